@@ -1,0 +1,91 @@
+"""The command line: it picks a command and turns faults into one line and a status.
+
+Every command is a module of `pendpipe.commands` with two functions,
+``add_arguments(parser)`` and ``run(arguments) -> int``. Only the module of the command
+that was asked for is imported, since a job's cost is its imports.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+from pendpipe.errors import InputError
+from pendpipe.version import __version__
+
+COMMANDS: Final = {
+    "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
+    "convert": "any supported recording to the plain CSV form",
+    "acquire": "record from a Dataq instrument, real or simulated",
+    "calibrate": "volts against angles to V/rad, with a linearity test",
+    "simulate": "a recording from a described pendulum and measurement chain",
+    "turning-points": "the turning points of one recording",
+    "fit": "a, b, c and the rest of one recording",
+    "separate": "the hysteretic and the viscous part of a campaign's losses",
+    "compare": "a campaign's losses beside Eq. 16",
+    "figures": "the figures 3 to 10 of a campaign",
+    "report": "one self-contained page about a campaign",
+    "config": "check a configuration, or print its schema",
+}
+"""The commands with the line that ``--help`` shows for each."""
+
+
+def _list_of_commands() -> str:
+    width = max(map(len, COMMANDS)) + 2
+    return "\n".join(f"  {name:<{width}}{text}" for name, text in COMMANDS.items())
+
+
+def _parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Parse the words of one call; argparse ends the program with 2 on bad usage."""
+    if argv and argv[0] in COMMANDS:
+        module = importlib.import_module(f"pendpipe.commands.{argv[0].replace('-', '_')}")
+        parser = argparse.ArgumentParser(
+            prog=f"pendpipe {argv[0]}",
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(parser)
+        arguments = parser.parse_args(argv[1:])
+        arguments.run = module.run
+        return arguments
+    parser = argparse.ArgumentParser(
+        prog="pendpipe",
+        description=(__import__("pendpipe").__doc__ or "").splitlines()[0],
+        epilog="commands (each has its own --help):\n" + _list_of_commands(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"pendpipe {__version__}")
+    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="see below")
+    return parser.parse_args(argv)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns
+    -------
+    int
+        0 done; 1 a fault of the program's own (with its traceback); 2 the input or the
+        usage is wrong (one line on standard error); 3 only where ``--fail-on`` asks.
+    """
+    arguments = _parse(sys.argv[1:] if argv is None else argv)
+    try:
+        return int(arguments.run(arguments))
+    except InputError as fault:
+        print(f"pendpipe: {fault}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # The reader of our output (`head`, say) has gone; that is nobody's fault.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("pendpipe: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

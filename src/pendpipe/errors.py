@@ -1,0 +1,40 @@
+"""What is said when the input, and not the program, is at fault.
+
+Every message is one line: where, what is wrong, what to do. The command line prints it
+and ends with status 2; a Snakemake stage writes it into ``refused.json`` instead.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """The input or the usage is wrong, and the user can mend it.
+
+    Parameters
+    ----------
+    place
+        The file (or port, or option) at fault; a path, or a path with a line or column
+        (``"a.csv, line 7"``).
+    problem
+        What is wrong with it, in a clause that needs no context.
+    remedy
+        What to do about it.
+
+    Examples
+    --------
+    >>> str(InputError("a.csv, line 7", "time_s falls from 0.3 to 0.2", "sort the rows by time"))
+    'a.csv, line 7: time_s falls from 0.3 to 0.2; sort the rows by time'
+    """
+
+    def __init__(self, place: str | Path, problem: str, remedy: str) -> None:
+        self.place = str(place)
+        self.problem = problem
+        self.remedy = remedy
+        line = f"{self.place}: {problem}; {remedy}"
+        super().__init__(" ".join(line.split()))
+
+
+class NotAnalysableError(InputError):
+    """The recording can be read, but holds no free decay that could be analysed."""

@@ -1,0 +1,46 @@
+"""A number with its uncertainty, as it stands in every result file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An estimated quantity.
+
+    Parameters
+    ----------
+    value
+        The estimate, in `unit`; ``nan`` where there is none (null in JSON).
+    sd
+        Its standard deviation, in `unit`.
+    unit
+        SI, radians; ``""`` for a pure number.
+    interval95
+        The 95 % interval; it need not be symmetric, and is one-sided at a bound.
+        ``value -+ 1.96 sd`` where none is given.
+    at_bound
+        Whether the estimate lies on the edge of what is possible (a, b, c = 0).
+    """
+
+    value: float
+    sd: float
+    unit: str
+    interval95: tuple[float, float] | None = None
+    at_bound: bool = False
+
+    def as_json(self, *, full: bool = True) -> dict[str, Any]:
+        """Return the form of fit.json; with ``full=False`` that of campaign.json."""
+        if not full:
+            return {"value": self.value, "sd": self.sd, "unit": self.unit}
+        half = 1.959963984540054 * self.sd
+        low, high = self.interval95 or (self.value - half, self.value + half)
+        return {
+            "value": self.value,
+            "sd": self.sd,
+            "interval95": [low, high],
+            "at_bound": self.at_bound,
+            "unit": self.unit,
+        }

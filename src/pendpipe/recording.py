@@ -1,0 +1,278 @@
+"""One recording: samples, time base, units, provenance; and its plain form on disk.
+
+This is the only type that crosses from acquisition and formats to the analysis. The
+plain form is a CSV (contract of the project): a header with ``time_s`` and one of
+``angle_rad``, ``volts``, ``displacement_m``, optionally ``quality``, and before it any
+number of lines ``# key: value``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from pendpipe.arrays import BoolArray, ByteArray, FloatArray
+from pendpipe.errors import InputError
+from pendpipe.files import replaced
+
+Quantity = Literal["angle_rad", "volts", "displacement_m"]
+QUANTITIES: Final = ("angle_rad", "volts", "displacement_m")
+UNITS: Final[Mapping[str, str]] = {"angle_rad": "rad", "volts": "V", "displacement_m": "m"}
+
+GOOD, SUSPECT, MISSING = 0, 1, 2
+"""The values of ``quality``: a good sample, a suspect one, a row that marks a gap."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples of one channel against time.
+
+    Parameters
+    ----------
+    time_s
+        Times of the samples, shape (n,), strictly rising.
+    values
+        The readings, shape (n,), in the unit of `quantity`; NaN where `quality` is 2.
+    quantity
+        What `values` are: ``"angle_rad"``, ``"volts"`` or ``"displacement_m"``.
+    quality
+        0 good, 1 suspect, 2 missing, shape (n,); ``None`` when all are good.
+    metadata
+        Whatever stood before the header: ``volts_per_radian``, ``bits``,
+        ``range_volts``, ``range_low_volts``, ``source``, ``recorded_at``, ...
+    resolution
+        The step between neighbouring readings in the unit of `values`, where known.
+    notes
+        What a reader guessed or noticed, a clause each, for the user to see.
+    """
+
+    time_s: FloatArray
+    values: FloatArray
+    quantity: Quantity
+    quality: ByteArray | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    resolution: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def unit(self) -> str:
+        """The unit of `values`."""
+        return UNITS[self.quantity]
+
+    @cached_property
+    def usable(self) -> BoolArray:
+        """Which samples hold a reading: neither missing nor NaN; shape (n,)."""
+        reading = np.isfinite(self.values)
+        return reading if self.quality is None else reading & (self.quality != MISSING)
+
+    @cached_property
+    def interval_s(self) -> float:
+        """The usual time between samples: the median of the differences."""
+        return float(np.median(np.diff(self.time_s))) if len(self) > 1 else float("nan")
+
+    def number(self, key: str) -> float | None:
+        """Read a number from the metadata; ``None`` where it is absent or blank."""
+        text = self.metadata.get(key, "").strip()
+        if not text:
+            return None
+        try:
+            return float(text)
+        except ValueError:
+            raise InputError(
+                f"metadata {key}", f"'{text}' is no number", f"write '# {key}: 3.85'"
+            ) from None
+
+    def between(self, start_s: float | None, stop_s: float | None) -> Recording:
+        """Return the samples with ``start_s <= time_s <= stop_s`` (either may be open)."""
+        low = -np.inf if start_s is None else start_s
+        high = np.inf if stop_s is None else stop_s
+        keep = (self.time_s >= low) & (self.time_s <= high)
+        return replace(
+            self,
+            time_s=self.time_s[keep],
+            values=self.values[keep],
+            quality=None if self.quality is None else self.quality[keep],
+        )
+
+    def as_motion(self, volts_per_radian: float | None = None) -> Recording:
+        """Return the same recording in radians (or metres), volts divided by V/rad.
+
+        Raises
+        ------
+        InputError
+            If the readings are volts and no sensor constant is known.
+        """
+        if self.quantity != "volts":
+            return self
+        constant = volts_per_radian or self.number("volts_per_radian")
+        if not constant:
+            raise InputError(
+                self.metadata.get("source", "recording"),
+                "the readings are volts and no sensor constant is known",
+                "give --volts-per-radian (see pendpipe calibrate)",
+            )
+        return replace(
+            self,
+            values=self.values / constant,
+            quantity="angle_rad",
+            resolution=None if self.resolution is None else self.resolution / abs(constant),
+            metadata={**self.metadata, "volts_per_radian": repr(float(constant))},
+        )
+
+
+def write_plain(path: str | Path, recording: Recording) -> None:
+    """Write the plain CSV form: metadata lines, header, a row a sample, all digits."""
+    columns = ["time_s", recording.quantity]
+    rows = [map(repr, recording.time_s.tolist()), map(repr, recording.values.tolist())]
+    if recording.quality is not None:
+        columns.append("quality")
+        rows.append(map(str, recording.quality.tolist()))
+    with replaced(path) as stream:
+        for key, value in recording.metadata.items():
+            stream.write(f"# {key}: {' '.join(str(value).split())}\n")
+        stream.write(",".join(columns) + "\n")
+        stream.writelines(",".join(row) + "\n" for row in zip(*rows, strict=True))
+
+
+def read_plain(path: str | Path) -> Recording:
+    """Read the plain CSV form.
+
+    Raises
+    ------
+    InputError
+        On a missing column, text in a number, NaN outside a marked gap, a time that
+        does not rise, or a file without samples: file, line, what, remedy.
+    """
+    place = Path(path)
+    try:
+        text = place.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(place, "there is no such file", "check the path") from None
+    except UnicodeDecodeError:
+        raise InputError(place, "this is no UTF-8 text", "run pendpipe convert first") from None
+    lines = text.splitlines()
+    metadata: dict[str, str] = {}
+    first = 0
+    while first < len(lines) and (lines[first].startswith("#") or not lines[first].strip()):
+        key, _, value = lines[first].lstrip("# ").partition(":")
+        if value:
+            metadata[key.strip()] = value.strip()
+        first += 1
+    if first == len(lines):
+        raise InputError(place, "the file is empty", "record again, or give another file")
+    names = [name.strip() for name in lines[first].split(",")]
+    quantity, picked = _columns(place, first + 1, names)
+    table = _numbers(place, lines, first + 1, picked, len(names))
+    recording = Recording(
+        time_s=np.ascontiguousarray(table[:, 0]),
+        values=np.ascontiguousarray(table[:, 1]),
+        quantity=quantity,
+        quality=table[:, 2].astype(np.uint8) if len(picked) > 2 else None,
+        metadata=metadata,
+    )
+    check(place, recording, first_line=first + 2)
+    return replace(recording, resolution=_resolution(recording))
+
+
+def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
+    """Find the columns of the plain form in its header."""
+    where = f"{place}, line {line}"
+    if "time_s" not in names:
+        raise InputError(
+            where, f"the column time_s is missing (found {', '.join(names)})", "name it time_s"
+        )
+    found = [name for name in QUANTITIES if name in names]
+    if len(found) != 1:
+        raise InputError(
+            where,
+            f"exactly one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
+            "rename the column, or run pendpipe convert",
+        )
+    picked = [names.index("time_s"), names.index(found[0])]
+    if "quality" in names:
+        picked.append(names.index("quality"))
+    return found[0], picked
+
+
+def _numbers(
+    place: Path, lines: list[str], start: int, picked: list[int], width: int
+) -> FloatArray:
+    """Turn the rows into numbers, quickly; on a fault go through them one by one."""
+    rows = [line for line in lines[start:] if line.strip()]
+    if not rows:
+        raise InputError(place, "there are no samples", "record again, or give another file")
+    try:
+        return np.loadtxt(rows, delimiter=",", usecols=picked, ndmin=2, dtype=np.float64)
+    except ValueError:
+        pass
+    for number, line in enumerate(lines[start:], start=start + 1):
+        if not line.strip():
+            continue
+        cells = line.split(",")
+        where = f"{place}, line {number}"
+        if len(cells) < width:
+            raise InputError(where, f"{len(cells)} cells, not {width}", "complete or drop the row")
+        for index in picked:
+            try:
+                float(cells[index])
+            except ValueError:
+                raise InputError(
+                    where, f"'{cells[index].strip()}' is no number", "mend or drop the row"
+                ) from None
+    raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
+
+
+def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> None:
+    """Refuse a recording whose samples can't be true.
+
+    Parameters
+    ----------
+    place
+        The file, for the message.
+    recording
+        What was read from it.
+    first_line
+        The line of the first sample, so that the message can name the row.
+    """
+    time, values = recording.time_s, recording.values
+    if len(time) == 0:
+        raise InputError(place, "there are no samples", "record again, or give another file")
+    marked = np.zeros(len(time), dtype=bool)
+    if recording.quality is not None:
+        marked = recording.quality == MISSING
+        odd = np.flatnonzero(recording.quality > MISSING)
+        if odd.size:
+            raise InputError(
+                f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "mend the row"
+            )
+    bad = np.flatnonzero(~np.isfinite(time) | (~np.isfinite(values) & ~marked))
+    if bad.size:
+        raise InputError(
+            f"{place}, line {first_line + bad[0]}",
+            f"{bad.size} value(s) that are NaN or infinite",
+            "drop the rows, or mark them with quality 2",
+        )
+    falls = np.flatnonzero(np.diff(time) <= 0)
+    if falls.size:
+        raise InputError(
+            f"{place}, line {first_line + falls[0] + 1}",
+            f"time_s does not rise ({time[falls[0]]:.9g} is followed by {time[falls[0] + 1]:.9g})",
+            "sort the rows by time and drop repeated ones",
+        )
+
+
+def _resolution(recording: Recording) -> float | None:
+    """The step of the converter, from `bits` and `range_volts`, where both are told."""
+    bits, high = recording.number("bits"), recording.number("range_volts")
+    if bits is None or high is None or recording.quantity != "volts":
+        return None
+    low = recording.number("range_low_volts")
+    return float((high - (-high if low is None else low)) / 2.0**bits)

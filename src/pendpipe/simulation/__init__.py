@@ -1,0 +1,1 @@
+"""Recordings made from a described pendulum and measurement chain."""
