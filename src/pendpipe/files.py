@@ -22,7 +22,7 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     path
         The file to write; its folder is made where it is missing.
     mode
-        ``"w"`` for text (UTF-8, ``\\n`` line ends on every system) or ``"wb"``.
+        ``"w"`` for text (UTF-8, line feeds on every system) or ``"wb"``.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)

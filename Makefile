@@ -1,0 +1,45 @@
+# Everything lives in .venv/; nothing else is installed. The README has the same steps for
+# a machine without make.
+.DELETE_ON_ERROR:
+.PHONY: campaign test report bench evidence check clean
+
+PYTHON ?= python3
+CORES ?= 2
+BIN := .venv/bin
+RUN := PATH="$(CURDIR)/$(BIN):$$PATH" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+campaign: .venv/installed
+	$(RUN) snakemake --cores $(CORES)
+
+test: .venv/installed
+	$(RUN) pytest -q -n $(CORES)
+
+report: .venv/installed
+	$(RUN) snakemake --cores $(CORES)
+	$(RUN) snakemake --report results/snakemake-report.html
+
+bench: .venv/installed-bench
+	$(RUN) python -m benchmarks
+
+evidence: .venv/installed
+	$(RUN) python -m benchmarks.evidence
+
+# What CI asks besides the tests.
+check: .venv/installed
+	$(RUN) ruff check .
+	$(RUN) ruff format --check .
+	$(RUN) mypy
+	$(RUN) snakefmt --check Snakefile workflow
+	$(RUN) snakemake --lint
+
+.venv/installed: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	touch $@
+
+.venv/installed-bench: .venv/installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]"
+	touch $@
+
+clean:
+	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis results/*/ results/*.json results/*.html

@@ -1,0 +1,28 @@
+# The campaign: acquire -> calibrate -> turning points -> fit -> separate -> compare ->
+# figures -> report. A stage's rule is in workflow/rules, its work in src/pendpipe.
+from snakemake.utils import min_version
+
+min_version("9.8")
+
+
+configfile: "config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/acquire.smk"
+include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/turning_points.smk"
+include: "workflow/rules/fit.smk"
+include: "workflow/rules/separate.smk"
+include: "workflow/rules/compare.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+# `all` stands in this file: Snakemake forgets the default target of an included one.
+rule all:
+    default_target: True
+    input:
+        f"{RESULTS}/campaign.json",
+        f"{RESULTS}/report.html",
+        figure_files(),

@@ -1,0 +1,162 @@
+"""A serial line: pyserial's ports, with the user's faults in one line each.
+
+`serial.serial_for_url` opens device files, COM ports and ``socket://HOST:PORT`` alike.
+All limits here are seconds of the host's clock: how long a byte takes from one process to
+another does not depend on the scale of a simulated clock.
+"""
+
+from __future__ import annotations
+
+import errno
+import sys
+import time
+from types import TracebackType
+from typing import Final, Self
+
+import serial
+
+from pendpipe.errors import InputError
+
+_PERMISSION: Final = {
+    "linux": "join the group that owns it (often: sudo usermod -aG dialout $USER), then log in again",
+    "darwin": "use the /dev/cu.* name and close the programs that hold it",
+    "win32": "close the program that holds it (WinDaq, a terminal)",
+}
+
+
+class LineLostError(InputError):
+    """The line broke while it was in use: a cable pulled, a device switched off."""
+
+
+class Line:
+    """An open serial line.
+
+    Parameters
+    ----------
+    port
+        A device file, a COM port, or a URL of pyserial (``socket://127.0.0.1:4001``).
+    baudrate
+        Bits a second; 8 data bits, no parity, one stop bit, no flow control. USB devices
+        and sockets take any.
+
+    Raises
+    ------
+    InputError
+        If the port does not exist, is busy, may not be opened, or is no serial port.
+    """
+
+    def __init__(self, port: str, baudrate: int) -> None:
+        self.port = port
+        try:
+            self._serial = serial.serial_for_url(port, do_not_open=True)
+            self._serial.baudrate = baudrate
+            self._serial.timeout = 0
+            self._serial.write_timeout = 2.0
+            # DTR and RTS feed the RS-232 models, which have no other supply.
+            self._serial.dtr = self._serial.rts = True
+            if "://" not in port:
+                self._serial.exclusive = True
+            self._serial.open()
+        except (OSError, ValueError) as fault:
+            raise _cannot_open(port, fault) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def set_baudrate(self, baudrate: int) -> None:
+        """Change the speed of the open line."""
+        self._serial.baudrate = baudrate
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+        try:
+            self._serial.write(data)
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def receive(self, limit_s: float) -> bytes:
+        """Return what has arrived; if nothing has, wait for it at most `limit_s`."""
+        try:
+            self._serial.timeout = limit_s
+            first: bytes = self._serial.read(1)
+            if not first:
+                return b""
+            # With no time to wait, pyserial's read makes one system call and returns.
+            self._serial.timeout = 0
+            return first + bytes(self._serial.read(1 << 16))
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def read(self, size: int, limit_s: float) -> bytes:
+        """Return `size` bytes, or the fewer that came within `limit_s`."""
+        try:
+            self._serial.timeout = limit_s
+            return bytes(self._serial.read(size))
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def read_until(self, end: bytes, limit_s: float) -> bytes:
+        """Return everything up to and with `end`, or what came within `limit_s`."""
+        stop = time.monotonic() + limit_s
+        got = bytearray()
+        while not got.endswith(end) and (left := stop - time.monotonic()) > 0:
+            got += self.read(1, left)
+        return bytes(got)
+
+    def discard(self, quiet_s: float, limit_s: float = 1.0) -> bytes:
+        """Throw away what arrives until nothing has come for `quiet_s`; return its end."""
+        stop = time.monotonic() + limit_s
+        tail = b""
+        while data := self.receive(quiet_s):
+            tail = (tail + data)[-64:]
+            if time.monotonic() > stop:
+                break
+        return tail
+
+    def close(self) -> None:
+        """Close the line."""
+        # pyserial forgets the socket of a broken connection without closing it.
+        connection = getattr(self._serial, "_socket", None)
+        self._serial.close()
+        if connection is not None:
+            connection.close()
+
+    def _lost(self, fault: Exception) -> LineLostError:
+        return LineLostError(
+            self.port,
+            f"the line was lost ({_text(fault)})",
+            "check cable and power, and that no other program uses the port",
+        )
+
+
+def _text(fault: BaseException) -> str:
+    """One short clause out of pyserial's messages, which wrap one another."""
+    return " ".join(str(fault).split())[:160]
+
+
+def _cannot_open(port: str, fault: Exception) -> InputError:
+    """Say why a port does not open, and what to do about it on this system."""
+    text = _text(fault)
+    number = getattr(fault, "errno", None)
+    if number == errno.ENOENT or "FileNotFoundError" in text:
+        return InputError(port, "there is no such port", "pendpipe acquire --list shows the ports")
+    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        return InputError(port, "the port is busy", "close the program that uses it")
+    if number in (errno.EACCES, errno.EPERM) or "PermissionError" in text:
+        remedy = _PERMISSION.get(sys.platform, "ask the owner of the machine")
+        return InputError(port, "the port may not be opened", remedy)
+    if "refused" in text:
+        return InputError(port, "nothing listens there", "start the device, or mend the address")
+    if "configure port" in text:
+        return InputError(port, "this is no serial port", "pendpipe acquire --list shows the ports")
+    return InputError(
+        port, f"the port can't be opened ({text})", "pendpipe acquire --list shows the ports"
+    )

@@ -1,0 +1,68 @@
+"""The schema and the manual's tables, made from the models."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any, Final
+
+from pendpipe.configuration.models import Configuration
+
+BEGIN: Final = "<!-- made by `pendpipe config --manual`: begin -->"
+END: Final = "<!-- end -->"
+
+
+def schema() -> str:
+    """The JSON schema of a configuration, as the file in ``workflow/schemas`` holds it."""
+    content = Configuration.model_json_schema()
+    content["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return json.dumps(content, indent=1, sort_keys=True) + "\n"
+
+
+def manual() -> str:
+    """The tables of ``config/README.md``: every key, its kind, default and meaning."""
+    content = Configuration.model_json_schema()
+    parts = [_table("top level", content, content)]
+    for name, model in content["$defs"].items():
+        parts.append(_table(f"{name}: {model['description']}", model, content))
+    return "\n".join([BEGIN, "", *parts, END])
+
+
+def _table(title: str, model: dict[str, Any], whole: dict[str, Any]) -> str:
+    required = model.get("required", [])
+    rows = [
+        f"| `{key}` | {_kind(entry)} | {_default(entry, key in required)} | {entry['description']} |"
+        for key, entry in model["properties"].items()
+    ]
+    head = [f"### {title}", "", "| key | kind | default | meaning |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows, ""])
+
+
+def _kind(entry: dict[str, Any]) -> str:
+    """The kind of a value in a reader's words."""
+    return " or ".join(dict.fromkeys(_kinds(entry)))
+
+
+def _kinds(entry: dict[str, Any]) -> Iterator[str]:
+    if "$ref" in entry:
+        yield entry["$ref"].rpartition("/")[2]
+    elif "enum" in entry:
+        yield ", ".join(f"`{value}`" for value in entry["enum"])
+    elif "anyOf" in entry:
+        for option in entry["anyOf"]:
+            yield from _kinds(option)
+    elif "additionalProperties" in entry:
+        yield "names, each with " + _kind(entry["additionalProperties"])
+    else:
+        yield {"null": "blank", "string": "text", "boolean": "true or false"}.get(
+            entry["type"], str(entry["type"])
+        )
+
+
+def _default(entry: dict[str, Any], required: bool) -> str:
+    if required:
+        return "needed"
+    default = entry.get("default")
+    if default is None or isinstance(default, dict):
+        return "blank" if default is None and "default" in entry else "see there"
+    return f"`{json.dumps(default)}`"

@@ -1,0 +1,89 @@
+"""What the workflow's rules need to know about a campaign: names, sources, digests."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pendpipe.configuration.load import Campaign
+from pendpipe.files import replaced
+
+
+def digest(content: Any) -> str:
+    """Hash any JSON-like content, the same on every machine."""
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def store(content: Mapping[str, Any], folder: str | Path) -> str:
+    """Write a configuration under a name made of its content, unless it is there.
+
+    Snakemake merges files and ``--config``; the jobs read what came out of it. The name
+    is not a parameter of the rules, so that a change reruns only what it touches.
+    """
+    path = Path(folder) / f"configuration-{digest(content)}.json"
+    if not path.exists():
+        with replaced(path) as stream:
+            json.dump(content, stream, indent=1, default=str)
+    return path.as_posix()
+
+
+def source_files(campaign: Campaign, record: str) -> list[str]:
+    """The file that a record comes from, where it is one and exists.
+
+    A missing file is no input: the record is then refused by its own job, in one line,
+    while Snakemake would stop the whole campaign.
+    """
+    path = campaign.record(record).file
+    return [path.as_posix()] if path is not None and path.is_file() else []
+
+
+def acquisition(campaign: Campaign, record: str) -> str:
+    """Digest all that a record's acquisition depends on."""
+    row = campaign.record(record)
+    settings = campaign.configuration
+    content: dict[str, Any] = {"row": asdict(row)}
+    if row.source == "simulated":
+        assert settings.simulated is not None
+        truth = settings.simulated.model_dump()
+        releases = truth.pop("release")
+        content |= {
+            "truth": truth,
+            "release": releases.get(row.record, releases.get(row.fluid)),
+            "seed": settings.seed,
+            "apparatus": settings.apparatus and settings.apparatus.model_dump(),
+            "geometry": (geometry := campaign.geometry(row)) and geometry.model_dump(),
+            "fluid": settings.fluids[row.fluid].model_dump(),
+        }
+    return digest(content)
+
+
+def caliper(campaign: Campaign) -> str:
+    """Digest all that the sensor's calibration depends on."""
+    settings = campaign.configuration
+    content: dict[str, Any] = {
+        "run": settings.calibration and settings.calibration.model_dump(),
+        "seed": settings.seed,
+    }
+    if settings.simulated is not None:
+        content["sensor"] = settings.simulated.sensor.model_dump()
+        content["device"] = settings.simulated.device.model_dump()
+    return digest(content)
+
+
+def theory(campaign: Campaign) -> str:
+    """Digest what the campaign's own stages take from the configuration."""
+    content = campaign.configuration.model_dump(
+        include={"title", "apparatus", "geometries", "fluids", "typical_record"}
+    )
+    return digest([content, [asdict(record) for record in campaign.records]])
+
+
+def sensor_constant(campaign: Campaign, record: str) -> str:
+    """The option that gives a record's own V/rad, where the table has one."""
+    given = campaign.record(record).volts_per_radian
+    return "" if given is None else f"--volts-per-radian {given!r}"

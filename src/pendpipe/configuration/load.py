@@ -1,0 +1,138 @@
+"""A campaign: the configuration and its records, read, checked and held together."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from pendpipe.configuration.faults import as_input_error, nearest
+from pendpipe.configuration.models import Configuration, Geometry
+from pendpipe.configuration.records import Record, read_records
+from pendpipe.errors import InputError
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A checked configuration with its records."""
+
+    configuration: Configuration
+    records: tuple[Record, ...]
+
+    def record(self, name: str) -> Record:
+        """Find a record by its name."""
+        for entry in self.records:
+            if entry.record == name:
+                return entry
+        known = [entry.record for entry in self.records]
+        raise InputError(self.configuration.records, f"no record '{name}'", nearest(name, known))
+
+    def geometry(self, record: Record) -> Geometry | None:
+        """Where the weights are for a record; ``None`` where none is given."""
+        return self.configuration.geometries.get(record.geometry)
+
+
+def read_configuration(path: str | Path) -> dict[str, Any]:
+    """Read a configuration file, YAML or JSON, unchecked."""
+    place = Path(path)
+    try:
+        text = place.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(place, "there is no such configuration", "see config/README.md") from None
+    content = json.loads(text) if place.suffix == ".json" else _yaml(place, text)
+    if not isinstance(content, dict):
+        raise InputError(place, "this is no mapping of keys to values", "see config/README.md")
+    return content
+
+
+def _yaml(place: Path, text: str) -> Any:
+    """Parse YAML; a fault names its line."""
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except yaml.MarkedYAMLError as fault:
+        line = fault.problem_mark.line + 1 if fault.problem_mark else 1
+        raise InputError(f"{place}, line {line}", fault.problem or "no YAML", "mend it") from None
+
+
+def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
+    """Check a configuration and read its records.
+
+    Parameters
+    ----------
+    content
+        The keys and values, from `read_configuration` or from Snakemake.
+    place
+        Where they stand, for the messages.
+
+    Raises
+    ------
+    InputError
+        On the first fault: the place, what is wrong, what to do.
+    """
+    try:
+        configuration = Configuration.model_validate(content)
+    except ValidationError as fault:
+        raise as_input_error(place, fault, Configuration) from None
+    records = tuple(read_records(configuration.records))
+    campaign = Campaign(configuration, records)
+    for entry in records:
+        _check_record(campaign, entry)
+    _check_geometries(configuration, place)
+    if configuration.typical_record is not None:
+        campaign.record(configuration.typical_record)
+    return campaign
+
+
+def _check_record(campaign: Campaign, entry: Record) -> None:
+    """Refuse a record that names what the configuration does not have."""
+    configuration = campaign.configuration
+    where = f"{configuration.records}, record {entry.record}"
+    known: dict[str, tuple[str, Mapping[str, Any]]] = {
+        "fluid": (entry.fluid, configuration.fluids),
+        "geometry": (entry.geometry, configuration.geometries),
+    }
+    for column, (name, names) in known.items():
+        if name and name not in names:
+            raise InputError(where, f"unknown {column} '{name}'", nearest(name, names))
+    if entry.start_s is not None and entry.stop_s is not None and entry.stop_s <= entry.start_s:
+        raise InputError(where, "stop_s is not after start_s", "mend or blank the cells")
+    if entry.source != "simulated":
+        return
+    missing = [
+        name
+        for name, there in {
+            "apparatus": configuration.apparatus,
+            "simulated": configuration.simulated,
+            "a fluid": entry.fluid,
+            "a geometry": entry.geometry,
+        }.items()
+        if not there
+    ]
+    if missing:
+        raise InputError(where, f"a simulated record needs {', '.join(missing)}", "add it")
+    assert configuration.simulated is not None
+    releases = configuration.simulated.release
+    if entry.record not in releases and entry.fluid not in releases:
+        raise InputError(where, "nothing says how it is released", "add it to simulated.release")
+
+
+def _check_geometries(configuration: Configuration, place: str | Path) -> None:
+    """Refuse a geometry that clamps a weight the apparatus does not have."""
+    apparatus = configuration.apparatus
+    for name, geometry in configuration.geometries.items():
+        where = f"{place}, geometries.{name}"
+        if apparatus is None:
+            raise InputError(where, "there is no apparatus", "add the section apparatus")
+        for weight in geometry.weights_m:
+            if weight not in apparatus.weights:
+                raise InputError(
+                    where, f"unknown weight '{weight}'", nearest(weight, apparatus.weights)
+                )
+        if geometry.sphere and apparatus.sphere is None:
+            raise InputError(where, "the apparatus has no sphere", "add it, or set sphere: false")

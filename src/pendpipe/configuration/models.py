@@ -1,0 +1,182 @@
+"""What may stand in a campaign's configuration, key by key.
+
+The JSON schema in ``workflow/schemas`` and the table in ``config/README.md`` are made
+from these models, so a key is described once: here. Lengths are metres, masses
+kilograms, angles radians; distances are counted from the axis along the rod.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class Section(BaseModel):
+    """A part of the configuration; a key that is not listed is refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Rod(Section):
+    """The rod, pivoted at its middle."""
+
+    mass_kg: Positive = Field(description="mass of the rod with what is glued to it")
+    length_m: Positive = Field(description="its whole length")
+
+
+class Weight(Section):
+    """A weight that can be clamped anywhere on the rod."""
+
+    mass_kg: Positive = Field(description="mass")
+    radius_m: NotNegative = Field(
+        0.0, description="radius of a solid sphere of that mass; 0 for a point"
+    )
+    frontal_area_m2: NotNegative = Field(
+        0.0, description="area that meets the air, for the quadratic drag; 0 for none"
+    )
+
+
+class Sphere(Section):
+    """The sphere at the lower end, which swings in the fluid."""
+
+    mass_kg: Positive = Field(description="mass with its screw")
+    diameter_m: Positive = Field(description="diameter")
+    diameter_sd_m: NotNegative = Field(0.0, description="standard uncertainty of the diameter")
+    distance_m: Positive = Field(description="from the axis to the centre of the sphere (L)")
+    distance_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that distance")
+    screw_volume_m3: NotNegative = Field(
+        0.0, description="volume of the immersed part of the screw"
+    )
+    screw_distance_m: NotNegative = Field(
+        0.0, description="from the axis to the middle of the immersed part of the screw"
+    )
+
+
+class Apparatus(Section):
+    """The compound pendulum, before the weights are clamped."""
+
+    gravity_m_per_s2: Positive = Field(9.80665, description="local acceleration of free fall")
+    rod: Rod = Field(description="the rod")
+    weights: dict[str, Weight] = Field(description="the weights, by name")
+    sphere: Sphere | None = Field(None, description="the sphere that swings in the fluid")
+    bearing_torque_n_m: NotNegative = Field(0.0, description="friction torque of the bearings")
+    added_mass: Literal["boundary-layer", "plain"] = Field(
+        "boundary-layer",
+        description="of the displaced fluid: 1/2 + 9 delta/(4 radius), or the plain 1/2",
+    )
+
+
+class Geometry(Section):
+    """Where the weights are clamped for a record."""
+
+    weights_m: dict[str, float] = Field(
+        description="name of a weight to its distance from the axis; negative above it"
+    )
+    sphere: bool = Field(True, description="whether the sphere is fitted")
+
+
+class Fluid(Section):
+    """What the pendulum swings in."""
+
+    density_kg_per_m3: Positive = Field(description="density")
+    viscosity_pa_s: Positive = Field(description="dynamic viscosity")
+    drag_coefficient: NotNegative = Field(
+        0.0, description="C_d of the drag that grows with the square of the velocity"
+    )
+    boundary_layer: bool = Field(
+        True, description="whether Stokes' drag with its history term acts (Eq. 2)"
+    )
+
+
+class Sensor(Section):
+    """The angle sensor of the simulated instrument."""
+
+    volts_per_radian: Positive = Field(3.85, description="its constant")
+    offset_volts: float = Field(0.0, description="its reading at rest")
+    noise_volts: NotNegative = Field(0.0, description="rms of its white noise")
+
+
+class Device(Section):
+    """The converter of the simulated instrument."""
+
+    kind: Literal["di154", "di2108"] = Field(
+        "di2108", description="di154: 12 bit on a slow line; di2108: 16 bit"
+    )
+    clock_scale: Positive = Field(
+        1000.0, description="seconds of the device for each second of the wall clock"
+    )
+
+
+class Release(Section):
+    """How a simulated record begins and ends."""
+
+    angle_rad: Positive = Field(description="amplitude at the release")
+    samples: Annotated[int, Field(ge=64, le=10_000_000)] = Field(
+        32768, description="number of samples kept"
+    )
+    duration_s: Positive | None = Field(
+        None, description="length of the record; blank: until the amplitude meets the noise"
+    )
+
+
+class Simulated(Section):
+    """The truth that the simulated instrument hides."""
+
+    hysteretic_coefficient_s2: Positive = Field(3940.0, description="k of Q_hys = k f^2")
+    drag_factor: Positive = Field(1.117, description="drag in the fluid over Eq. 2")
+    history_coefficient: NotNegative = Field(1.0, description="C_H of Eq. 2")
+    sensor: Sensor = Field(default_factory=Sensor, description="the angle sensor")
+    device: Device = Field(default_factory=Device, description="the converter")
+    release: dict[str, Release] = Field(
+        description="how a record begins, by fluid, or by record where one differs"
+    )
+
+
+class CaliperRun(Section):
+    """The calibration of the sensor against a caliper."""
+
+    source: str = Field(
+        "simulated", description="`simulated`, or a CSV with displacement_m or angle and volts"
+    )
+    arm_m: Positive = Field(description="from the axis to where the caliper touches")
+    travel_m: Positive = Field(description="largest displacement to each side")
+    points: Annotated[int, Field(ge=5)] = Field(description="number of positions")
+    displacement_sd_m: NotNegative = Field(description="standard uncertainty of the caliper")
+    samples: Annotated[int, Field(ge=1)] = Field(64, description="samples averaged at a position")
+
+
+class Fit(Section):
+    """How a, b and c are found."""
+
+    method: Literal["waveform", "turning-points"] = Field(
+        "waveform", description="Eq. 8 on all samples, or Eq. 14 on the turning points"
+    )
+
+
+class Configuration(Section):
+    """A campaign."""
+
+    title: str = Field(description="heading of the report")
+    records: str = Field("config/records.tsv", description="table of the records, a row each")
+    results: str = Field("results", description="folder of the results")
+    seed: Annotated[int, Field(ge=0)] = Field(
+        0, description="seed of everything that is drawn at random"
+    )
+    strict: bool = Field(
+        False, description="whether a record that can't be used stops the campaign"
+    )
+    fit: Fit = Field(default_factory=Fit, description="how a, b and c are found")
+    apparatus: Apparatus | None = Field(None, description="the compound pendulum; none: no theory")
+    geometries: dict[str, Geometry] = Field(
+        {}, description="where the weights are clamped, by name"
+    )
+    fluids: dict[str, Fluid] = Field({}, description="the fluids, by name")
+    calibration: CaliperRun | None = Field(None, description="the sensor's calibration")
+    simulated: Simulated | None = Field(None, description="the truth of simulated records")
+    typical_record: str | None = Field(
+        None, description="the record of figures 7 and 8; none: the first in a fluid with a sphere"
+    )

@@ -1,0 +1,167 @@
+"""The table of records, ``config/records.tsv``: a row a record."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pendpipe.configuration.faults import nearest
+from pendpipe.errors import InputError
+
+COLUMNS: Final = (
+    "record",
+    "source",
+    "fluid",
+    "branch",
+    "geometry",
+    "channel",
+    "start_s",
+    "stop_s",
+    "volts_per_radian",
+    "temperature_c",
+)
+REQUIRED: Final = ("record", "source")
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+
+
+@dataclass(frozen=True)
+class Record:
+    """A row of the table; what is blank is ``None`` (or ``""`` for the words).
+
+    Parameters
+    ----------
+    record
+        Its name, that of its folder in ``results/``.
+    source
+        ``simulated``, ``dataq:<port>`` or a file.
+    fluid, branch, geometry
+        Names from the configuration; `branch` groups records (``low``, ``high``, ``air``).
+    channel
+        Channel or column of the source, as its reader names it.
+    start_s, stop_s
+        The part to use; blank: found from the recording.
+    volts_per_radian
+        The sensor's constant; blank: from the file, or from the campaign's calibration.
+    temperature_c
+        Of the fluid.
+    """
+
+    record: str
+    source: str
+    fluid: str = ""
+    branch: str = ""
+    geometry: str = ""
+    channel: str = ""
+    start_s: float | None = None
+    stop_s: float | None = None
+    volts_per_radian: float | None = None
+    temperature_c: float | None = None
+
+    @property
+    def file(self) -> Path | None:
+        """The file of the recording, where the source is one."""
+        if self.source == "simulated" or self.source.startswith("dataq:"):
+            return None
+        return Path(self.source)
+
+
+def read_records(path: str | Path) -> list[Record]:
+    """Read the table.
+
+    Raises
+    ------
+    InputError
+        On a missing or unknown column, a name that is no name or stands twice, or text
+        where a number belongs: file, line, what, remedy.
+    """
+    place = Path(path)
+    try:
+        text = place.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(place, "there is no such table", "see config/README.md") from None
+    rows = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.startswith("#")
+    ]
+    if not rows:
+        raise InputError(
+            place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}"
+        )
+    names = [name.strip() for name in rows[0][1].split("\t")]
+    _check_columns(f"{place}, line {rows[0][0]}", names)
+    records: list[Record] = []
+    for number, line in rows[1:]:
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
+        where = f"{place}, line {number}"
+        if len(cells) > len(names):
+            raise InputError(where, f"{len(cells)} cells, not {len(names)}", "separate by one tab")
+        cells += [""] * (len(names) - len(cells))
+        records.append(_record(where, dict(zip(names, cells, strict=True))))
+    if not records:
+        raise InputError(place, "the table has no records", "add a row a record")
+    _check_names(place, records)
+    return records
+
+
+def _check_columns(where: str, names: list[str]) -> None:
+    """Refuse a header with a column too few, unknown or twice."""
+    for name in REQUIRED:
+        if name not in names:
+            raise InputError(where, f"the column '{name}' is missing", "separate columns by tabs")
+    for name in names:
+        if name not in COLUMNS:
+            raise InputError(where, f"unknown column '{name}'", nearest(name, COLUMNS))
+        if names.count(name) > 1:
+            raise InputError(where, f"the column '{name}' stands twice", "drop one")
+
+
+def _record(where: str, row: dict[str, str]) -> Record:
+    """Make a record from the cells of a row."""
+    if not NAME.fullmatch(row["record"]):
+        raise InputError(
+            where, f"'{row['record']}' is no name for a folder", "use letters, digits, . _ -"
+        )
+    if not row["source"]:
+        raise InputError(where, "the source is blank", "write simulated, dataq:<port> or a file")
+    words = {name: row.get(name, "") for name in COLUMNS[:6]}
+    return Record(
+        **words,
+        start_s=_number(where, row, "start_s"),
+        stop_s=_number(where, row, "stop_s"),
+        volts_per_radian=_number(where, row, "volts_per_radian"),
+        temperature_c=_number(where, row, "temperature_c"),
+    )
+
+
+def _number(where: str, row: dict[str, str], name: str) -> float | None:
+    """Read a cell that holds a number or nothing."""
+    text = row.get(name, "")
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise InputError(where, f"{name} '{text}' is no number", "mend or blank the cell") from None
+    if not math.isfinite(value):
+        raise InputError(where, f"{name} is not finite", "mend or blank the cell")
+    return value
+
+
+def _check_names(place: Path, records: list[Record]) -> None:
+    """Refuse two records of one name, also where only the case differs (Windows)."""
+    seen: dict[str, str] = {}
+    reserved = {"figures", "calibration"}
+    for entry in records:
+        key = entry.record.lower()
+        if key in seen:
+            raise InputError(place, f"the record '{entry.record}' stands twice", "rename one")
+        if key in reserved:
+            raise InputError(
+                place, f"'{entry.record}' is a folder of the campaign's own", "rename the record"
+            )
+        seen[key] = entry.record

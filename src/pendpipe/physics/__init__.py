@@ -1,0 +1,133 @@
+"""The paper's equations as pure functions on arrays: SI units, radians, numpy only.
+
+Every function takes numbers or arrays that broadcast and returns a number or an array.
+The equations are used in their corrected forms; each docstring names its number.
+"""
+
+from pendpipe.physics.decay import amplitude, stopping_time, time_at
+from pendpipe.physics.decay_gradient import amplitude_and_gradient
+from pendpipe.physics.drag import (
+    POTENTIAL_FLOW_ADDED_MASS,
+    added_mass_coefficient,
+    harmonic_drag,
+    penetration_depth,
+    quadratic_drag_rate,
+    stokes_drag,
+    viscous_quality_factor,
+)
+from pendpipe.physics.friction import (
+    DecayRates,
+    QualityFactors,
+    decay_rates,
+    energy_power_friction,
+    energy_power_quality_factor,
+    net_quality_factor,
+    quality_factors,
+    structural_quality_factor,
+    universal_acceleration,
+)
+from pendpipe.physics.oscillator import (
+    damping_coefficient,
+    driven_pendulum_acceleration,
+    hysteretic_decrement_quality,
+    hysteretic_frequency_ratio,
+    hysteretic_frequency_shift,
+    hysteretic_quality_of_decrement,
+    logarithmic_decrement,
+    viscous_acceleration,
+    viscous_frequency_ratio,
+    viscous_frequency_shift,
+)
+from pendpipe.physics.pendulum import (
+    STANDARD_GRAVITY_M_PER_S2,
+    Fluid,
+    Part,
+    PointMass,
+    Rod,
+    Sphere,
+    added_inertia,
+    displaced_moment,
+    moment_of_inertia,
+    restoring_torque,
+    sphere_volume,
+    static_moment,
+)
+from pendpipe.physics.quality import (
+    amplitude_of_largest_quality_factor,
+    amplitude_rate,
+    largest_quality_factor,
+    quality_factor,
+    quality_factor_limit,
+    rates_from_energy_constants,
+)
+from pendpipe.physics.separation import hysteretic_quality_factor, without_hysteresis
+from pendpipe.physics.swing import (
+    Lengthening,
+    Swing,
+    bearing_friction_rate,
+    inertia_from_frequency,
+    period_lengthening,
+    swing,
+)
+from pendpipe.physics.water import water_density, water_viscosity
+
+__all__ = [
+    "POTENTIAL_FLOW_ADDED_MASS",
+    "STANDARD_GRAVITY_M_PER_S2",
+    "DecayRates",
+    "Fluid",
+    "Lengthening",
+    "Part",
+    "PointMass",
+    "QualityFactors",
+    "Rod",
+    "Sphere",
+    "Swing",
+    "added_inertia",
+    "added_mass_coefficient",
+    "amplitude",
+    "amplitude_and_gradient",
+    "amplitude_of_largest_quality_factor",
+    "amplitude_rate",
+    "bearing_friction_rate",
+    "damping_coefficient",
+    "decay_rates",
+    "displaced_moment",
+    "driven_pendulum_acceleration",
+    "energy_power_friction",
+    "energy_power_quality_factor",
+    "harmonic_drag",
+    "hysteretic_decrement_quality",
+    "hysteretic_frequency_ratio",
+    "hysteretic_frequency_shift",
+    "hysteretic_quality_factor",
+    "hysteretic_quality_of_decrement",
+    "inertia_from_frequency",
+    "largest_quality_factor",
+    "logarithmic_decrement",
+    "moment_of_inertia",
+    "net_quality_factor",
+    "penetration_depth",
+    "period_lengthening",
+    "quadratic_drag_rate",
+    "quality_factor",
+    "quality_factor_limit",
+    "quality_factors",
+    "rates_from_energy_constants",
+    "restoring_torque",
+    "sphere_volume",
+    "static_moment",
+    "stokes_drag",
+    "stopping_time",
+    "structural_quality_factor",
+    "swing",
+    "time_at",
+    "universal_acceleration",
+    "viscous_acceleration",
+    "viscous_frequency_ratio",
+    "viscous_frequency_shift",
+    "viscous_quality_factor",
+    "water_density",
+    "water_viscosity",
+    "without_hysteresis",
+]

@@ -1,0 +1,195 @@
+"""A compound pendulum from its parts: inertia, restoring torque, frequency, in any fluid.
+
+Positions are measured along the rod from the axis, positive below it. A position may be
+an array (a weight moved from record to record); everything broadcasts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics.drag import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
+
+STANDARD_GRAVITY_M_PER_S2 = 9.80665
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A weight that is small beside its distance from the axis.
+
+    Parameters
+    ----------
+    mass_kg, position_m
+        Mass in kg; position below the axis in m (negative above).
+    own_inertia_kg_m2
+        Its moment of inertia about its own centre in kg m^2, if that counts.
+    displaced_m3
+        The volume of fluid that it displaces in m^3 (a screw under water).
+    """
+
+    mass_kg: Numbers
+    position_m: Numbers
+    own_inertia_kg_m2: Numbers = 0.0
+    displaced_m3: Numbers = 0.0
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A thin uniform rod: ``I = m (l^2/12 + z^2)``.
+
+    Parameters
+    ----------
+    mass_kg, length_m
+        Mass in kg and length in m.
+    centre_m
+        Position of its centre below the axis in m.
+    """
+
+    mass_kg: Numbers
+    length_m: Numbers
+    centre_m: Numbers = 0.0
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A solid sphere, ``I = m (2 a^2/5 + L^2)``; under water where `submerged`.
+
+    Parameters
+    ----------
+    mass_kg, radius_m, centre_m
+        Mass in kg, radius a in m, distance L of its centre below the axis in m.
+    submerged
+        Whether the fluid buoys it and swings along with it.
+    """
+
+    mass_kg: Numbers
+    radius_m: Numbers
+    centre_m: Numbers
+    submerged: bool = False
+
+
+Part: TypeAlias = PointMass | Rod | Sphere
+
+
+class Fluid(NamedTuple):
+    """What a part is submerged in."""
+
+    density_kg_per_m3: Numbers
+    viscosity_pa_s: Numbers
+
+
+def sphere_volume(radius_m: Numbers) -> FloatArray:
+    """Volume of a sphere in m^3: ``4 pi a^3/3``."""
+    (radius,) = floats(radius_m)
+    return plain(4.0 / 3.0 * np.pi * radius**3)
+
+
+def moment_of_inertia(parts: Sequence[Part]) -> FloatArray:
+    """Moment of inertia of the parts about the axis in kg m^2, without any fluid."""
+    return plain(sum((_inertia(part) for part in parts), start=np.float64(0.0)))
+
+
+def static_moment(parts: Sequence[Part]) -> FloatArray:
+    """Return the sum of mass times position, M Delta of Eq. 7, in kg m."""
+    total: FloatArray = np.zeros(())
+    for part in parts:
+        mass, position = floats(part.mass_kg, _position(part))
+        total = total + mass * position
+    return plain(total)
+
+
+def displaced_moment(parts: Sequence[Part]) -> FloatArray:
+    """Return the sum of displaced volume times position in m^4."""
+    total: FloatArray = np.zeros(())
+    for part in parts:
+        volume, position = floats(_displaced(part), _position(part))
+        total = total + volume * position
+    return plain(total)
+
+
+def restoring_torque(
+    parts: Sequence[Part],
+    fluid: Fluid | None = None,
+    gravity_m_per_s2: Numbers = STANDARD_GRAVITY_M_PER_S2,
+) -> FloatArray:
+    """Restoring torque per angle, ``g (sum m z - rho sum V z)``, in N m/rad.
+
+    The second sum is the buoyancy of what is submerged. Negative where the pendulum
+    would turn over.
+    """
+    (gravity,) = floats(gravity_m_per_s2)
+    moment = static_moment(parts)
+    if fluid is not None:
+        (density,) = floats(fluid.density_kg_per_m3)
+        moment = moment - density * displaced_moment(parts)
+    return plain(gravity * moment)
+
+
+def added_inertia(
+    parts: Sequence[Part],
+    fluid: Fluid | None,
+    angular_frequency_per_s: Numbers,
+    *,
+    plain_added_mass: bool = False,
+) -> FloatArray:
+    """Moment of inertia of the fluid that swings with the submerged spheres, in kg m^2.
+
+    ``(1/2 + 9 delta/(4 a)) rho V L^2`` for each.
+
+    Parameters
+    ----------
+    parts, fluid
+        The pendulum's parts and the fluid; ``None`` for none.
+    angular_frequency_per_s
+        omega in rad/s; it sets the penetration depth delta.
+    plain_added_mass
+        Leave the part with delta out (a fluid without viscosity).
+    """
+    total: FloatArray = np.zeros(())
+    if fluid is None:
+        return plain(total)
+    (density,) = floats(fluid.density_kg_per_m3)
+    for part in parts:
+        if isinstance(part, Sphere) and part.submerged:
+            coefficient = (
+                np.float64(POTENTIAL_FLOW_ADDED_MASS)
+                if plain_added_mass
+                else added_mass_coefficient(
+                    part.radius_m, angular_frequency_per_s, fluid.viscosity_pa_s, density
+                )
+            )
+            (centre,) = floats(part.centre_m)
+            total = total + coefficient * density * sphere_volume(part.radius_m) * centre**2
+    return plain(total)
+
+
+def _inertia(part: Part) -> FloatArray:
+    """Moment of inertia of one part about the axis."""
+    mass, position = floats(part.mass_kg, _position(part))
+    if isinstance(part, Rod):
+        (length,) = floats(part.length_m)
+        return mass * (length**2 / 12.0 + position**2)
+    if isinstance(part, Sphere):
+        (radius,) = floats(part.radius_m)
+        return mass * (0.4 * radius**2 + position**2)
+    (own,) = floats(part.own_inertia_kg_m2)
+    return mass * position**2 + own
+
+
+def _position(part: Part) -> Numbers:
+    """Where a part's centre of mass lies."""
+    return part.position_m if isinstance(part, PointMass) else part.centre_m
+
+
+def _displaced(part: Part) -> Numbers:
+    """The volume of fluid that a part displaces."""
+    if isinstance(part, PointMass):
+        return part.displaced_m3
+    if isinstance(part, Sphere) and part.submerged:
+        return sphere_volume(part.radius_m)
+    return 0.0

@@ -1,0 +1,75 @@
+"""Which code made a result: so that editing the library reruns what depends on it."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+PACKAGE: Final = Path(__file__).parent
+
+
+def code_version(module: str) -> str:
+    """Hash the source of a module and of everything of ours that it imports.
+
+    Imports inside functions count too. The hash is a parameter of the rule that calls the
+    module, so Snakemake reruns the rule when, and only when, its code has changed.
+
+    Parameters
+    ----------
+    module
+        Dotted name, ``"pendpipe.commands.fit"``.
+
+    Returns
+    -------
+    str
+        Twelve hexadecimal digits.
+    """
+    seen: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in seen or _file(name) is None:
+            continue
+        seen.add(name)
+        waiting.extend(_imports(name))
+    digest = hashlib.sha256()
+    for name in sorted(seen):
+        digest.update(_content(name))
+    return digest.hexdigest()[:12]
+
+
+def _file(module: str) -> Path | None:
+    """The source file of one of our modules."""
+    parts = module.split(".")
+    if parts[0] != PACKAGE.name:
+        return None
+    path = PACKAGE.joinpath(*parts[1:])
+    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+        if len(parts) > 1 and candidate.is_file():
+            return candidate
+    return None
+
+
+@cache
+def _content(module: str) -> bytes:
+    path = _file(module)
+    assert path is not None
+    return path.read_bytes()
+
+
+@cache
+def _imports(module: str) -> frozenset[str]:
+    """The modules of ours that a module names in its import statements."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(_content(module))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module)
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    # A package's own __init__ runs before its modules do.
+    parents = {name.rpartition(".")[0] for name in found}
+    return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))

@@ -1,0 +1,145 @@
+"""The configuration refuses what it does not know, and says what was meant."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pendpipe.configuration import document, jobs
+from pendpipe.configuration.load import load_campaign, read_configuration
+from pendpipe.configuration.records import COLUMNS, read_records
+from pendpipe.errors import InputError
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def content(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    monkeypatch.chdir(ROOT)
+    return read_configuration("config/config.yaml")
+
+
+def test_the_default_campaign_is_the_papers(content: dict[str, Any]) -> None:
+    """Fifteen records in water, in two branches, and an air benchmark from 15 s to 2 s."""
+    campaign = load_campaign(content, "config/config.yaml")
+    branches = [record.branch for record in campaign.records]
+    assert {name: branches.count(name) for name in set(branches)} == {
+        "high": 8,
+        "low": 7,
+        "air": 12,
+    }
+    assert {record.source for record in campaign.records} == {"simulated"}
+
+
+def misspell(*path: str, wrong: str) -> Callable[[dict[str, Any]], None]:
+    """Rename a key of the configuration."""
+
+    def change(content: dict[str, Any]) -> None:
+        holder = content
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[wrong] = holder.pop(path[-1])
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("path", "wrong", "said"),
+    [
+        (["apparatus"], "aparatus", "did you mean 'apparatus'?"),
+        (["apparatus", "sphere", "diameter_m"], "diametr_m", "did you mean 'diameter_m'?"),
+        (["fluids", "water", "density_kg_per_m3"], "density", "did you mean 'density_kg_per_m3'?"),
+        (["simulated", "sensor", "noise_volts"], "noise", "did you mean 'noise_volts'?"),
+    ],
+)
+def test_an_unknown_key_is_refused_with_the_nearest_known_name(
+    content: dict[str, Any], path: list[str], wrong: str, said: str
+) -> None:
+    misspell(*path, wrong=wrong)(content)
+    with pytest.raises(InputError) as caught:
+        load_campaign(content, "config.yaml")
+    assert said in str(caught.value)
+    assert f"unknown key '{wrong}'" in str(caught.value)
+
+
+def test_an_added_unknown_key_names_its_place(content: dict[str, Any]) -> None:
+    content["simulated"]["drag_facto"] = 1.0
+    with pytest.raises(InputError, match=r"config.yaml, simulated.drag_facto: .*'drag_factor'"):
+        load_campaign(content, "config.yaml")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda c: c["apparatus"]["rod"].update(mass_kg=-1), "greater than 0"),
+        (lambda c: c["apparatus"]["rod"].update(mass_kg="heavy"), "valid number"),
+        (lambda c: c["geometries"].pop("low-3"), "unknown geometry 'low-3'"),
+        (lambda c: c["fluids"].pop("air"), "unknown fluid 'air'"),
+        (lambda c: c["geometries"]["low-1"]["weights_m"].update(uper=0.1), "did you mean 'upper'"),
+        (lambda c: c.update(typical_record="water-low-9"), "no record 'water-low-9'"),
+        (lambda c: c.pop("simulated"), "a simulated record needs simulated"),
+        (lambda c: c["simulated"]["release"].pop("air"), "nothing says how it is released"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_line(
+    content: dict[str, Any], change: Callable[[dict[str, Any]], Any], said: str
+) -> None:
+    change(content)
+    with pytest.raises(InputError) as caught:
+        load_campaign(content, "config.yaml")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_schema_and_manual_are_those_of_the_models() -> None:
+    """Both are made by `pendpipe config`; whoever changes a model makes them anew."""
+    committed = ROOT / "workflow/schemas/configuration.schema.json"
+    assert committed.read_text(encoding="utf-8") == document.schema()
+    assert document.manual() in (ROOT / "config/README.md").read_text(encoding="utf-8")
+
+
+def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:
+    path = folder / "records.tsv"
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("rows", "header", "said"),
+    [
+        (["x\tsimulated"], "record\tsorce", "the column 'source' is missing"),
+        (["x\tsimulated\t1"], "record\tsource\tfuid", "did you mean 'fluid'?"),
+        (["a b\tsimulated"], "record\tsource", "no name for a folder"),
+        (["x\tsimulated", "X\tsimulated"], "record\tsource", "stands twice"),
+        (["x\tfile.csv\tnine"], "record\tsource\tstart_s", "start_s 'nine' is no number"),
+        (["figures\tsimulated"], "record\tsource", "a folder of the campaign's own"),
+        (["x\t"], "record\tsource", "the source is blank"),
+        ([], "record\tsource", "no records"),
+    ],
+)
+def test_a_faulty_table_is_refused_with_its_line(
+    tmp_path: Path, rows: list[str], header: str, said: str
+) -> None:
+    with pytest.raises(InputError, match=r"records\.tsv") as caught:
+        read_records(table(tmp_path, *rows, header=header))
+    assert said in str(caught.value)
+
+
+def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str, Any]) -> None:
+    """Another water changes the water records' acquisition and leaves the air's."""
+    before = load_campaign(content, "config.yaml")
+    changed = copy.deepcopy(content)
+    changed["fluids"]["water"]["viscosity_pa_s"] = 1.1e-3
+    after = load_campaign(changed, "config.yaml")
+    same = {
+        record.record: jobs.acquisition(before, record.record)
+        == jobs.acquisition(after, record.record)
+        for record in before.records
+    }
+    assert {name for name, kept in same.items() if kept} == {
+        record.record for record in before.records if record.fluid == "air"
+    }

@@ -1,0 +1,18 @@
+rule acquire:
+    input:
+        lambda wildcards: jobs.source_files(CAMPAIGN, wildcards.record),
+    output:
+        f"{RESULTS}/{{record}}/recording.csv",
+    log:
+        f"{RESULTS}/{{record}}/logs/acquire.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        refusal=refusal,
+        depends=lambda wildcards: jobs.acquisition(CAMPAIGN, wildcards.record),
+        code=code_version("pendpipe.commands.acquire"),
+    message:
+        "{wildcards.record}: acquire"
+    shell:
+        "pendpipe acquire --campaign {CONFIGURATION} --record {wildcards.record}"
+        " --out {output} {params.refusal} 2> {log}"

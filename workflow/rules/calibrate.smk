@@ -1,0 +1,40 @@
+rule caliper:
+    output:
+        table=f"{RESULTS}/calibration/caliper.csv",
+        sensor=f"{RESULTS}/calibration/sensor.json",
+    log:
+        f"{RESULTS}/calibration/logs/caliper.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        depends=jobs.caliper(CAMPAIGN),
+        code=code_version("pendpipe.stages.caliper"),
+    message:
+        "the sensor against a caliper"
+    shell:
+        "pendpipe calibrate --campaign {CONFIGURATION} --table {output.table}"
+        " --out {output.sensor} 2> {log}"
+
+
+rule calibrate:
+    input:
+        recording=f"{RESULTS}/{{record}}/recording.csv",
+        sensor=rules.caliper.output.sensor if CAMPAIGN.configuration.calibration else [],
+    output:
+        f"{RESULTS}/{{record}}/calibration.json",
+    log:
+        f"{RESULTS}/{{record}}/logs/calibrate.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        refusal=refusal,
+        sensor=lambda wildcards, input: (
+            f"--sensor {input.sensor}" if input.sensor else ""
+        ),
+        given=lambda wildcards: jobs.sensor_constant(CAMPAIGN, wildcards.record),
+        code=code_version("pendpipe.stages.calibrate"),
+    message:
+        "{wildcards.record}: calibrate"
+    shell:
+        "pendpipe calibrate {input.recording} --record {wildcards.record} {params.sensor}"
+        " {params.given} --out {output} {params.refusal} 2> {log}"

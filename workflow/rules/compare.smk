@@ -1,0 +1,19 @@
+rule compare:
+    input:
+        separation=f"{RESULTS}/separation.json",
+        sensor=rules.caliper.output.sensor if CAMPAIGN.configuration.calibration else [],
+    output:
+        comparison=f"{RESULTS}/comparison.json",
+        campaign=f"{RESULTS}/campaign.json",
+    log:
+        f"{RESULTS}/logs/compare.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        depends=jobs.theory(CAMPAIGN),
+        code=code_version("pendpipe.commands.compare"),
+    message:
+        "the losses beside Eq. 16"
+    shell:
+        "pendpipe compare --campaign {CONFIGURATION} --separation {input.separation}"
+        " --out {output.comparison} --summary {output.campaign} 2> {log}"

@@ -1,0 +1,22 @@
+rule report:
+    input:
+        comparison=f"{RESULTS}/comparison.json",
+        campaign=f"{RESULTS}/campaign.json",
+        figures=figure_files(),
+    output:
+        report(
+            f"{RESULTS}/report.html",
+            category="Report",
+            caption="../report/report.rst",
+        ),
+    log:
+        f"{RESULTS}/logs/report.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        code=code_version("pendpipe.commands.report"),
+    message:
+        "the page about the campaign"
+    shell:
+        "pendpipe report --campaign {CONFIGURATION} --comparison {input.comparison}"
+        " --summary {input.campaign} --out {output} 2> {log}"

@@ -1,0 +1,16 @@
+rule separate:
+    input:
+        of_all_records("fit.json"),
+    output:
+        f"{RESULTS}/separation.json",
+    log:
+        f"{RESULTS}/logs/separate.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        depends=jobs.theory(CAMPAIGN),
+        code=code_version("pendpipe.commands.separate"),
+    message:
+        "hysteretic and viscous losses"
+    shell:
+        "pendpipe separate --campaign {CONFIGURATION} --out {output} 2> {log}"

@@ -1,0 +1,18 @@
+rule turning_points:
+    input:
+        recording=f"{RESULTS}/{{record}}/recording.csv",
+        calibration=f"{RESULTS}/{{record}}/calibration.json",
+    output:
+        f"{RESULTS}/{{record}}/turning_points.csv",
+    log:
+        f"{RESULTS}/{{record}}/logs/turning_points.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        refusal=refusal,
+        code=code_version("pendpipe.commands.turning_points"),
+    message:
+        "{wildcards.record}: turning points"
+    shell:
+        "pendpipe turning-points {input.recording} --record {wildcards.record}"
+        " --calibration {input.calibration} --out {output} {params.refusal} 2> {log}"
