@@ -22,18 +22,18 @@ def schema() -> str:
 def manual() -> str:
     """The tables of ``config/README.md``: every key, its kind, default and meaning."""
     content = Configuration.model_json_schema()
-    parts = [_table("top level", content, content)]
+    parts = [_table("top level", content)]
     for name, model in content["$defs"].items():
-        parts.append(_table(f"{name}: {model['description']}", model, content))
+        parts.append(_table(f"{name}: {model['description']}", model))
     return "\n".join([BEGIN, "", *parts, END])
 
 
-def _table(title: str, model: dict[str, Any], whole: dict[str, Any]) -> str:
+def _table(title: str, model: dict[str, Any]) -> str:
     required = model.get("required", [])
-    rows = [
-        f"| `{key}` | {_kind(entry)} | {_default(entry, key in required)} | {entry['description']} |"
-        for key, entry in model["properties"].items()
-    ]
+    rows = []
+    for key, entry in model["properties"].items():
+        default = _default(entry, key in required)
+        rows.append(f"| `{key}` | {_kind(entry)} | {default} | {entry['description']} |")
     head = [f"### {title}", "", "| key | kind | default | meaning |", "|---|---|---|---|"]
     return "\n".join([*head, *rows, ""])
 

@@ -16,7 +16,8 @@ from pendpipe.errors import InputError
 def nearest(name: str, known: Iterable[str]) -> str:
     """Say which of the known names `name` may have meant, or all of them."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    without_unit = [known_name for known_name in names if name and known_name.startswith(name)]
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6) or without_unit
     return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(names) or 'none'}"
 
 

@@ -80,7 +80,7 @@ class Geometry(Section):
 
 
 class Fluid(Section):
-    """What the pendulum swings in."""
+    """What the pendulum swings in; it acts on the sphere, without one on the weights."""
 
     density_kg_per_m3: Positive = Field(description="density")
     viscosity_pa_s: Positive = Field(description="dynamic viscosity")
@@ -89,6 +89,11 @@ class Fluid(Section):
     )
     boundary_layer: bool = Field(
         True, description="whether Stokes' drag with its history term acts (Eq. 2)"
+    )
+    temperature_c: float | None = Field(
+        None,
+        description="water only: where density and viscosity hold; a record's own temperature"
+        " then scales them; blank: they hold for every record",
     )
 
 

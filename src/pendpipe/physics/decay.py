@@ -100,9 +100,8 @@ def amplitude(
     Right to 1e-12 of y wherever that can be asked: close to the stop, y is known no better
     than the last digit of the time times the rate c.
     """
-    t, y0, quadratic, linear, coulomb = np.broadcast_arrays(
-        *floats(time_s, amplitude0_rad, a, b, c)
-    )
+    # Not broadcast here: with scalar rates everything but the exponential is then cheap.
+    t, y0, quadratic, linear, coulomb = floats(time_s, amplitude0_rad, a, b, c)
     r, sign = root(quadratic, linear, coulomb)
     with np.errstate(over="ignore", invalid="ignore"):
         parts = exponential_fraction(t, y0, quadratic, linear, coulomb, r)

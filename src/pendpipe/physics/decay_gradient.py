@@ -20,8 +20,8 @@ import numpy as np
 from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
 from pendpipe.physics.decay import (
     Fraction,
-    quotient,
     exponential_fraction,
+    quotient,
     root,
     saturation,
     smaller_half,
@@ -116,8 +116,7 @@ def amplitude_and_gradient(
         dy/d(y0, a, b, c), shape s + (4,). Zero from the stopping time on, where it jumps
         (the last of it is what moves the stopping time).
     """
-    arguments = np.broadcast_arrays(*floats(time_s, amplitude0_rad, a, b, c))
-    t, y0, quadratic, linear, coulomb = arguments
+    t, y0, quadratic, linear, coulomb = floats(time_s, amplitude0_rad, a, b, c)
     r, sign = root(quadratic, linear, coulomb)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         parts, gradient = _exponential_branch(t, y0, quadratic, linear, coulomb, r)

@@ -39,7 +39,7 @@ class DecayRates(NamedTuple):
 
     @property
     def linear(self) -> FloatArray:
-        """b in 1/s."""
+        """Both parts of b together, in 1/s."""
         return plain(self.hysteretic + self.viscous)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Protocol
 
 from pendpipe.acquire.clock import Clock
 from pendpipe.acquire.line import Line
@@ -136,17 +136,30 @@ class Driver(Protocol):
 
 
 class StreamReader:
-    """The part of a driver that is alike in every family: bytes off the line, decoded."""
+    """The part of a driver that is alike in every family: bytes off the line, decoded.
 
-    line: Line
-    setup: Setup | None = None
-    _decoder: Decoder | None = None
+    Parameters
+    ----------
+    line
+        An open line.
+    clock
+        The recorder's clock, in which the waits for the device are counted.
+    """
+
+    def __init__(self, line: Line, clock: Clock) -> None:
+        self.line = line
+        self.setup: Setup | None = None
+        self._clock = clock
+        self._decoder: Decoder | None = None
+        # How long no byte must come until a stream is held to have ended. The adapters of
+        # USB keep bytes back for up to 16 ms; a simulated line does not.
+        self.quiet_s = max(0.05 / clock.scale, 0.01)
 
     def receive(self, limit_s: float) -> bytes:
         """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""
         return self.line.receive(limit_s)
 
-    def read(self: Self, limit_s: float) -> Scans:
+    def read(self, limit_s: float) -> Scans:
         """Receive and decode, for a use without the recorder."""
         if self._decoder is None:
             raise RuntimeError("start() comes before read()")

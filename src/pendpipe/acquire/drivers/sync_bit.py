@@ -52,14 +52,10 @@ class SyncBitDecoder:
         data = self._pending + data
         whole = len(data) - len(data) % self.bytes_per_scan
         words = np.frombuffer(data, dtype="<u2", count=whole // 2).reshape(-1, len(self._marks))
-        if self._discarded or not self._in_step(words):
-            return self._resynchronise(data)
         rest = data[whole:]
-        if rest and rest[0] & 1:
+        if self._discarded or not self._begins_scan(rest) or not self._in_step(words):
             return self._resynchronise(data)
         self._pending = rest
-        if any(byte & 1 == 0 for byte in rest[1:]):
-            return self._resynchronise(data)
         self._scans += len(words)
         return Scans(self._counts(words))
 
@@ -69,6 +65,11 @@ class SyncBitDecoder:
         left = self._discarded
         self._discarded, self._pending = 0, b""
         return Scans(nothing, (self._loss(self._scans, left, self._suspect),) if left else ())
+
+    @staticmethod
+    def _begins_scan(rest: bytes) -> bool:
+        """Whether these bytes can be the beginning of a scan (nothing at all can)."""
+        return all((byte & 1) == (place > 0) for place, byte in enumerate(rest))
 
     def _in_step(self, words: AnyArray) -> bool:
         """Whether every byte has the mark that its place asks for."""

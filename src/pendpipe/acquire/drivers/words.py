@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.acquire.drivers.base import Loss, Scans
+from pendpipe.acquire.drivers.base import Scans
 
 
 class WordDecoder:
@@ -24,7 +24,6 @@ class WordDecoder:
         self.bytes_per_scan = 2 * channels
         self._channels = channels
         self._pending = b""
-        self._scans = 0
 
     def feed(self, data: bytes) -> Scans:
         """Decode further bytes; an unfinished scan waits for the next call."""
@@ -32,11 +31,9 @@ class WordDecoder:
         whole = len(data) - len(data) % self.bytes_per_scan
         self._pending = data[whole:]
         counts = np.frombuffer(data, dtype="<i2", count=whole // 2).reshape(-1, self._channels)
-        self._scans += len(counts)
         return Scans(counts)
 
     def finish(self) -> Scans:
-        """Say what is left over at the end: no counts; part of a scan is a loss of one."""
-        left, self._pending = len(self._pending), b""
-        nothing = np.empty((0, self._channels), dtype=np.int16)
-        return Scans(nothing, (Loss(self._scans, left, 1),) if left else ())
+        """Forget an unfinished scan; a stream without marks has no losses to tell."""
+        self._pending = b""
+        return Scans(np.empty((0, self._channels), dtype=np.int16))

@@ -1,0 +1,99 @@
+"""A simulated DI-2108 in CDC mode (dataq-facts A8)."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from typing import ClassVar
+
+import numpy as np
+
+from pendpipe.arrays import IntArray
+
+
+class SimulatedDI2108:
+    """Eight channels of 16 bits, +-10 V, text commands ended by CR.
+
+    Commands are echoed with their CR; ``start`` is not, and ``info N`` is followed by the
+    answer. While data flow only ``stop`` is obeyed. Data leave in packets (``ps``).
+    """
+
+    model: ClassVar[str] = "DI-2108"
+    bits: ClassVar[int] = 16
+    range_volts: ClassVar[float] = 10.0
+    information: ClassVar[dict[str, str]] = {
+        "0": "DATAQ",
+        "1": "2108",
+        "2": "0.141",
+        "6": "5F2A9C01",
+        "9": "60000000",
+    }
+
+    def __init__(self) -> None:
+        self.starts = 0
+        self.streaming = False
+        self._line = b""
+        self._list: dict[int, int] = {0: 0}
+        self._setting = {"srate": 60000, "dec": 1, "deca": 1, "ps": 0, "encode": 0}
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels, from 1, in the order of the scan."""
+        return tuple((self._list[place] & 0x0F) + 1 for place in sorted(self._list))
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Scans a second: 60 MHz over the three divisors."""
+        return 60e6 / (self._setting["srate"] * self._setting["dec"] * self._setting["deca"])
+
+    @property
+    def packet_bytes(self) -> int:
+        """16, 32, ... 2048 bytes for ``ps`` 0 to 7."""
+        return 16 << self._setting["ps"]
+
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+        self._line += data
+        out = b""
+        while b"\r" in self._line:
+            line, _, self._line = self._line.partition(b"\r")
+            out += self._execute(line.decode("latin-1").strip("\0\n "))
+        return out
+
+    def _execute(self, text: str) -> bytes:
+        """Do what one command says and return its echo."""
+        name, *arguments = text.split()[:3] or [""]
+        if self.streaming and name != "stop":
+            return b""
+        if name == "start":
+            self.streaming = True
+            self.starts += 1
+            return b""
+        if name == "stop":
+            self.streaming = False
+        elif name == "info" and arguments:
+            return f"{text} {self.information.get(arguments[0], '')}\r".encode()
+        elif name == "slist" and len(arguments) == 2:
+            place = int(arguments[0])
+            # A list is written from its first place on, and ends with its last.
+            kept = {key: word for key, word in self._list.items() if key < place}
+            self._list = {**kept, place: int(arguments[1])}
+        elif name in self._setting and arguments:
+            low, high = {
+                "srate": (375, 65535),
+                "dec": (1, 512),
+                "deca": (1, 40000),
+                "ps": (0, 7),
+                "encode": (0, 1),
+            }[name]
+            self._setting[name] = min(high, max(low, int(arguments[0])))
+        elif name not in ("filter", "eol", "led", "din", "reset"):
+            return b"Command not found\r"
+        return f"{text}\r".encode()
+
+    def encode(self, codes: IntArray) -> bytes:
+        """One signed 16-bit word a sample, low byte first."""
+        words = np.asarray(codes).ravel().astype(np.int16)
+        if words.size < 32:
+            return struct.pack(f"<{words.size}h", *words.tolist())
+        return (words if sys.byteorder == "little" else words.byteswap()).tobytes()

@@ -1,0 +1,152 @@
+"""The device's end of a line: a pseudo-terminal, or a loopback socket."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+from contextlib import suppress
+from typing import Protocol
+
+
+class Link(Protocol):
+    """The device's end; every call returns at once, except `wait`."""
+
+    port: str
+
+    def wait(self, timeout_s: float, *, sending: bool) -> None:
+        """Wait until there is something to read (or room to write), or `wake` is called."""
+
+    def wake(self) -> None:
+        """Let a waiting thread go on."""
+
+    def receive(self) -> bytes:
+        """Return what the host has sent; nothing when it has sent nothing."""
+
+    def send(self, data: memoryview) -> int:
+        """Send what there is room for; return how many bytes that was."""
+
+    def close(self) -> None:
+        """Pull the plug: the host's next read fails."""
+
+
+class _Waking:
+    """A pair of sockets that ends a wait from another thread (on every system)."""
+
+    def __init__(self) -> None:
+        self._bell, self._rope = socket.socketpair()
+        self._bell.setblocking(False)
+
+    def _wait(self, read: int | None, write: int | None, timeout_s: float) -> None:
+        readers = [self._bell.fileno()] + ([] if read is None else [read])
+        select.select(readers, [] if write is None else [write], [], max(0.0, timeout_s))
+        with suppress(BlockingIOError):
+            self._bell.recv(64)
+
+    def wake(self) -> None:
+        """Let a waiting thread go on."""
+        self._rope.send(b"!")
+
+    def _close(self) -> None:
+        self._bell.close()
+        self._rope.close()
+
+
+class PseudoTerminal(_Waking):
+    """A pseudo-terminal, which the driver opens as it opens any serial port."""
+
+    def __init__(self) -> None:
+        import tty
+
+        super().__init__()
+        self._device, self._host = os.openpty()
+        # Raw before anyone opens it, else the terminal itself echoes and translates. The
+        # host's end stays open here: were it closed between two drivers, reads would fail.
+        tty.setraw(self._host)
+        os.set_blocking(self._device, False)
+        self.port = os.ttyname(self._host)
+
+    def wait(self, timeout_s: float, *, sending: bool) -> None:
+        """Wait until there is something to read (or room to write), or `wake` is called."""
+        self._wait(self._device, self._device if sending else None, timeout_s)
+
+    def receive(self) -> bytes:
+        """Return what the host has sent; nothing when it has sent nothing."""
+        try:
+            return os.read(self._device, 4096)
+        except BlockingIOError:
+            return b""
+
+    def send(self, data: memoryview) -> int:
+        """Send what there is room for; return how many bytes that was."""
+        try:
+            return os.write(self._device, data)
+        except BlockingIOError:
+            return 0
+
+    def close(self) -> None:
+        """Pull the plug: the host's next read fails."""
+        os.close(self._device)
+        os.close(self._host)
+        self._close()
+
+
+class LoopbackSocket(_Waking):
+    """A socket on 127.0.0.1, for pyserial's ``socket://``; one host at a time."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.setblocking(False)
+        self._host: socket.socket | None = None
+        self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def wait(self, timeout_s: float, *, sending: bool) -> None:
+        """Wait until there is something to read (or room to write), or `wake` is called."""
+        end = self._host or self._listener
+        writing = self._host is not None and sending
+        self._wait(end.fileno(), end.fileno() if writing else None, timeout_s)
+
+    def receive(self) -> bytes:
+        """Return what the host has sent; accept a host that has come, drop one that left."""
+        if self._host is None:
+            with suppress(BlockingIOError):
+                self._host, _ = self._listener.accept()
+                self._host.setblocking(False)
+                self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return b""
+        try:
+            data = self._host.recv(4096)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._host.close()
+            self._host = None
+        return data
+
+    def send(self, data: memoryview) -> int:
+        """Send what there is room for; what nobody listens to is gone."""
+        if self._host is None:
+            return len(data)
+        try:
+            return self._host.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            return len(data)
+
+    def close(self) -> None:
+        """Pull the plug: the host's next read fails."""
+        if self._host is not None:
+            self._host.close()
+        self._listener.close()
+        self._close()
+
+
+def open_link(kind: str | None = None) -> Link:
+    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them."""
+    if kind is None:
+        kind = "pty" if hasattr(os, "openpty") else "socket"
+    return PseudoTerminal() if kind == "pty" else LoopbackSocket()

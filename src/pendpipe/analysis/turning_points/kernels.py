@@ -1,0 +1,208 @@
+"""The loops over all samples: rough extremes, and the sums of every half cycle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pendpipe.arrays import FloatArray, IntArray
+
+HARMONICS = 3
+"""How many odd harmonics above the first the shape may hold (3, 5, 7)."""
+
+
+@njit(cache=True)
+def extremes(values: FloatArray, start: float, least: float) -> tuple[IntArray, int]:
+    """Find alternating extremes: each is followed by a return of at least a threshold.
+
+    Parameters
+    ----------
+    values
+        Readings; nothing need be known of level or period.
+    start
+        The first threshold; later it is a quarter of the median of the last five swings.
+    least
+        Threshold that is never undercut (a multiple of the noise).
+
+    Returns
+    -------
+    index, first
+        Positions of the extremes; `first` is +1 if the first one is a maximum.
+    """
+    found = np.empty(len(values) // 2 + 2, dtype=np.int64)
+    swings = np.full(5, np.nan)
+    count, direction, first = 0, 0, 0
+    threshold = max(start, least)
+    high, low = 0, 0
+    for i in range(len(values)):
+        x = values[i]
+        if x > values[high]:
+            high = i
+        if x < values[low]:
+            low = i
+        if direction >= 0 and values[high] - x > threshold:
+            extreme, turned = high, -1
+        elif direction <= 0 and x - values[low] > threshold:
+            extreme, turned = low, 1
+        else:
+            continue
+        if direction == 0:
+            first = -turned
+        else:
+            swings[count % 5] = abs(values[extreme] - values[found[count - 1]])
+            known = swings[~np.isnan(swings)]
+            threshold = max(least, 0.25 * np.median(known))
+        found[count] = extreme
+        count += 1
+        direction, high, low = turned, i, i
+    return found[:count].copy(), first
+
+
+@njit(cache=True, inline="always")
+def cosine_sine(phase: float) -> tuple[float, float]:
+    """Cosine and sine for |phase| < 2, to 1e-9: fast, since no range is reduced."""
+    square = phase * phase
+    cosine = 1.0 / 20922789888000.0
+    cosine = cosine * square - 1.0 / 87178291200.0
+    cosine = cosine * square + 1.0 / 479001600.0
+    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = cosine * square - 0.5
+    cosine = cosine * square + 1.0
+    sine = 1.0 / 1307674368000.0
+    sine = -sine * square + 1.0 / 6227020800.0
+    sine = sine * square - 1.0 / 39916800.0
+    sine = sine * square + 1.0 / 362880.0
+    sine = sine * square - 1.0 / 5040.0
+    sine = sine * square + 1.0 / 120.0
+    sine = sine * square - 1.0 / 6.0
+    sine = (sine * square + 1.0) * phase
+    return cosine, sine
+
+
+@njit(cache=True)
+def half_cycle_sums(
+    time_s: FloatArray,
+    values: FloatArray,
+    weights: FloatArray,
+    edges: IntArray,
+    centre_s: FloatArray,
+    rate: FloatArray,
+    level: FloatArray,
+    shape: FloatArray,
+    free: int,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Normal equations of every half cycle: level, amplitude, sine, free odd harmonics.
+
+    Parameters
+    ----------
+    time_s, values, weights
+        Samples, shape (n,); `weights` of length 0 for equal ones.
+    edges
+        First sample and the one after the last of each half cycle, shape (k, 2).
+    centre_s, rate
+        Time of the turning point and phase per second, shape (k,).
+    level
+        What is taken off the readings first, shape (k,).
+    shape
+        Coefficients of the half cycle's shape (see `shape.py`), shape (k, 4 + HARMONICS).
+    free
+        How many odd harmonics are fitted besides, 0 to HARMONICS.
+
+    Returns
+    -------
+    gram, right, square
+        Weighted sums of products, shape (k, 3 + free, 3 + free), with the readings,
+        (k, 3 + free), and of the readings' squares, (k,).
+    """
+    number, size = len(centre_s), 3 + free
+    gram = np.zeros((number, size, size))
+    right = np.zeros((number, size))
+    square = np.zeros(number)
+    basis = np.empty(size)
+    even = weights.size == 0
+    for k in range(number):
+        friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
+        for i in range(edges[k, 0], edges[k, 1]):
+            phase = rate[k] * (time_s[i] - centre_s[k])
+            cosine, sine = cosine_sine(phase)
+            lack = 1.0 - cosine
+            form = cosine - friction2 * lack + viscous * (sine - phase * cosine)
+            form += math.copysign(friction, phase) * lack
+            form += viscous2 * phase * (0.5 * phase * cosine - sine)
+            before, now = cosine, cosine
+            twice = 2.0 * (2.0 * cosine * cosine - 1.0)
+            for m in range(HARMONICS):
+                before, now = now, twice * now - before
+                form += shape[k, 4 + m] * now
+                if m < free:
+                    basis[3 + m] = now
+                elif m >= free and shape[k, 4] == 0.0:
+                    break
+            basis[0] = 1.0
+            basis[1] = form
+            basis[2] = sine
+            x = values[i] - level[k]
+            w = 1.0 if even else weights[i]
+            square[k] += w * x * x
+            for p in range(size):
+                wp = w * basis[p]
+                right[k, p] += wp * x
+                for q in range(p + 1):
+                    gram[k, p, q] += wp * basis[q]
+        for p in range(size):
+            for q in range(p):
+                gram[k, q, p] = gram[k, p, q]
+    return gram, right, square
+
+
+@njit(cache=True)
+def smooth_times(
+    number: FloatArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Smooth the times of turning points over as many neighbours as it takes.
+
+    A weighted local parabola in the number of the half cycle; the window grows until the
+    weights sum to `wanted` (the inverse variance that is good enough), between 2 and 40
+    neighbours to each side.
+
+    Returns
+    -------
+    centre_s, half_period_s
+        Smoothed time and slope at each number in `at`.
+    """
+    centre = np.empty(len(at))
+    slope = np.empty(len(at))
+    last = len(number) - 1
+    for k in range(len(at)):
+        middle = np.searchsorted(number, at[k])
+        lo, hi = max(middle - 2, 0), min(middle + 2, last)
+        lo, hi = max(min(lo, hi - 3), 0), min(max(hi, lo + 3), last)
+        total = weight[lo : hi + 1].sum()
+        while total < wanted and hi - lo < 80 and (lo > 0 or hi < last):
+            if lo > 0:
+                lo -= 1
+                total += weight[lo]
+            if hi < last:
+                hi += 1
+                total += weight[hi]
+        degree = 2 if hi - lo >= 4 else 1
+        normal = np.zeros((degree + 1, degree + 1))
+        right = np.zeros(degree + 1)
+        power = np.ones(degree + 1)
+        for j in range(lo, hi + 1):
+            u = number[j] - at[k]
+            for p in range(1, degree + 1):
+                power[p] = power[p - 1] * u
+            for p in range(degree + 1):
+                right[p] += weight[j] * power[p] * (time_s[j] - time_s[lo])
+                for q in range(degree + 1):
+                    normal[p, q] += weight[j] * power[p] * power[q]
+        solved = np.linalg.solve(normal, right)
+        centre[k] = time_s[lo] + solved[0]
+        slope[k] = solved[1]
+    return centre, slope

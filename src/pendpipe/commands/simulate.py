@@ -1,0 +1,31 @@
+"""Make a recording from a described pendulum and measurement chain.
+
+MODEL.toml has the sections pendulum, sampling and, where wanted, sensor and converter;
+config/model.toml is an example with every key.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe simulate``."""
+    parser.add_argument("model", metavar="MODEL.toml", help="what to simulate")
+    parser.add_argument("out", metavar="OUT.csv", type=Path, help="the recording, plain form")
+    parser.add_argument("--seed", type=int, help="seed of the noise, instead of the model's")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate and write."""
+    from pendpipe.recording import write_plain
+    from pendpipe.simulation.model import read_model, simulate
+
+    model = read_model(arguments.model)
+    if arguments.seed is not None:
+        model = model.model_copy(update={"seed": arguments.seed})
+    recording = simulate(model, source=f"simulated: {Path(arguments.model).name}")
+    write_plain(arguments.out, recording)
+    print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
+    return 0

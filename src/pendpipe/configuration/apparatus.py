@@ -1,0 +1,115 @@
+"""From the configuration's words to the physics: parts, fluid, and how they swing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pendpipe import physics
+from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.models import Apparatus, Fluid, Geometry
+from pendpipe.configuration.records import Record
+from pendpipe.errors import InputError
+
+
+class Pendulum(NamedTuple):
+    """One record's pendulum, from distances and masses alone."""
+
+    parts: list[physics.Part]
+    fluid: physics.Fluid
+    submerged: bool
+    """Whether the fluid acts on a sphere (and not on the weights)."""
+    swing: physics.Swing
+
+
+def pendulum(campaign: Campaign, record: Record) -> Pendulum:
+    """Build the pendulum of a record.
+
+    Raises
+    ------
+    InputError
+        If the record has no geometry or fluid, or the pendulum would turn over.
+    """
+    settings = campaign.configuration
+    geometry = campaign.geometry(record)
+    where = f"{settings.records}, record {record.record}"
+    if settings.apparatus is None or geometry is None or not record.fluid:
+        raise InputError(where, "no apparatus, geometry or fluid is given", "fill the cells")
+    parts = pendulum_parts(settings.apparatus, geometry)
+    fluid = fluid_at(settings.fluids[record.fluid], record.temperature_c)
+    moving = physics.swing(
+        parts,
+        fluid if geometry.sphere else None,
+        settings.apparatus.gravity_m_per_s2,
+        plain_added_mass=settings.apparatus.added_mass == "plain",
+    )
+    if not np.isfinite(moving.angular_frequency_per_s):
+        raise InputError(
+            f"geometry {record.geometry}", "the pendulum turns over", "move a weight down"
+        )
+    return Pendulum(parts, fluid, geometry.sphere, moving)
+
+
+def pendulum_parts(apparatus: Apparatus, geometry: Geometry) -> list[physics.Part]:
+    """List the parts of the pendulum with their positions below the axis."""
+    parts: list[physics.Part] = [physics.Rod(apparatus.rod.mass_kg, apparatus.rod.length_m)]
+    for name, position in geometry.weights_m.items():
+        weight = apparatus.weights[name]
+        if weight.radius_m:
+            parts.append(physics.Sphere(weight.mass_kg, weight.radius_m, position))
+        else:
+            parts.append(physics.PointMass(weight.mass_kg, position))
+    if geometry.sphere and (sphere := apparatus.sphere):
+        parts.append(
+            physics.Sphere(sphere.mass_kg, sphere.diameter_m / 2, sphere.distance_m, submerged=True)
+        )
+        # The screw's mass is counted with the sphere; under water it displaces some more.
+        parts.append(
+            physics.PointMass(0.0, sphere.screw_distance_m, displaced_m3=sphere.screw_volume_m3)
+        )
+    return parts
+
+
+def fluid_at(fluid: Fluid, temperature_c: float | None) -> physics.Fluid:
+    """Density and viscosity of a fluid at a record's temperature.
+
+    Water's change between the temperature where the configured values hold and that of
+    the record is taken from the published formulas of `pendpipe.physics.water`.
+    """
+    density, viscosity = fluid.density_kg_per_m3, fluid.viscosity_pa_s
+    if temperature_c is not None and fluid.temperature_c is not None:
+        density *= float(
+            physics.water_density(temperature_c) / physics.water_density(fluid.temperature_c)
+        )
+        viscosity *= float(
+            physics.water_viscosity(temperature_c) / physics.water_viscosity(fluid.temperature_c)
+        )
+    return physics.Fluid(density, viscosity)
+
+
+def quadratic_rate(campaign: Campaign, record: Record, built: Pendulum) -> float:
+    """Eq. 13's a from the drag coefficient: of the sphere, without one of the weights."""
+    settings = campaign.configuration
+    geometry, apparatus = campaign.geometry(record), settings.apparatus
+    assert geometry is not None
+    assert apparatus is not None
+    coefficient = settings.fluids[record.fluid].drag_coefficient
+    if built.submerged and apparatus.sphere:
+        bodies = [(apparatus.sphere.diameter_m / 2, apparatus.sphere.distance_m)]
+    else:
+        # A body of any shape counts as the disc of its frontal area.
+        bodies = [
+            (float(np.sqrt(apparatus.weights[name].frontal_area_m2 / np.pi)), abs(position))
+            for name, position in geometry.weights_m.items()
+        ]
+    radii, distances = np.array(bodies).T
+    rates = physics.quadratic_drag_rate(
+        coefficient,
+        built.swing.moment_of_inertia_kg_m2,
+        built.swing.angular_frequency_per_s,
+        radii,
+        distances,
+        built.fluid.density_kg_per_m3,
+    )
+    return float(np.sum(rates))

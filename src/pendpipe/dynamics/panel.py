@@ -1,0 +1,204 @@
+"""The phase clock: one panel of a half cycle of Eq. 8.
+
+Time is counted in radians, tau = omega t, and u = dx/dtau. In a half cycle in which the
+pendulum moves towards negative x, Eq. 8 reads
+
+    x'' = -x + delta + h R + q R^2 - 2 g u,    R = sqrt(x^2 + u^2),
+    delta = pi c/(2 omega), h = pi b_h/(2 omega), q = pi a/(2 omega), g = b_v/omega.
+
+m, the smaller root of delta + h m + q m^2 = m, is where the sliding pendulum would be in
+equilibrium (m = delta if h = q = 0), and the amplitude at and below which it sticks. About this
+centre, x = m + r cos(psi), u = -r sin(psi),
+
+    dr/dpsi   = -r nu sin(psi)/(1 - nu cos(psi)),     dtau/dpsi = 1/(1 - nu cos(psi)),
+    nu = (r + 2 m cos(psi)) [h/(R + m) + q] + 2 g sin(psi),
+
+so the turning points (u = 0) are exactly psi = 0 and pi, and everything between them is smooth.
+delta itself has dropped out: the difference to m is taken analytically.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from pendpipe.dynamics.chebyshev import ANALYSIS, ANALYSIS_T, DEGREE, INTEGRATION_T, NODES, POWERS_T
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+
+NODE_COUNT = DEGREE + 1
+
+# Rows of the workspace `node`, each with a value a node of the panel.
+COS, SIN, LOSS, NU, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(10)
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(10, 16)  # derivatives, in sensitivities.py
+ROWS = 16
+
+_OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
+kernel = njit(**_OPTIONS)
+"""How every function of the engine is compiled: no exceptions, fused multiply-add."""
+
+
+@kernel
+def multiply(transposed: FloatArray, values: FloatArray, out: FloatArray) -> None:
+    """Write the product of a matrix, given transposed, and `values` to `out`."""
+    for i in range(NODE_COUNT):
+        out[i] = 0.0
+    for j in range(NODE_COUNT):
+        value = values[j]
+        for i in range(NODE_COUNT):
+            out[i] += transposed[j, i] * value
+
+
+@kernel
+def unresolved(values: FloatArray) -> float:
+    """Return the estimated size of the Chebyshev coefficients left out, extrapolated."""
+    last, before = 0.0, 1e-300
+    for k in range(DEGREE - 3, DEGREE + 1):
+        coefficient = 0.0
+        for j in range(NODE_COUNT):
+            coefficient += ANALYSIS[k, j] * values[j]
+        if k < DEGREE - 1:
+            before = max(before, abs(coefficient))
+        else:
+            last = max(last, abs(coefficient))
+    return last * min(1.0, last / before)
+
+
+@kernel
+def place(node: FloatArray, start: float, half_width: float) -> None:
+    """Set cos(psi) and sin(psi) of the panel that starts at `start`."""
+    for j in range(NODE_COUNT):
+        psi = start + half_width * (1.0 + NODES[j])
+        node[COS, j] = math.cos(psi)
+        node[SIN, j] = math.sin(psi)
+
+
+@kernel
+def solve(
+    node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
+) -> bool:
+    """Solve the phase clock on a panel by Picard's iteration, and say whether it is resolved.
+
+    Parameters
+    ----------
+    node
+        The workspace: cos and sin as `place` left them; row LOSS holds a first guess of
+        r/radius - 1 and receives the solution, SLOPE receives dLOSS/dpsi, NU nu,
+        SLIP 1/(1 - nu cos psi), and EXCESS tau - psi since the start of the panel.
+    shape
+        m, h, q, g.
+    radius
+        r at the start of the panel.
+    """
+    m, h, q, g = shape[0], shape[1], shape[2], shape[3]
+    loss, new, slope = node[LOSS], node[SCRATCH], node[SLOPE]
+    cos, sin, nu, slip = node[COS], node[SIN], node[NU], node[SLIP]
+    before = 1.0
+    for _ in range(60):
+        least = 1.0
+        for j in range(NODE_COUNT):
+            r = radius * (1.0 + loss[j])
+            distance = math.sqrt(max(0.0, r * r + m * (2.0 * r * cos[j] + m)))
+            nu[j] = (r + 2.0 * m * cos[j]) * (h / (distance + m) + q) + 2.0 * g * sin[j]
+            slip[j] = 1.0 / (1.0 - nu[j] * cos[j])
+            least = min(least, 1.0 - nu[j] * cos[j])
+            slope[j] = -(1.0 + loss[j]) * nu[j] * sin[j] * slip[j]
+        if not least > 0.0:
+            return False
+        multiply(INTEGRATION_T, slope, new)
+        change, size = 0.0, 1e-300
+        for j in range(NODE_COUNT):
+            value = half_width * new[j]
+            change = max(change, abs(value - loss[j]))
+            size = max(size, abs(value))
+            loss[j] = value
+        # The error left is the change times the rate at which changes shrink.
+        if change * min(1.0, change / before) <= 1e-16 * size:
+            break
+        before = change
+    else:
+        return False
+    return _finish(node, half_width, tolerance)
+
+
+@kernel
+def _finish(node: FloatArray, half_width: float, tolerance: float) -> bool:
+    """Integrate tau - psi, and say whether the panel is resolved to `tolerance`."""
+    scratch, excess = node[SCRATCH], node[EXCESS]
+    largest = 0.0
+    for j in range(NODE_COUNT):
+        scratch[j] = node[NU, j] * node[COS, j] * node[SLIP, j]
+        largest = max(largest, abs(node[NU, j]))
+    multiply(INTEGRATION_T, scratch, excess)
+    for j in range(NODE_COUNT):
+        excess[j] *= half_width
+    error = max(unresolved(node[SLOPE]), unresolved(scratch))
+    return error * half_width <= tolerance * largest
+
+
+@kernel
+def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> float:
+    """Find where in the panel the Chebyshev nodes of *time* lie.
+
+    Writes T_k at those places to ``chebyshev[k]`` and returns the panel's duration (radians).
+    Newton's iteration on tau(zeta) = half_width (1 + zeta) + excess(zeta), all nodes at once.
+    """
+    coefficients, zeta = node[COLUMN], node[ZETA]
+    multiply(ANALYSIS_T, node[EXCESS], coefficients)
+    duration = 2.0 * half_width + node[EXCESS, DEGREE]
+    for i in range(NODE_COUNT):
+        zeta[i] = NODES[i]
+    for _ in range(20):
+        worst = 0.0
+        for i in range(NODE_COUNT):
+            z = zeta[i]
+            value, slope = 0.0, 0.0
+            value_before, slope_before = 0.0, 0.0
+            for k in range(DEGREE, 0, -1):
+                slope, slope_before = (
+                    2.0 * value + 2.0 * z * slope - slope_before,
+                    slope,
+                )
+                value, value_before = coefficients[k] + 2.0 * z * value - value_before, value
+            slope = value + z * slope - slope_before
+            value = coefficients[0] + z * value - value_before
+            target = 0.5 * duration * (1.0 + NODES[i])
+            step = (half_width * (1.0 + z) + value - target) / (half_width + slope)
+            zeta[i] = min(1.0, max(-1.0, z - step))
+            worst = max(worst, abs(step))
+        if worst < 1e-9:  # quadratic convergence: the next step would be below 1e-16
+            break
+    for i in range(NODE_COUNT):
+        chebyshev[0, i] = 1.0
+        chebyshev[1, i] = zeta[i]
+    for k in range(2, NODE_COUNT):
+        for i in range(NODE_COUNT):
+            chebyshev[k, i] = 2.0 * zeta[i] * chebyshev[k - 1, i] - chebyshev[k - 2, i]
+    return duration
+
+
+@kernel
+def polynomial(
+    node: FloatArray, values: FloatArray, chebyshev: FloatArray, out: FloatArray
+) -> None:
+    """Turn values at the phase nodes into a polynomial in time, in powers of theta in [-1, 1].
+
+    `values` is replaced by the values at the time nodes.
+    """
+    coefficients = node[COLUMN]
+    multiply(ANALYSIS_T, values, coefficients)
+    for i in range(NODE_COUNT):
+        values[i] = 0.0
+    for k in range(NODE_COUNT):
+        for i in range(NODE_COUNT):
+            values[i] += coefficients[k] * chebyshev[k, i]
+    multiply(POWERS_T, values, out)
+
+
+def workspace() -> FloatArray:
+    """Return the node workspace."""
+    return np.zeros((ROWS, NODE_COUNT))

@@ -1,0 +1,165 @@
+"""What stands above a table: names, units, the sample rate, and remarks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pendpipe.errors import InputError
+from pendpipe.formats.layout import COMMENT, Layout, is_comment
+from pendpipe.formats.units import split_header, unit_of
+
+_RATE: Final = re.compile(
+    r"(?:sampl\w*|scan|acquisition|abtast\w*|messrate|frame|daq)[\s_\-.]*"
+    r"(?:rate|freq\w*|frequenz)?[\s_]*(?:[\[(]?\s*(k?hz|s/s|fps)\s*[\])]?)?\s*[:=;,\t ]\s*"
+    r"([0-9.eE+]+)\s*(k?hz|s/s|fps|/s)?",
+    re.I,
+)
+_RATE_WORD: Final = re.compile(
+    r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
+    r"|messrate|rate[\s_]*\(?hz",
+    re.I,
+)
+_INTERVAL_WORD: Final = re.compile(
+    r"sampl\w*[\s_\-.]*(interval|period|time|step)|\bdt\b|delta[\s_]*t\b|time[\s_]*step"
+    r"|abtast(zeit|intervall)|\bts\b",
+    re.I,
+)
+_VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]*)", re.I)
+
+
+@dataclass(frozen=True)
+class Header:
+    """Names and units (one a column, ``""`` where not told), interval, remarks."""
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    interval_s: float | None = None
+    metadata: dict[str, str] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
+    """Read the lines above the first row of numbers.
+
+    Raises
+    ------
+    InputError
+        When a line under the names is a row with text where the numbers begin.
+    """
+    filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
+    names_at, cells = _names(filled, layout)
+    _refuse_spoilt_rows(place, filled, names_at, layout)
+    interval = _interval([line for _, line in filled])
+    metadata = _metadata([line for _, line in filled])
+    if not cells:
+        return Header((), (), interval, metadata, ("no header: columns are told by their shape",))
+    notes: tuple[str, ...] = ()
+    pairs = [split_header(cell) for cell in cells]
+    names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
+    below = [line for number, line in filled if number > names_at]
+    row_of_units = _row_of_units(below, layout)
+    if row_of_units:
+        units = [unit or own for unit, own in zip(row_of_units, units, strict=True)]
+    if len(cells) < layout.width:
+        missing = layout.width - len(cells)
+        names, units = [""] * missing + names, [""] * missing + units
+        notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the last",)
+    return Header(tuple(_unique(names)), tuple(units), interval, metadata, notes)
+
+
+def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list[str]]:
+    """Find the line of names: the last (but for a row of units) that fits the columns."""
+    candidates: list[tuple[int, int, list[str]]] = []
+    for number, line in filled:
+        bare = line.strip().lstrip("".join(COMMENT)).strip()
+        for cells in (layout.split(line.strip("\n")), layout.split(bare), bare.split()):
+            while len(cells) > layout.width and not cells[-1]:
+                cells.pop()
+            texts = [cell for cell in cells if cell and not layout.is_number(cell)]
+            if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
+                continue
+            if len(cells) < layout.width and not is_comment(line):
+                continue
+            if all(map(unit_of, cells)) and candidates and candidates[-1][0] == len(cells):
+                continue
+            if layout.width == 1 and len(bare.split()) > 4:
+                continue
+            candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
+            break
+    if not candidates:
+        return 0, []
+    width, number, cells = max(candidates, key=lambda entry: entry[:2])
+    return number, cells if width else []
+
+
+def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
+    """Read a row under the names that holds units only."""
+    for line in below:
+        cells = layout.split(line.strip().lstrip("#%"))
+        if len(cells) == layout.width and any(map(unit_of, cells)):
+            if all(not cell or unit_of(cell) for cell in cells):
+                return [cell.strip("[](){} ") for cell in cells]
+    return None
+
+
+def _refuse_spoilt_rows(
+    place: Path, filled: Sequence[tuple[int, str]], names_at: int, layout: Layout
+) -> None:
+    """A row of the block's width between names and numbers is a row with a fault."""
+    for number, line in filled:
+        cells = layout.split(line)
+        numbers = sum(map(layout.is_number, cells))
+        if names_at and number > names_at and numbers and len(cells) == layout.width > 1:
+            text = next(cell for cell in cells if not layout.is_number(cell))
+            raise InputError(
+                f"{place}, line {number}", f"'{text}' is no number", "mend or drop the row"
+            )
+
+
+def _interval(lines: Sequence[str]) -> float | None:
+    """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
+    for line, follower in zip(lines, [*lines[1:], ""], strict=True):
+        for words, inverse in ((_RATE_WORD, True), (_INTERVAL_WORD, False)):
+            found = words.search(line)
+            if found is None:
+                continue
+            value = _VALUE.search(line, found.end())
+            if value is None and "," in line:
+                # A row of names over a row of values.
+                names, cells = line.split(","), follower.split(",")
+                place = next(i for i, name in enumerate(names) if words.search(name))
+                value = _VALUE.search(cells[place]) if place < len(cells) else None
+            if value is None:
+                continue
+            number = float(value[1].replace(",", "."))
+            told = (value[2] or "").lower() or line[found.end() : found.end() + 8].lower()
+            if number <= 0:
+                continue
+            if inverse:
+                return 1.0 / (number * (1e3 if "khz" in told else 1.0))
+            return number * (1e-3 if "ms" in told else 1e-6 if "us" in told or "µs" in told else 1.0)
+    return None
+
+
+def _metadata(lines: Sequence[str]) -> dict[str, str]:
+    """Keep ``key: value`` lines (with or without a comment sign) as they stand."""
+    kept = {}
+    for line in lines[:200]:
+        key, colon, value = line.strip().lstrip("#%/! ").partition(":")
+        if colon and value.strip() and 0 < len(key) <= 40:
+            kept[key.strip()] = value.strip()
+    return kept
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 or not name else f"{name} ({seen[name]})")
+    return out

@@ -1,0 +1,176 @@
+"""How a text file writes its table: the sign between cells, the decimal sign, the rows."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pendpipe.errors import InputError
+from pendpipe.formats.options import ReadOptions
+from pendpipe.formats.table import NotThisFormatError
+
+_NAMES: Final = {
+    "tab": "\t",
+    "\\t": "\t",
+    "comma": ",",
+    "semicolon": ";",
+    "space": " ",
+    "blank": " ",
+    "whitespace": " ",
+    "pipe": "|",
+}
+_SPOKEN: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
+_DELIMITERS: Final = ("\t", ";", "|", ",", " ")
+COMMENT: Final = ("#", "%", "//", "!")
+BLANK_CELLS: Final = frozenset(
+    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "#value!", "\"\"", "?", "*")
+)
+_NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The signs of a table: between its cells, and in its numbers; and its width."""
+
+    delimiter: str
+    decimal: str
+    width: int
+
+    def split(self, line: str) -> list[str]:
+        """Split a line into its cells, quotes and blanks around them removed."""
+        if '"' in line:
+            return self._split_quoted(line)
+        if self.delimiter == " ":
+            return line.split()
+        return [cell.strip() for cell in line.split(self.delimiter)]
+
+    def _split_quoted(self, line: str) -> list[str]:
+        import csv
+
+        blank = self.delimiter == " "
+        cells = next(csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True))
+        return [cell.strip() for cell in cells if cell.strip() or not blank]
+
+    def is_number(self, cell: str) -> bool:
+        """Say whether a cell is a number in this layout."""
+        if self.decimal == ",":
+            cell = "x" if "." in cell else cell.replace(",", ".")
+        return _NUMBER.fullmatch(cell) is not None
+
+    @property
+    def spoken(self) -> str:
+        """The layout in words, for the notes."""
+        between = _SPOKEN.get(self.delimiter, repr(self.delimiter))
+        cells = f"columns apart by {between}" if self.width > 1 else "one column"
+        return cells + (", decimal commas" if self.decimal == "," else "")
+
+
+def is_comment(line: str) -> bool:
+    """Say whether a line is a remark."""
+    return line.lstrip().startswith(COMMENT)
+
+
+def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
+    """Find the signs under which most of the lines are rows of as many numbers.
+
+    Raises
+    ------
+    NotThisFormatError
+        When under none of them a third of the lines are rows of numbers.
+    """
+    full = [line for line in lines if line.strip() and not is_comment(line)]
+    step = max(1, len(full) // 200)
+    sample = full[len(full) // 20 :: step]
+    candidates = [
+        Layout(delimiter, decimal, 0)
+        for delimiter in _wanted_delimiters(options)
+        for decimal in _wanted_decimals(options)
+        if delimiter != decimal
+    ]
+    best, best_score = None, (0.0, 0)
+    for layout in candidates:
+        score, width, numbers = _score(sample, layout)
+        if (round(score, 3), numbers) > best_score:
+            best_score = (round(score, 3), numbers)
+            best = Layout(layout.delimiter, layout.decimal, width)
+    if best is None or best_score[0] < 0.3:
+        raise NotThisFormatError("no block of rows with numbers was found")
+    forced = options.delimiter is not None or options.decimal is not None
+    if best.delimiter == "," and best.width == 2 and not forced and _is_one_column(sample):
+        return Layout(" ", ",", 1)
+    return best
+
+
+def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
+    """Score a layout: share of number cells in rows of the usual width; width; numbers."""
+    rows = [layout.split(line) for line in sample]
+    if not rows:
+        return 0.0, 0, 0
+    width = Counter(len(row) for row in rows).most_common(1)[0][0]
+    total = 0.0
+    numbers = [0] * width
+    for row in rows:
+        if len(row) != width:
+            continue
+        cells = [cell for cell in row if cell.lower() not in BLANK_CELLS]
+        total += sum(map(layout.is_number, cells)) / max(len(cells), 1)
+        for place, cell in enumerate(row):
+            numbers[place] += layout.is_number(cell)
+    return total / len(rows), width, sum(count > len(rows) / 2 for count in numbers)
+
+
+def _is_one_column(sample: Sequence[str]) -> bool:
+    """Tell ``-45,27`` (one number) from ``12,-4`` (two): the first of two is a rising time."""
+    pairs = [line.strip().split(",") for line in sample if line.count(",") == 1]
+    if not all(re.fullmatch(r"[+-]?\d+", a) and re.fullmatch(r"\d+", b) for a, b in pairs):
+        return False
+    first = [int(a) for a, _ in pairs]
+    return any(b < a for a, b in zip(first, first[1:], strict=False))
+
+
+def _wanted_delimiters(options: ReadOptions) -> tuple[str, ...]:
+    if options.delimiter is None:
+        return _DELIMITERS
+    sign = _NAMES.get(options.delimiter.lower(), options.delimiter)
+    if len(sign) != 1 or sign.isalnum() or sign in '.+-"':
+        raise InputError("--delimiter", f"'{sign}' can't part cells", "give tab, space, ',' or ';'")
+    return (sign,)
+
+
+def _wanted_decimals(options: ReadOptions) -> tuple[str, ...]:
+    if options.decimal is None:
+        return (".", ",")
+    sign = {"comma": ",", "point": ".", "dot": "."}.get(options.decimal.lower(), options.decimal)
+    if sign not in (".", ","):
+        raise InputError("--decimal", f"'{sign}' is no decimal sign", "give '.' or ','")
+    return (sign,)
+
+
+def first_row(lines: Sequence[str], layout: Layout) -> int:
+    """Find the first line of the block of numbers.
+
+    It has the usual width and at least half of its filled cells are numbers; so has the
+    next row (a lone row of numbers above the block belongs to the header).
+    """
+    rows = [
+        (place, _is_row(line, layout))
+        for place, line in enumerate(lines)
+        if line.strip() and not is_comment(line)
+    ]
+    for (place, fits), follower in zip(rows, [*rows[1:], (0, True)], strict=True):
+        if fits and follower[1]:
+            return place
+    fitting = [place for place, fits in rows if fits]
+    if not fitting:
+        raise NotThisFormatError("no row of numbers was found")
+    return fitting[0]
+
+
+def _is_row(line: str, layout: Layout) -> bool:
+    cells = layout.split(line)
+    filled = [cell for cell in cells if cell.lower() not in BLANK_CELLS]
+    numbers = sum(map(layout.is_number, filled))
+    return len(cells) == layout.width and numbers > 0 and 2 * numbers >= len(filled)

@@ -1,0 +1,126 @@
+"""A pendulum and its measurement chain, described in a TOML file for `pendpipe simulate`."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, ValidationError, model_validator
+
+from pendpipe.configuration.faults import as_input_error
+from pendpipe.configuration.models import NotNegative, Positive, Section
+from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+from pendpipe.simulation.converter import clipped, quantised
+
+
+class PendulumModel(Section):
+    """Eq. 8: a frequency, four losses, and a release."""
+
+    frequency_hz: Positive = Field(description="Eq. 8's omega over 2 pi")
+    quality_factor_hysteretic: Positive | None = Field(None, description="Q_h; blank: none")
+    quality_factor_viscous: Positive | None = Field(None, description="Q_v; blank: none")
+    a: NotNegative = Field(0.0, description="quadratic drag's rate in Eq. 13, 1/(rad s)")
+    c: NotNegative = Field(0.0, description="Coulomb friction's rate in Eq. 13, rad/s")
+    release_angle_rad: float = Field(description="angle from which it is let go, at rest")
+    release_time_s: float = Field(
+        0.0, le=0.0, description="when it is let go; the record starts at 0"
+    )
+
+    def equation(self) -> Eq8:
+        """Eq. 8 with these numbers."""
+        omega = 2.0 * np.pi * self.frequency_hz
+        hysteretic, viscous = self.quality_factor_hysteretic, self.quality_factor_viscous
+        return Eq8(
+            angular_frequency=omega,
+            quadratic=self.a,
+            hysteretic=omega / (2.0 * hysteretic) if hysteretic else 0.0,
+            viscous=omega / (2.0 * viscous) if viscous else 0.0,
+            coulomb=self.c,
+        )
+
+
+class SensorModel(Section):
+    """The angle sensor; without one the recording is in radians."""
+
+    volts_per_radian: float = Field(3.85, description="its constant")
+    offset_volts: float = Field(0.0, description="its reading at rest")
+    noise_volts: NotNegative = Field(0.0, description="rms of its white noise")
+
+
+class ConverterModel(Section):
+    """The analogue-to-digital converter; without one the volts are not rounded."""
+
+    bits: Annotated[int, Field(ge=2, le=32)] = Field(16, description="bits of a code")
+    range_volts: Positive = Field(10.0, description="it spans minus to plus this")
+
+
+class SamplingModel(Section):
+    """When samples are taken."""
+
+    sample_rate_hz: Positive = Field(description="samples a second")
+    duration_s: Positive = Field(description="length of the record")
+
+
+class Model(Section):
+    """A recording to be simulated."""
+
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the noise")
+    pendulum: PendulumModel = Field(description="the motion")
+    noise_rad: NotNegative = Field(0.0, description="rms of white noise added to the angle")
+    sensor: SensorModel | None = Field(None, description="the sensor; none: radians")
+    converter: ConverterModel | None = Field(None, description="the converter; none: no steps")
+    sampling: SamplingModel = Field(description="rate and length")
+
+    @model_validator(mode="after")
+    def _converter_has_a_sensor(self) -> Model:
+        if self.converter is not None and self.sensor is None:
+            raise ValueError("a converter needs a sensor before it")
+        return self
+
+
+def read_model(path: str | Path) -> Model:
+    """Read a model; a fault is one line with the nearest known name."""
+    place = Path(path)
+    try:
+        content = tomllib.loads(place.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(place, "there is no such file", "check the path") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise InputError(place, f"this is no TOML ({fault})", "mend it") from None
+    try:
+        return Model.model_validate(content)
+    except ValidationError as fault:
+        raise as_input_error(place, fault, Model) from None
+
+
+def simulate(model: Model, source: str = "simulated") -> Recording:
+    """Make the recording that a model describes.
+
+    Returns
+    -------
+    Recording
+        In volts where there is a sensor, else in radians, with its metadata.
+    """
+    rate = model.sampling.sample_rate_hz
+    time = np.arange(int(np.floor(model.sampling.duration_s * rate + 1e-9))) / rate
+    release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
+    angle = sample(model.pendulum.equation(), release, time)
+    random = np.random.default_rng(model.seed)
+    angle = angle + model.noise_rad * random.standard_normal(len(time))
+    metadata = {"source": source, "seed": str(model.seed)}
+    if model.sensor is None:
+        return Recording(time, angle, "angle_rad", metadata=metadata)
+    sensor, converter = model.sensor, model.converter
+    volts = sensor.offset_volts + sensor.volts_per_radian * angle
+    volts = volts + sensor.noise_volts * random.standard_normal(len(time))
+    metadata["volts_per_radian"] = repr(sensor.volts_per_radian)
+    if converter is None:
+        return Recording(time, volts, "volts", metadata=metadata)
+    metadata |= {"bits": str(converter.bits), "range_volts": repr(converter.range_volts)}
+    step = 2.0 * converter.range_volts / 2.0**converter.bits
+    volts = quantised(clipped(volts, converter.range_volts, step), step)
+    return Recording(time, volts, "volts", metadata=metadata, resolution=step)

@@ -1,0 +1,141 @@
+"""The truth behind a simulated record: from the apparatus to the volts at the converter."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from pendpipe import physics
+from pendpipe.arrays import FloatArray
+from pendpipe.configuration.apparatus import pendulum, quadratic_rate
+from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.models import Device, Sensor
+from pendpipe.configuration.records import Record
+from pendpipe.dynamics import Eq8, Release, sample
+
+STEP_V = {"di154": 20.0 / 2**12, "di2108": 20.0 / 2**16}
+"""The step of each simulated converter; both span -10 V to +10 V."""
+
+FEWEST_PERIODS = 8.0
+
+
+@dataclass(frozen=True)
+class SimulatedRecord:
+    """What a simulated record hides, and how it is sampled.
+
+    Parameters
+    ----------
+    model
+        Eq. 8 with the apparatus's own numbers.
+    release
+        The turning point before the first sample.
+    sensor, device
+        The measurement chain.
+    rate_hz, duration_s
+        Samples a second, and for how long.
+    """
+
+    model: Eq8
+    release: Release
+    sensor: Sensor
+    device: Device
+    rate_hz: float
+    duration_s: float
+
+
+def generator(campaign: Campaign, name: str) -> np.random.Generator:
+    """Random numbers of one record: the same whatever other records there are."""
+    return np.random.default_rng([campaign.configuration.seed, zlib.crc32(name.encode())])
+
+
+def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
+    """Eq. 8 of a simulated record, from geometry and the configured truth.
+
+    a from C_d, c from the bearing's torque, the viscous part of b from Eq. 16 times the
+    drag factor, the hysteretic part from Q_hys = k f^2.
+    """
+    settings = campaign.configuration
+    apparatus, truth = settings.apparatus, settings.simulated
+    assert apparatus is not None
+    assert truth is not None
+    built = pendulum(campaign, record)
+    omega = float(built.swing.angular_frequency_per_s)
+    inertia = float(built.swing.moment_of_inertia_kg_m2)
+    hysteretic = physics.hysteretic_quality_factor(
+        built.swing.frequency_hz, truth.hysteretic_coefficient_s2
+    )
+    viscous = 0.0
+    if built.submerged and apparatus.sphere and settings.fluids[record.fluid].boundary_layer:
+        quality = physics.viscous_quality_factor(
+            inertia,
+            omega,
+            apparatus.sphere.diameter_m / 2,
+            apparatus.sphere.distance_m,
+            built.fluid.viscosity_pa_s,
+            built.fluid.density_kg_per_m3,
+            truth.history_coefficient,
+        )
+        viscous = truth.drag_factor * omega / (2.0 * float(quality))
+    return Eq8(
+        angular_frequency=omega,
+        quadratic=quadratic_rate(campaign, record, built),
+        hysteretic=omega / (2.0 * float(hysteretic)),
+        viscous=viscous,
+        coulomb=float(physics.bearing_friction_rate(apparatus.bearing_torque_n_m, inertia, omega)),
+    )
+
+
+def simulated_record(campaign: Campaign, record: Record) -> SimulatedRecord:
+    """Describe one simulated record: motion, sampling, measurement chain."""
+    truth = campaign.configuration.simulated
+    assert truth is not None
+    plan = truth.release.get(record.record) or truth.release[record.fluid]
+    model = equation_of_motion(campaign, record)
+    duration = _duration(model, truth.sensor, truth.device, plan.angle_rad)
+    if plan.duration_s is not None:
+        duration = min(duration, plan.duration_s)
+    # The first sample comes at any phase: the release lies up to a period before it.
+    period = 2.0 * np.pi / model.angular_frequency
+    before = float(generator(campaign, record.record + " release").uniform(0.0, period))
+    return SimulatedRecord(
+        model=model,
+        release=Release(time_s=-before, angle_rad=plan.angle_rad),
+        sensor=truth.sensor,
+        device=truth.device,
+        rate_hz=plan.samples / duration,
+        duration_s=duration,
+    )
+
+
+def _duration(model: Eq8, sensor: Sensor, device: Device, angle_rad: float) -> float:
+    """How long the amplitude stays above the noise, eight periods at least."""
+    noise = float(np.hypot(sensor.noise_volts, STEP_V[device.kind] / np.sqrt(12.0)))
+    lasts = physics.time_at(
+        noise / sensor.volts_per_radian,
+        angle_rad,
+        model.quadratic,
+        model.hysteretic + model.viscous,
+        model.coulomb,
+    )
+    return max(float(lasts), FEWEST_PERIODS * 2.0 * np.pi / model.angular_frequency)
+
+
+class SensorVolts:
+    """The volts at the converter at given times: motion, sensor, noise.
+
+    The noise is drawn sample by sample in the order of the calls, so a record does not
+    depend on the size of the pieces in which the device asks for it.
+    """
+
+    def __init__(self, record: SimulatedRecord, random: np.random.Generator) -> None:
+        self.record = record
+        self.random = random
+
+    def __call__(self, time_s: FloatArray) -> FloatArray:
+        """Return volts at ascending times since the record's start; shape (n,)."""
+        sensor = self.record.sensor
+        angle = sample(self.record.model, self.record.release, time_s)
+        noise = sensor.noise_volts * self.random.standard_normal(len(time_s))
+        return sensor.offset_volts + sensor.volts_per_radian * angle + noise

@@ -1,0 +1,80 @@
+"""The caliper run: the rod is moved by known lengths while the sensor's volts are read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pendpipe.acquire import acquire_simulated
+from pendpipe.arrays import FloatArray
+from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.models import CaliperRun, Sensor
+from pendpipe.errors import InputError
+from pendpipe.files import replaced
+from pendpipe.simulation.record import generator
+
+RATE_HZ = 200.0
+
+
+class Staircase:
+    """The sensor's volts while the caliper holds one position after the other."""
+
+    def __init__(self, run: CaliperRun, sensor: Sensor, angles: FloatArray, seed: int) -> None:
+        self.dwell_s = run.samples / RATE_HZ
+        self.sensor = sensor
+        self.angles = angles
+        self.random = np.random.default_rng([seed, len(angles)])
+
+    def __call__(self, time_s: FloatArray) -> FloatArray:
+        """Return volts at ascending times; shape (n,)."""
+        position = np.floor(time_s / self.dwell_s + 1e-6).astype(np.int64)
+        angle = self.angles[np.clip(position, 0, len(self.angles) - 1)]
+        noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
+        return self.sensor.offset_volts + self.sensor.volts_per_radian * angle + noise
+
+
+def run_caliper(campaign: Campaign, table: Path) -> None:
+    """Make the table of a caliper run, or copy the one that the configuration names.
+
+    Columns ``displacement_m``, ``volts``, ``volts_sd``: the caliper's reading, the mean of
+    the samples at that position, and the mean's standard deviation.
+    """
+    settings = campaign.configuration
+    assert settings.calibration is not None
+    if settings.calibration.source != "simulated":
+        _copy(Path(settings.calibration.source), table)
+        return
+    run, truth = settings.calibration, settings.simulated
+    if truth is None:
+        raise InputError("calibration", "a simulated run needs the section simulated", "add it")
+    random = generator(campaign, "caliper run")
+    displacement = np.linspace(-run.travel_m, run.travel_m, run.points)
+    reading = displacement + run.displacement_sd_m * random.standard_normal(run.points)
+    signal = Staircase(run, truth.sensor, displacement / run.arm_m, settings.seed)
+    recording = acquire_simulated(
+        truth.device.kind,
+        signal,
+        rate_hz=RATE_HZ,
+        duration_s=run.points * run.samples / RATE_HZ,
+        clock_scale=truth.device.clock_scale,
+    )
+    steps = np.floor(recording.time_s * RATE_HZ / run.samples + 1e-6).astype(np.int64)
+    with replaced(table) as stream:
+        stream.write(f"# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n")
+        for index, length in enumerate(reading.tolist()):
+            volts = recording.values[steps == index]
+            spread = float(np.std(volts, ddof=1) / np.sqrt(len(volts)))
+            stream.write(f"{length!r},{float(np.mean(volts))!r},{spread!r}\n")
+
+
+def _copy(source: Path, table: Path) -> None:
+    """Keep the user's own table beside the results that were made with it."""
+    try:
+        content = source.read_bytes()
+    except OSError:
+        raise InputError(
+            source, "the calibration's table can't be read", "check the path"
+        ) from None
+    with replaced(table, "wb") as stream:
+        stream.write(content)
