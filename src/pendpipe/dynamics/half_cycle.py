@@ -35,8 +35,10 @@ if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
 
 HEAD = 2
-TOLERANCE = 1e-12
-"""Of one half cycle, relative to its loss (the trajectory) or to its amplitude (the waveform)."""
+LOSS_TOLERANCE = 5e-10
+"""Bound of `solve`'s estimate, which is a thousand times the error: 5e-13 of a half cycle's loss."""
+WAVEFORM_TOLERANCE = 1e-12
+"""Of the polynomial in time, relative to the amplitude."""
 
 
 @kernel
@@ -98,7 +100,7 @@ def panel_polynomials(
     for j in range(NODE_COUNT):
         waveform[j] = (shape[0] + radius * (1.0 + node[LOSS, j]) * node[COS, j]) / y
     polynomial(node, waveform, chebyshev, out[:NODE_COUNT])
-    resolved = unresolved(waveform) <= TOLERANCE
+    resolved = unresolved(waveform) <= WAVEFORM_TOLERANCE
     for c in range(columns.shape[0] - 1):
         if c > 0:
             for j in range(NODE_COUNT):
@@ -132,9 +134,8 @@ def tabulated_half_cycle(
     for p in range(panels):
         if panels > 1 or node[SIN, DEGREE // 2] != 1.0:
             place(node, 2.0 * p * half_width, half_width)
-            node[LOSS, :] = 0.0
         here = radius * (1.0 + change)
-        if not solve(node, shape, here, half_width, TOLERANCE):
+        if not solve(node, shape, here, half_width, LOSS_TOLERANCE):
             return False
         if sigma.size > 0:
             sensitivities(node, shape, directions, here, half_width, sigma, shift, columns)

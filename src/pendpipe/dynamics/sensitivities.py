@@ -45,7 +45,7 @@ def _differentiate_nu(node: FloatArray, shape: FloatArray, radius: float) -> Non
         cos = node[COS, j]
         r = radius * (1.0 + node[LOSS, j])
         x = m + r * cos
-        distance = math.sqrt(max(0.0, r * r + m * (2.0 * r * cos + m)))
+        distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
         inverse = 1.0 / (distance + m)
         # Where x and u vanish together R has no derivative; its direction is then of no weight.
         direction = 1.0 / distance if distance > 0.0 else 0.0

@@ -12,12 +12,6 @@ from pendpipe.errors import InputError
 from pendpipe.formats.layout import COMMENT, Layout, is_comment
 from pendpipe.formats.units import split_header, unit_of
 
-_RATE: Final = re.compile(
-    r"(?:sampl\w*|scan|acquisition|abtast\w*|messrate|frame|daq)[\s_\-.]*"
-    r"(?:rate|freq\w*|frequenz)?[\s_]*(?:[\[(]?\s*(k?hz|s/s|fps)\s*[\])]?)?\s*[:=;,\t ]\s*"
-    r"([0-9.eE+]+)\s*(k?hz|s/s|fps|/s)?",
-    re.I,
-)
 _RATE_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
     r"|messrate|rate[\s_]*\(?hz",

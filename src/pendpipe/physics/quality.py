@@ -70,7 +70,8 @@ def quality_factor(
         Q; zero at y = 0 with c > 0, infinite where nothing is lost.
     """
     y, frequency, quadratic, linear, coulomb = floats(amplitude_rad, frequency_hz, a, b, c)
-    coulomb_loss = np.where(coulomb == 0.0, 0.0, coulomb * inverse(y))
+    # Where the pendulum rests, c/y is infinite, unless there is no c.
+    coulomb_loss = coulomb * inverse(np.where(coulomb == 0.0, 1.0, y))
     return plain(np.pi * frequency * inverse(quadratic * y + linear + coulomb_loss))
 
 

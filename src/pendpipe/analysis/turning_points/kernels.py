@@ -36,15 +36,18 @@ def extremes(values: FloatArray, start: float, least: float) -> tuple[IntArray, 
     count, direction, first = 0, 0, 0
     threshold = max(start, least)
     high, low = 0, 0
-    for i in range(len(values)):
-        x = values[i]
-        if x > values[high]:
-            high = i
-        if x < values[low]:
-            low = i
-        if direction >= 0 and values[high] - x > threshold:
+    top, bottom = -np.inf, np.inf
+    for i in range(1, len(values) - 1):
+        # The median of three: a glitch of one sample is no extreme.
+        p, q, r = values[i - 1], values[i], values[i + 1]
+        x = max(min(p, q), min(max(p, q), r))
+        if x > top:
+            high, top = i, x
+        if x < bottom:
+            low, bottom = i, x
+        if direction >= 0 and top - x > threshold:
             extreme, turned = high, -1
-        elif direction <= 0 and x - values[low] > threshold:
+        elif direction <= 0 and x - bottom > threshold:
             extreme, turned = low, 1
         else:
             continue
@@ -56,7 +59,7 @@ def extremes(values: FloatArray, start: float, least: float) -> tuple[IntArray, 
             threshold = max(least, 0.25 * np.median(known))
         found[count] = extreme
         count += 1
-        direction, high, low = turned, i, i
+        direction, high, low, top, bottom = turned, i, i, x, x
     return found[:count].copy(), first
 
 
@@ -125,6 +128,7 @@ def half_cycle_sums(
     square = np.zeros(number)
     basis = np.empty(size)
     even = weights.size == 0
+    harmonic = free > 0 or np.any(shape[:, 4:] != 0.0)
     for k in range(number):
         friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
         for i in range(edges[k, 0], edges[k, 1]):
@@ -135,14 +139,13 @@ def half_cycle_sums(
             form += math.copysign(friction, phase) * lack
             form += viscous2 * phase * (0.5 * phase * cosine - sine)
             before, now = cosine, cosine
-            twice = 2.0 * (2.0 * cosine * cosine - 1.0)
-            for m in range(HARMONICS):
-                before, now = now, twice * now - before
-                form += shape[k, 4 + m] * now
-                if m < free:
-                    basis[3 + m] = now
-                elif m >= free and shape[k, 4] == 0.0:
-                    break
+            if harmonic:
+                twice = 2.0 * (2.0 * cosine * cosine - 1.0)
+                for m in range(HARMONICS):
+                    before, now = now, twice * now - before
+                    form += shape[k, 4 + m] * now
+                    if m < free:
+                        basis[3 + m] = now
             basis[0] = 1.0
             basis[1] = form
             basis[2] = sine
@@ -158,6 +161,25 @@ def half_cycle_sums(
             for q in range(p):
                 gram[k, q, p] = gram[k, p, q]
     return gram, right, square
+
+
+@njit(cache=True)
+def solve_in_place(matrix: FloatArray, right: FloatArray) -> None:
+    """Solve a small positive definite system; `right` becomes the solution.
+
+    numba's own ``linalg`` would import scipy, which costs more than all of this.
+    """
+    size = len(right)
+    for p in range(size):
+        for q in range(p + 1, size):
+            factor = matrix[q, p] / matrix[p, p]
+            for r in range(p, size):
+                matrix[q, r] -= factor * matrix[p, r]
+            right[q] -= factor * right[p]
+    for p in range(size - 1, -1, -1):
+        for q in range(p + 1, size):
+            right[p] -= matrix[p, q] * right[q]
+        right[p] /= matrix[p, p]
 
 
 @njit(cache=True)
@@ -202,7 +224,95 @@ def smooth_times(
                 right[p] += weight[j] * power[p] * (time_s[j] - time_s[lo])
                 for q in range(degree + 1):
                     normal[p, q] += weight[j] * power[p] * power[q]
-        solved = np.linalg.solve(normal, right)
-        centre[k] = time_s[lo] + solved[0]
-        slope[k] = solved[1]
+        solve_in_place(normal, right)
+        centre[k] = time_s[lo] + right[0]
+        slope[k] = right[1]
     return centre, slope
+
+
+@njit(cache=True)
+def solve_half_cycles(
+    gram: FloatArray, right: FloatArray, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Solve each half cycle for amplitude, sine and harmonics at a given level.
+
+    Parameters
+    ----------
+    gram, right
+        From `half_cycle_sums`; row 0 is the level.
+    prior
+        Added to the sine's diagonal (an inverse variance about zero, over the noise's).
+
+    Returns
+    -------
+    solution, inverse
+        Shape (k, size - 1, 2): for a level that is right, and minus the change per unit
+        of level; and the inverse of the reduced Gram matrix, (k, size - 1, size - 1). A
+        half cycle without samples gives NaN.
+    """
+    number, size = right.shape[0], right.shape[1] - 1
+    solution = np.full((number, size, 2), np.nan)
+    inverse = np.full((number, size, size), np.nan)
+    matrix = np.empty((size, size))
+    column = np.empty(size)
+    for k in range(number):
+        if gram[k, 0, 0] == 0.0:
+            continue
+        for job in range(size + 2):
+            for p in range(size):
+                for q in range(size):
+                    matrix[p, q] = gram[k, 1 + p, 1 + q]
+                if job == 0:
+                    column[p] = right[k, 1 + p]
+                elif job == 1:
+                    column[p] = gram[k, 1 + p, 0]
+                else:
+                    column[p] = 1.0 if p == job - 2 else 0.0
+                # A hair of regularisation: few samples can't tell harmonics apart.
+                matrix[p, p] *= 1.0 + 1e-9
+            matrix[1, 1] += prior[k] + 1e-12
+            solve_in_place(matrix, column)
+            for p in range(size):
+                if job < 2:
+                    solution[k, p, job] = column[p]
+                else:
+                    inverse[k, p, job - 2] = column[p]
+    return solution, inverse
+
+
+@njit(cache=True)
+def count_half_cycles(
+    time_s: FloatArray, sign: IntArray, gap_before: IntArray
+) -> tuple[IntArray, int]:
+    """Number the extremes, counting those that a gap in the data has swallowed.
+
+    Parameters
+    ----------
+    time_s, sign
+        Of each extreme; `sign` is +1 for a maximum.
+    gap_before
+        1 where samples are missing between an extreme and the one before it.
+
+    Returns
+    -------
+    number, good
+        Number of each half cycle from 0; and how many extremes from the start hang
+        together (an interval of three half cycles without a gap ends the motion).
+    """
+    number = np.zeros(len(time_s), dtype=np.int64)
+    if len(time_s) < 2:
+        return number, len(time_s)
+    period = np.median(np.diff(time_s[: min(6, len(time_s))]))
+    for k in range(1, len(time_s)):
+        interval = time_s[k] - time_s[k - 1]
+        odd = sign[k] != sign[k - 1]
+        whole = round(interval / period)
+        if (whole % 2 == 1) != odd:
+            whole += 1 if interval / period > whole else -1
+        whole = max(whole, 1 if odd else 2)
+        if whole > 2 and gap_before[k] == 0:
+            return number, k
+        number[k] = number[k - 1] + whole
+        if whole == 1:
+            period += 0.3 * (interval - period)
+    return number, len(time_s)

@@ -1,0 +1,1 @@
+"""Figures that are shown, not asserted: ``python -m benchmarks`` and ``.evidence``."""

@@ -1,0 +1,155 @@
+"""Turning points with their errors, and the file they are kept in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.errors import InputError
+from pendpipe.files import replaced
+
+COLUMNS: Final = (
+    "half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad",
+)  # fmt: skip
+_NUMBERS: Final = ("level_sd_rad", "level_coupling", "noise_rms_rad", "step_rad")
+
+
+@dataclass(frozen=True)
+class TurningPoints:
+    """The turning points of one free decay.
+
+    Parameters
+    ----------
+    half_cycle
+        Number of each, rising; numbers are left out where the data have a gap. Shape (k,).
+    time_s, time_sd_s
+        When the velocity is zero, and its standard deviation, in s.
+    angle_rad
+        Signed angle about `level_rad`, in rad (metres where `unit` is m).
+    angle_sd_rad
+        Its standard deviation at a known level; these errors are independent.
+    level_rad
+        The local equilibrium level.
+    level_sd_rad, level_coupling
+        Standard deviation of the level (of a wandering one, of its local value) and by
+        how much a level too high by one lowers the signed angles: the shared error.
+    noise_rms_rad
+        Standard deviation of one reading, never below step/sqrt(12).
+    step_rad
+        The step of the readings, 0 where none is known.
+    samples
+        How many readings went in.
+    unit
+        ``"rad"`` or ``"m"``.
+    wanders
+        Whether the level is a slow function of time.
+    metadata, notes
+        Provenance for the file's head; and what the user should know, a clause each.
+    """
+
+    half_cycle: IntArray
+    time_s: FloatArray
+    time_sd_s: FloatArray
+    angle_rad: FloatArray
+    angle_sd_rad: FloatArray
+    level_rad: FloatArray
+    level_sd_rad: float = 0.0
+    level_coupling: float = 4.0 / np.pi
+    noise_rms_rad: float = float("nan")
+    step_rad: float = 0.0
+    samples: int = 0
+    unit: str = "rad"
+    wanders: bool = False
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def amplitude_rad(self) -> FloatArray:
+        """Angle without the alternating sign; noise may make a small one negative."""
+        return self.angle_rad * self.side
+
+    @property
+    def side(self) -> FloatArray:
+        """+1 for the half cycles above the level, -1 for those below; shape (k,)."""
+        alternating = 1.0 - 2.0 * ((self.half_cycle - self.half_cycle[0]) % 2)
+        return np.copysign(alternating, alternating * float(np.sum(alternating * self.angle_rad)))
+
+    def covariance(self) -> FloatArray:
+        """Covariance of the signed angles, shape (k, k): independent and shared parts."""
+        shared = (self.level_coupling * self.level_sd_rad) ** 2
+        return np.diag(self.angle_sd_rad**2) + shared
+
+    @property
+    def apparent_frequency_hz(self) -> float:
+        """Mean number of cycles in a second over the whole record."""
+        cycles = 0.5 * float(self.half_cycle[-1] - self.half_cycle[0])
+        return cycles / float(self.time_s[-1] - self.time_s[0])
+
+
+def write_turning_points(path: str | Path, points: TurningPoints) -> None:
+    """Write ``turning_points.csv``: lines ``# key: value``, header, a row a turning point."""
+    head = {
+        "unit": points.unit,
+        "frequency_hz": repr(points.apparent_frequency_hz),
+        **{key: repr(float(getattr(points, key))) for key in _NUMBERS},
+        "level": "wanders" if points.wanders else "constant",
+        "samples": str(points.samples),
+        **points.metadata,
+    }
+    columns = [getattr(points, name).tolist() for name in COLUMNS]
+    with replaced(path) as stream:
+        for key, value in head.items():
+            stream.write(f"# {key}: {' '.join(str(value).split())}\n")
+        for note in points.notes:
+            stream.write(f"# note: {' '.join(note.split())}\n")
+        stream.write(",".join(COLUMNS) + "\n")
+        stream.writelines(",".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
+
+
+def read_turning_points(path: str | Path) -> TurningPoints:
+    """Read ``turning_points.csv``.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, is no table of turning points, or was refused.
+    """
+    place = Path(path)
+    try:
+        lines = place.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        raise InputError(place, "there is no such file", "run pendpipe turning-points") from None
+    metadata: dict[str, str] = {}
+    notes: list[str] = []
+    start = 0
+    for start, line in enumerate(lines):  # noqa: B007 - the first row after the head
+        if not line.startswith("#"):
+            break
+        key, _, value = line.lstrip("# ").partition(":")
+        notes.append(value.strip()) if key == "note" else metadata.update({key: value.strip()})
+    if not lines or lines[start].strip() != ",".join(COLUMNS):
+        raise InputError(place, "this is no table of turning points", "run pendpipe turning-points")
+    try:
+        table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
+        numbers = {key: float(metadata.pop(key)) for key in _NUMBERS}
+    except (KeyError, ValueError) as fault:
+        raise InputError(place, f"it can't be read ({fault})", "make it again") from None
+    metadata.pop("frequency_hz", None)
+    return TurningPoints(
+        table[:, 0].astype(np.int64),
+        *(np.ascontiguousarray(table[:, j]) for j in range(1, len(COLUMNS))),
+        **numbers,
+        samples=int(metadata.pop("samples", "0")),
+        unit=metadata.pop("unit", "rad"),
+        wanders=metadata.pop("level", "constant") == "wanders",
+        metadata=metadata,
+        notes=tuple(notes),
+    )

@@ -1,0 +1,173 @@
+"""The tabulated half-cycle map.
+
+Without explicit time dependence a half cycle depends on its amplitude y alone, and smoothly on
+ln y as long as y is well above the amplitude m of the stop. So a few half cycles are solved,
+at Chebyshev points in ln y, and all others are interpolated: every number of a half cycle's row
+(see `half_cycle.py`) becomes a polynomial in z = (ln y - middle)/half_span.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.dynamics.chebyshev import powers_of_chebyshev
+from pendpipe.dynamics.half_cycle import HEAD, tabulated_half_cycle
+from pendpipe.dynamics.panel import kernel
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+
+MOST_POINTS = 18
+WIDEST = 5.2
+"""The widest range of ln y that one table spans, and its points; see `points_for`."""
+SMOOTH_FROM = 20.0
+"""Below this multiple of m, half cycles are solved one by one."""
+MOST_PANELS = 4
+_LOSS_TOLERANCE = 1e-12
+_WAVEFORM_TOLERANCE = 1e-11
+
+_POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
+
+# Entries of a segment's description.
+LOW, HIGH, MIDDLE, HALF_SPAN, POINTS, PANELS = range(6)
+DESCRIPTION = 6
+
+
+@kernel
+def points_for(span: float) -> int:
+    """Return how many points resolve exp(+-ln y) over a span to 1e-14."""
+    return min(MOST_POINTS, 9 + math.ceil(1.8 * span))
+
+
+@kernel
+def half_cycles_and_span(
+    shape: FloatArray, log_y: float, half_cycles: float, room: float
+) -> tuple[float, float]:
+    """Foresee how far ln y falls in `half_cycles`, at most by `room`: half cycles, span.
+
+    By the slow equation 13, ln(y/y') = 2 (delta/y + h + q y) + pi g, good to a few per cent and
+    only used to lay out tables: nothing is lost but time if it is wrong.
+    """
+    m, h, q, g = shape[0], shape[1], shape[2], shape[3]
+    delta = m * (1.0 - h - q * m)
+    step = min(0.125, room / 8.0)
+    factor = math.exp(-step)
+    y = math.exp(log_y - 0.5 * step)
+    count, span = 0.0, 0.0
+    while span < room:
+        loss = 2.0 * (delta / y + h + q * y) + math.pi * g + 1e-300
+        if count + step / loss >= half_cycles:
+            span += (half_cycles - count) * loss * 1.03 + 2.0 * loss
+            return half_cycles, min(span, room)
+        count += step / loss
+        span += step
+        y *= factor
+    return count, room
+
+
+@kernel
+def build(
+    node: FloatArray,
+    shape: FloatArray,
+    directions: FloatArray,
+    log_y: float,
+    span: float,
+    panels: int,
+    width: int,
+    polynomials: int,
+    sigma: FloatArray,
+    shift: FloatArray,
+    columns: FloatArray,
+    chebyshev: FloatArray,
+    rows: FloatArray,
+    cosines: FloatArray,
+    segment: FloatArray,
+    table: FloatArray,
+) -> bool:
+    """Tabulate the half cycles with ln y from log_y - span to log_y; say whether it resolves.
+
+    `table` receives, for each power of z, the coefficients of all entries of the row;
+    `segment` its description.
+    """
+    points = points_for(span)
+    half = 0.5 * span
+    segment[LOW], segment[HIGH] = log_y - span, log_y
+    segment[MIDDLE], segment[HALF_SPAN] = log_y - half, half
+    segment[POINTS], segment[PANELS] = points, panels
+    for i in range(4 * points):
+        cosines[i] = math.cos(0.5 * math.pi * i / points)
+    for i in range(points):
+        y = math.exp(log_y - half + half * cosines[2 * i + 1])
+        if not tabulated_half_cycle(
+            node, shape, directions, y, panels, polynomials, sigma, shift, columns, chebyshev,
+            rows[i, :width],
+        ):  # fmt: skip
+            return False
+    return _interpolate(points, width, rows, cosines, sigma.size, table)
+
+
+@kernel
+def _interpolate(
+    points: int,
+    width: int,
+    rows: FloatArray,
+    cosines: FloatArray,
+    columns: int,
+    table: FloatArray,
+) -> bool:
+    """Turn the solved rows into polynomials in z; say whether their coefficients have died out."""
+    for k in range(points):
+        for j in range(width):
+            table[k, j] = 0.0
+    least = rows[0, 0]
+    for i in range(points):
+        least = min(least, rows[i, 0])
+    resolved = True
+    scratch = rows[MOST_POINTS]
+    for k in range(points):
+        for j in range(width):
+            scratch[j] = 0.0
+        for i in range(points):
+            weight = (2.0 if k > 0 else 1.0) / points * cosines[(k * (2 * i + 1)) % (4 * points)]
+            for j in range(width):
+                scratch[j] += weight * rows[i, j]
+        if k >= points - 2:
+            resolved = resolved and abs(scratch[0]) <= _LOSS_TOLERANCE * least
+            resolved = resolved and abs(scratch[1]) <= _LOSS_TOLERANCE * least
+            for j in range(HEAD + 2 * columns, width):
+                resolved = resolved and abs(scratch[j]) <= _WAVEFORM_TOLERANCE
+        for i in range(k + 1):
+            power = _POWERS[k, i]
+            if power != 0.0:
+                for j in range(width):
+                    table[i, j] += power * scratch[j]
+    return resolved
+
+
+@kernel
+def look_up(
+    segment: FloatArray, table: FloatArray, log_y: float, width: int, row: FloatArray
+) -> None:
+    """Write the half cycle that starts at ln y = log_y to `row`."""
+    z = (log_y - segment[MIDDLE]) / segment[HALF_SPAN]
+    points = int(segment[POINTS])
+    for j in range(width):
+        row[j] = table[0, j]
+    power = 1.0
+    for k in range(1, points):
+        power *= z
+        for j in range(width):
+            row[j] += power * table[k, j]
+
+
+def table_workspace(width: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the arrays `build` works in: solved rows, cosines, description and table."""
+    return (
+        np.zeros((MOST_POINTS + 1, width)),
+        np.zeros(4 * MOST_POINTS),
+        np.zeros(DESCRIPTION),
+        np.zeros((MOST_POINTS, width)),
+    )

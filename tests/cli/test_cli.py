@@ -1,0 +1,52 @@
+"""The command line: help for each command, one line and status 2 for a user's fault."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pendpipe import cli
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_has_its_module_and_its_help(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([name, "--help"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    module = importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
+    assert (module.__doc__ or "").splitlines()[0] in shown
+
+
+def test_an_unknown_command_is_a_usage_fault(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["inspekt"])
+    assert ended.value.code == 2
+    assert "inspekt" in capsys.readouterr().err
+
+
+def test_a_users_fault_is_one_line_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = cli.main(["simulate", str(tmp_path / "none.toml"), str(tmp_path / "out.csv")])
+    message = capsys.readouterr().err
+    assert status == 2
+    assert message.count("\n") == 1
+    assert "none.toml" in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_entry_point_imports_no_heavy_library() -> None:
+    """A job's cost is its imports: the command line alone brings none of these."""
+    heavy = {"numpy", "scipy", "pandas", "matplotlib", "numba", "pydantic", "serial"}
+    code = "import sys, pendpipe.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert not heavy & set(loaded.stdout.split())

@@ -1,0 +1,26 @@
+"""A result is whole or absent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.files import read_json, replaced, write_json
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "result.csv"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replaced(path) as stream:
+        stream.write("half")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_json_has_null_where_there_is_no_finite_value(tmp_path: Path) -> None:
+    content = {"a": np.float64("nan"), "b": [1.0, float("inf")], "c": np.arange(2)}
+    write_json(tmp_path / "x.json", content)
+    assert read_json(tmp_path / "x.json") == {"a": None, "b": [1.0, None], "c": [0, 1]}

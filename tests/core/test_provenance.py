@@ -1,0 +1,35 @@
+"""Editing the library changes the version of what depends on it, and of nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pendpipe import provenance
+
+
+@pytest.fixture
+def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A library of three modules: `stage` uses `used`, inside a function; `other` stands alone."""
+    package = tmp_path / "pendpipe"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "stage.py").write_text("def run():\n    from pendpipe.used import x\n    return x\n")
+    (package / "used.py").write_text("x = 1\n")
+    (package / "other.py").write_text("y = 1\n")
+    monkeypatch.setattr(provenance, "PACKAGE", package)
+    return package
+
+
+def version() -> str:
+    provenance._content.cache_clear()
+    provenance._imports.cache_clear()
+    return provenance.code_version("pendpipe.stage")
+
+
+@pytest.mark.parametrize(("edited", "changes"), [("used", True), ("stage", True), ("other", False)])
+def test_the_version_follows_the_imports(library: Path, edited: str, changes: bool) -> None:
+    before = version()
+    (library / f"{edited}.py").write_text("x = y = 2\n")
+    assert (version() != before) == changes

@@ -1,0 +1,90 @@
+"""A recording survives the disk unchanged, and a faulty one is refused with its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording, read_plain, write_plain
+
+finite = st.floats(-1e300, 1e300, allow_nan=False)
+
+
+@given(values=st.lists(finite, min_size=1, max_size=50), start=st.floats(-1e6, 1e6))
+@settings(max_examples=50)
+def test_every_digit_survives_the_disk(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float], start: float
+) -> None:
+    path = tmp_path_factory.mktemp("plain") / "recording.csv"
+    time = start + 0.01 * np.arange(len(values))
+    recording = Recording(
+        time, np.array(values), "volts", metadata={"source": "a: b", "bits": "16"}
+    )
+    write_plain(path, recording)
+    again = read_plain(path)
+    np.testing.assert_array_equal(again.time_s, time)
+    np.testing.assert_array_equal(again.values, recording.values)
+    assert again.quantity == "volts"
+    assert dict(again.metadata) == dict(recording.metadata)
+
+
+def test_a_gap_survives_the_disk(tmp_path: Path) -> None:
+    recording = Recording(
+        np.array([0.0, 1.0, 2.0, 7.0]),
+        np.array([0.1, 0.2, np.nan, 0.3]),
+        "angle_rad",
+        quality=np.array([0, 1, 2, 0], dtype=np.uint8),
+    )
+    write_plain(tmp_path / "gap.csv", recording)
+    again = read_plain(tmp_path / "gap.csv")
+    assert again.usable.tolist() == [True, True, False, True]
+
+
+def test_volts_become_radians_by_the_sensor_constant(tmp_path: Path) -> None:
+    """3.85 V is one radian, and the converter's step shrinks with it."""
+    (tmp_path / "v.csv").write_text(
+        "# volts_per_radian: 3.85\n# bits: 16\n# range_volts: 10\ntime_s,volts\n0,3.85\n1,0\n"
+    )
+    motion = read_plain(tmp_path / "v.csv").as_motion()
+    assert motion.values.tolist() == [1.0, 0.0]
+    assert motion.resolution == pytest.approx(20 / 2**16 / 3.85, rel=1e-15)
+
+
+FAULTS = {
+    "missing column": ("time,volts\n0,1\n", "line 1", "time_s is missing"),
+    "no reading": ("time_s,current\n0,1\n", "line 1", "exactly one of"),
+    "two readings": ("time_s,volts,angle_rad\n0,1,2\n", "line 1", "exactly one of"),
+    "text in a number": ("time_s,volts\n0,1\n1,two\n", "line 3", "'two' is no number"),
+    "short row": ("time_s,volts\n0,1\n1\n", "line 3", "1 cells, not 2"),
+    "time falls": ("time_s,volts\n0,1\n2,1\n1,1\n", "line 4", "does not rise"),
+    "time repeats": ("time_s,volts\n0,1\n0,1\n", "line 3", "does not rise"),
+    "NaN": ("time_s,volts\n0,1\n1,nan\n", "line 3", "NaN or infinite"),
+    "empty": ("", "", "is empty"),
+    "only a header": ("time_s,volts\n", "", "no samples"),
+    "odd quality": ("time_s,volts,quality\n0,1,7\n", "line 2", "not 0, 1 or 2"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_faulty_file_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
+    text, place, said = FAULTS[name]
+    path = tmp_path / "faulty.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_plain(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert place in message
+    assert said in message
+    assert "\n" not in message
+
+
+def test_volts_without_a_sensor_constant_are_no_angles() -> None:
+    recording = Recording(np.arange(3.0), np.zeros(3), "volts")
+    with pytest.raises(InputError, match="no sensor constant"):
+        recording.as_motion()

@@ -1,0 +1,60 @@
+"""A record that can't be used leaves its reason and stands in nobody's way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pendpipe.errors import InputError
+from pendpipe.files import read_json, write_json
+from pendpipe.stages.refusal import reason_of, run_stage
+
+
+def fails() -> None:
+    raise InputError("a.csv", "there is no decay", "record one")
+
+
+def test_a_refused_record_leaves_one_line_and_whole_stubs(tmp_path: Path) -> None:
+    refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
+    assert run_stage("fit", "x", fails, outputs=[out], refused=refused) == 0
+    assert read_json(refused) == {
+        "schema_version": 1,
+        "record": "x",
+        "stage": "fit",
+        "reason": "a.csv: there is no decay; record one",
+    }
+    assert read_json(out)["refused"] == "a.csv: there is no decay; record one"
+
+
+def test_the_stages_after_a_refusal_pass_it_on(tmp_path: Path) -> None:
+    refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
+    run_stage("acquire", "x", fails, outputs=[tmp_path / "recording.csv"], refused=refused)
+
+    def never() -> None:
+        raise AssertionError
+
+    assert run_stage("fit", "x", never, outputs=[out], refused=refused) == 0
+    assert "no decay" in read_json(out)["refused"]
+
+
+def test_a_mended_record_is_no_longer_refused(tmp_path: Path) -> None:
+    refused, out = tmp_path / "refused.json", tmp_path / "turning_points.csv"
+    run_stage("turning-points", "x", fails, outputs=[out], refused=refused)
+    run_stage("acquire", "x", lambda: None, outputs=[], refused=refused)
+    assert reason_of(refused) is None
+
+
+def test_without_a_place_for_refusals_the_fault_ends_the_program() -> None:
+    with pytest.raises(InputError):
+        run_stage("fit", "x", fails, outputs=[], refused=None)
+
+
+def test_a_fault_of_the_programs_own_is_never_a_refusal(tmp_path: Path) -> None:
+    def breaks() -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run_stage("fit", "x", breaks, outputs=[], refused=tmp_path / "refused.json")
+    write_json(tmp_path / "other.json", {})
+    assert not (tmp_path / "refused.json").exists()
