@@ -141,7 +141,10 @@ def _notes(raw: RawRecording, losses: Sequence[Loss], time_base: TimeBase) -> tu
     notes: list[str] = []
     met = [loss for loss in losses if loss.after_scan]
     if met:
-        scans, discarded = (sum(loss.lost_scans for loss in met), sum(loss.discarded_bytes for loss in met))
+        scans, discarded = (
+            sum(loss.lost_scans for loss in met),
+            sum(loss.discarded_bytes for loss in met),
+        )
         notes.append(f"{scans} scans lost at {len(met)} places ({discarded} bytes out of step)")
     if time_base.chosen == "measured":
         notes.append(

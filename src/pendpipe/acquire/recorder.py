@@ -26,6 +26,8 @@ _POLLS: Final = 256
 _SHORTEST_POLL_S, _LONGEST_POLL_S = 0.001, 0.02
 _SILENCE_S: Final = 3.0
 """Seconds of the host without a byte (beyond the time of a few scans) that end a session."""
+_PATIENCE_S: Final = 5.0
+"""Seconds of the host, beyond a tenth more than asked, that a slow device is waited for."""
 
 
 class Progress(Protocol):
@@ -130,7 +132,10 @@ def record(
             writer = RawWriter(stream, {key: v for key, v in header.items() if v is not None})
             if progress:
                 progress.begin(kind, setup)
-            _stream(instrument, setup, wish, clock, writer, progress)
+            try:
+                _stream(instrument, setup, wish, clock, writer, progress)
+            except OSError as fault:
+                raise _cannot_write(raw_path or "memory", fault) from None
             content = stream.getvalue() if isinstance(stream, BytesIO) else None
     return decode_recording(content if content is not None else Path(raw_path or ""))
 
@@ -148,21 +153,31 @@ def _stream(
     wanted = scans * type(instrument).decoder(len(setup.channels)).bytes_per_scan
     poll_s = wish.duration_s / clock.scale / _POLLS
     poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, poll_s))
+    latest_s = 1.1 * wish.duration_s + _PATIENCE_S * clock.scale
     # A packet may gather many scans before it is sent.
     silence_s = _SILENCE_S + 64 / setup.rate_hz / clock.scale
-    received, reason = 0, ""
-    instrument.start()
+    received, reason, fast = 0, "", False
+    # Taken before the start, so that a device can only seem late, never early.
     origin_s = clock.now()
+    instrument.start()
     try:
         while not reason:
             data = instrument.receive(silence_s)
             elapsed_s = clock.now() - origin_s
-            writer.data(elapsed_s, data)
-            received += len(data)
+            if data:
+                writer.data(elapsed_s, data)
+                received += len(data)
             if progress:
                 progress.update(elapsed_s, data)
-            reason = _ended(bool(data), received >= wanted, elapsed_s, wish.duration_s)
-            if not reason:
+            enough = received >= wanted
+            fast = fast or (enough and elapsed_s < 0.9 * (scans - 1) / setup.rate_hz)
+            if not data:
+                reason = f"the device fell silent after {elapsed_s:.6g} s"
+            elif enough and not fast:
+                reason = "scans"
+            elif elapsed_s >= (wish.duration_s if fast else latest_s):
+                reason = "time"
+            else:
                 time.sleep(poll_s)
         instrument.stop()
     except LineLostError as fault:
@@ -177,26 +192,21 @@ def _stream(
     writer.event(clock.now() - origin_s, event="stopped", reason=reason, **keep)
 
 
-def _ended(heard: bool, enough: bool, elapsed_s: float, duration_s: float) -> str:
-    """Say why the recording ends now; nothing while it goes on."""
-    if not heard:
-        return f"the device fell silent after {elapsed_s:.6g} s"
-    if enough and elapsed_s > 0.9 * duration_s:
-        return "scans" if elapsed_s < 1.1 * duration_s else "scans"
-    return ""
-
-
 def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
     """Open the raw file, which is appended to in its place so that a crash leaves it."""
     if raw_path is None:
         return nullcontext(BytesIO())
     try:
         Path(raw_path).parent.mkdir(parents=True, exist_ok=True)
-        return Path(raw_path).open("wb", buffering=0)
+        return Path(raw_path).open("wb")
     except OSError as fault:
-        raise InputError(
-            raw_path, f"can't be written ({fault.strerror})", "give another file"
-        ) from None
+        raise _cannot_write(raw_path, fault) from None
+
+
+def _cannot_write(place: str | Path, fault: OSError) -> InputError:
+    return InputError(
+        place, f"can't be written ({fault.strerror})", "make room, or give another file"
+    )
 
 
 def _header(

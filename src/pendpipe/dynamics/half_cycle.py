@@ -4,7 +4,7 @@ What a half cycle hands on is one row of numbers, the same whether it was solved
 from the table (`table.py`):
 
     [0]  ln(y/y'), the loss of amplitude          [1]  duration in radians, less pi
-    [HEAD ...]  for each sensitivity (the amplitude y at the start, then the directions)
+    [HEAD ...]  for each sensitivity (the amplitude y at the start, then the rates)
                 dy'/dy or (dy'/dp)/y, and after these y dtau/dy or dtau/dp
     then for each panel   tau - psi at its end, and the polynomials of degree 16 in time:
                 x/y, dx/dy, (dx/dp)/y at fixed time since the start of the half cycle.
@@ -16,12 +16,12 @@ import math
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.chebyshev import DEGREE
+from pendpipe.dynamics.emission import emit
 from pendpipe.dynamics.panel import (
     COS,
     EXCESS,
     LOSS,
     NODE_COUNT,
-    SIN,
     kernel,
     place,
     polynomial,
@@ -30,125 +30,154 @@ from pendpipe.dynamics.panel import (
     unresolved,
 )
 from pendpipe.dynamics.sensitivities import sensitivities
+from pendpipe.dynamics.workspace import HEAD, panel_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.workspace import Work
 
-HEAD = 2
 LOSS_TOLERANCE = 5e-10
 """Bound of `solve`'s estimate, which is a thousand times the error: 5e-13 of a half cycle's loss."""
 WAVEFORM_TOLERANCE = 1e-12
 """Of the polynomial in time, relative to the amplitude."""
+FINEST = 30
+"""The finest panel is a half cycle halved so often; it is accepted as it is."""
 
 
 @kernel
-def panel_width(columns: int, polynomials: int) -> int:
-    """Return how many numbers of a row belong to one panel."""
-    return 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
-
-
-@kernel
-def row_width(columns: int, polynomials: int, panels: int) -> int:
-    """Return the length of a half cycle's row."""
-    return HEAD + 2 * columns + panels * panel_width(columns, polynomials)
-
-
-@kernel
-def start_derivatives(
-    directions: FloatArray, radius: float, sigma: FloatArray, shift: FloatArray
-) -> None:
+def _start(work: Work, radius: float) -> None:
     """Set d ln r/dp and dtau/dp at the turning point y = m + r."""
-    for c in range(sigma.size):
-        sigma[c] = 1.0 / radius if c == 0 else -directions[c - 1, 0] / radius
-        shift[c] = 0.0
+    for c in range(work.sigma.size):
+        work.sigma[c] = 1.0 / radius if c == 0 else -work.directions[c - 1, 0] / radius
+        work.shift[c] = 0.0
 
 
 @kernel
-def end_derivatives(
-    directions: FloatArray,
-    radius: float,
-    y: float,
-    sigma: FloatArray,
-    shift: FloatArray,
-    row: FloatArray,
-) -> None:
+def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
     """Write the derivatives of the next turning point, y' = r - m, to the row's head."""
-    columns = sigma.size
+    columns = work.sigma.size
     for c in range(columns):
         if c == 0:
-            row[HEAD] = radius * sigma[0]
-            row[HEAD + columns] = y * shift[0]
+            row[HEAD] = radius * work.sigma[0]
+            row[HEAD + columns] = y * work.shift[0]
         else:
-            row[HEAD + c] = (radius * sigma[c] - directions[c - 1, 0]) / y
-            row[HEAD + columns + c] = shift[c]
+            row[HEAD + c] = (radius * work.sigma[c] - work.directions[c - 1, 0]) / y
+            row[HEAD + columns + c] = work.shift[c]
 
 
 @kernel
-def panel_polynomials(
-    node: FloatArray,
-    shape: FloatArray,
-    radius: float,
-    half_width: float,
-    y: float,
-    columns: FloatArray,
-    chebyshev: FloatArray,
-    out: FloatArray,
+def _solve_panel(
+    work: Work, radius: float, start: float, half_width: float, y: float, finest: bool,
+    polynomials: FloatArray,
+) -> bool:  # fmt: skip
+    """Solve a panel with all that is asked of it; say whether it is resolved."""
+    place(work.node, work.placed, start, half_width)
+    tolerance = math.inf if finest else LOSS_TOLERANCE
+    if not solve(work.node, work.shape, radius, half_width, tolerance):
+        return False
+    if work.sigma.size > 0:
+        sensitivities(
+            work.node, work.shape, work.directions, radius, half_width,
+            work.sigma, work.shift, work.columns,
+        )  # fmt: skip
+    if polynomials.size == 0:
+        return True
+    return _in_time(work, radius, half_width, y, polynomials) or finest
+
+
+@kernel
+def _in_time(
+    work: Work, radius: float, half_width: float, y: float, polynomials: FloatArray
 ) -> bool:
-    """Write a solved panel's polynomials in time; say whether time resolves the waveform."""
-    time_nodes(node, half_width, chebyshev)
-    waveform = columns[columns.shape[0] - 1]
-    for j in range(NODE_COUNT):
-        waveform[j] = (shape[0] + radius * (1.0 + node[LOSS, j]) * node[COS, j]) / y
-    polynomial(node, waveform, chebyshev, out[:NODE_COUNT])
+    """Write a solved panel's polynomials in time; say whether they resolve the waveform."""
+    n, node, count = NODE_COUNT, work.node, work.sigma.size
+    time_nodes(node, half_width, work.chebyshev)
+    waveform = work.columns[count]
+    for j in range(n):
+        waveform[j] = (work.shape[0] + radius * (1.0 + node[LOSS, j]) * node[COS, j]) / y
+    polynomial(node, waveform, work.chebyshev, polynomials[:n])
     resolved = unresolved(waveform) <= WAVEFORM_TOLERANCE
-    for c in range(columns.shape[0] - 1):
+    for c in range(count):
+        column = work.columns[c]
         if c > 0:
-            for j in range(NODE_COUNT):
-                columns[c, j] /= y
-        polynomial(node, columns[c], chebyshev, out[(c + 1) * NODE_COUNT : (c + 2) * NODE_COUNT])
+            for j in range(n):
+                column[j] /= y
+        polynomial(node, column, work.chebyshev, polynomials[(c + 1) * n : (c + 2) * n])
     return resolved
 
 
 @kernel
-def tabulated_half_cycle(
-    node: FloatArray,
-    shape: FloatArray,
-    directions: FloatArray,
-    y: float,
-    panels: int,
-    polynomials: int,
-    sigma: FloatArray,
-    shift: FloatArray,
-    columns: FloatArray,
-    chebyshev: FloatArray,
-    row: FloatArray,
-) -> bool:
+def even_half_cycle(work: Work, y: float, panels: int, polynomials: int, row: FloatArray) -> bool:
     """Solve a half cycle on `panels` equal panels into `row`; say whether these resolve it."""
-    m = shape[0]
+    m = work.shape[0]
     radius = y - m
-    start_derivatives(directions, radius, sigma, shift)
+    _start(work, radius)
     half_width = 0.5 * math.pi / panels
     change, excess = 0.0, 0.0
-    width = panel_width(sigma.size, polynomials)
-    at = HEAD + 2 * sigma.size
+    width = panel_width(polynomials)
+    at = HEAD + 2 * work.sigma.size
     for p in range(panels):
-        if panels > 1 or node[SIN, DEGREE // 2] != 1.0:
-            place(node, 2.0 * p * half_width, half_width)
-        here = radius * (1.0 + change)
-        if not solve(node, shape, here, half_width, LOSS_TOLERANCE):
+        if not _solve_panel(
+            work, radius * (1.0 + change), 2.0 * p * half_width, half_width, y, False,
+            row[at + 1 : at + width],
+        ):  # fmt: skip
             return False
-        if sigma.size > 0:
-            sensitivities(node, shape, directions, here, half_width, sigma, shift, columns)
-        excess += node[EXCESS, DEGREE]
+        excess += work.node[EXCESS, DEGREE]
         if polynomials > 0:
             row[at] = excess
-            if not panel_polynomials(
-                node, shape, here, half_width, y, columns, chebyshev, row[at + 1 : at + width]
-            ):
-                return False
             at += width
-        change += node[LOSS, DEGREE] * (1.0 + change)
+        change += work.node[LOSS, DEGREE] * (1.0 + change)
     row[0] = -math.log1p((radius * change - 2.0 * m) / y)
     row[1] = excess
-    end_derivatives(directions, radius * (1.0 + change), y, sigma, shift, row)
+    _end(work, radius * (1.0 + change), y, row)
     return True
+
+
+@kernel
+def direct_half_cycle(
+    work: Work, y: float, begin: float, signs: FloatArray, level: int, polynomials: int,
+    time_s: FloatArray, first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,
+) -> tuple[float, float, int, int]:  # fmt: skip
+    """Solve a half cycle on panels as fine as it needs, and write its samples.
+
+    `begin` is its start in radians since the release, `level` the number of halvings to begin
+    with. Returns the amplitude at its end (negative if the pendulum stops before it reaches
+    its equilibrium), its duration less pi, the index of the next sample, and the number of
+    halvings it began with, which is negative if the pendulum is overdamped.
+    """
+    m, row = work.shape[0], work.row
+    radius = y - m
+    _start(work, radius)
+    change, excess, k = 0.0, 0.0, 0
+    coarsest, at = -1, HEAD + 2 * work.sigma.size
+    width = polynomials * NODE_COUNT
+    while k < 1 << level:
+        half_width = 0.5 * math.pi / (1 << level)
+        start = 2.0 * k * half_width
+        work.kept[0, :], work.kept[1, :] = work.sigma, work.shift
+        if not _solve_panel(
+            work, radius * (1.0 + change), start, half_width, y, level >= FINEST,
+            row[at : at + width],
+        ):  # fmt: skip
+            if level >= FINEST:
+                return y, 0.0, first, -1
+            work.sigma[:], work.shift[:] = work.kept[0], work.kept[1]
+            level, k = level + 1, 2 * k
+            continue
+        if coarsest < 0:
+            coarsest = level
+        duration = 2.0 * half_width + work.node[EXCESS, DEGREE]
+        if polynomials > 0:
+            end = emit(
+                work, row[at : at + width], begin + start + excess, duration, y, signs,
+                time_s, first, guess, angle_rad, jacobian,
+            )  # fmt: skip
+            first, guess = end, end - first
+        excess += work.node[EXCESS, DEGREE]
+        change += work.node[LOSS, DEGREE] * (1.0 + change)
+        k += 1
+        if k % 2 == 0 and level > 0:
+            k, level = k // 2, level - 1
+    end_radius = radius * (1.0 + change)
+    _end(work, end_radius, y, row)
+    return end_radius - m, excess, first, coarsest

@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numba import njit
 
 from pendpipe.dynamics.chebyshev import ANALYSIS, ANALYSIS_T, DEGREE, INTEGRATION_T, NODES, POWERS_T
@@ -78,8 +77,11 @@ def unresolved(values: FloatArray) -> float:
 
 
 @kernel
-def place(node: FloatArray, start: float, half_width: float) -> None:
-    """Set cos(psi) and sin(psi) of the panel that starts at `start`, and forget the last guess."""
+def place(node: FloatArray, placed: FloatArray, start: float, half_width: float) -> None:
+    """Set cos(psi) and sin(psi) of a panel and forget the last guess, if it is another panel."""
+    if placed[0] == start and placed[1] == half_width:
+        return
+    placed[0], placed[1] = start, half_width
     for j in range(NODE_COUNT):
         psi = start + half_width * (1.0 + NODES[j])
         node[COS, j] = math.cos(psi)
@@ -217,8 +219,3 @@ def polynomial(
         for i in range(NODE_COUNT):
             values[i] += coefficients[k] * chebyshev[k, i]
     multiply(POWERS_T, values, out)
-
-
-def workspace() -> FloatArray:
-    """Return the node workspace."""
-    return np.zeros((ROWS, NODE_COUNT))

@@ -11,21 +11,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pendpipe.dynamics.chebyshev import powers_of_chebyshev
-from pendpipe.dynamics.half_cycle import HEAD, tabulated_half_cycle
+from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.panel import kernel
+from pendpipe.dynamics.workspace import HEAD, MOST_POINTS, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.workspace import Work
 
-MOST_POINTS = 18
 WIDEST = 5.2
 """The widest range of ln y that one table spans, and its points; see `points_for`."""
 SMOOTH_FROM = 20.0
 """Below this multiple of m, half cycles are solved one by one."""
-MOST_PANELS = 4
 _LOSS_TOLERANCE = 1e-12
 _WAVEFORM_TOLERANCE = 1e-11
 
@@ -33,7 +31,7 @@ _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
 
 # Entries of a segment's description.
 LOW, HIGH, MIDDLE, HALF_SPAN, POINTS, PANELS = range(6)
-DESCRIPTION = 6
+DONE, MORE_PANELS, LESS_SPAN = range(3)
 
 
 @kernel
@@ -69,44 +67,27 @@ def half_cycles_and_span(
 
 
 @kernel
-def build(
-    node: FloatArray,
-    shape: FloatArray,
-    directions: FloatArray,
-    log_y: float,
-    span: float,
-    panels: int,
-    width: int,
-    polynomials: int,
-    sigma: FloatArray,
-    shift: FloatArray,
-    columns: FloatArray,
-    chebyshev: FloatArray,
-    rows: FloatArray,
-    cosines: FloatArray,
-    segment: FloatArray,
-    table: FloatArray,
-) -> bool:
-    """Tabulate the half cycles with ln y from log_y - span to log_y; say whether it resolves.
+def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) -> int:
+    """Tabulate the half cycles with ln y from log_y - span to log_y.
 
-    `table` receives, for each power of z, the coefficients of all entries of the row;
-    `segment` its description.
+    Returns DONE, or what stands in the way: a half cycle needs more panels, or the span is too
+    wide for the points.
     """
-    points = points_for(span)
-    half = 0.5 * span
-    segment[LOW], segment[HIGH] = log_y - span, log_y
+    points, half = points_for(span), 0.5 * span
+    segment, cosines = work.segment, work.cosines
     segment[MIDDLE], segment[HALF_SPAN] = log_y - half, half
     segment[POINTS], segment[PANELS] = points, panels
+    width = row_width(work.sigma.size, polynomials, panels)
     for i in range(4 * points):
         cosines[i] = math.cos(0.5 * math.pi * i / points)
     for i in range(points):
         y = math.exp(log_y - half + half * cosines[2 * i + 1])
-        if not tabulated_half_cycle(
-            node, shape, directions, y, panels, polynomials, sigma, shift, columns, chebyshev,
-            rows[i, :width],
-        ):  # fmt: skip
-            return False
-    return _interpolate(points, width, rows, cosines, sigma.size, table)
+        if not even_half_cycle(work, y, panels, polynomials, work.rows[i]):
+            return MORE_PANELS
+    if not _interpolate(points, width, work.rows, cosines, work.sigma.size, work.table):
+        return LESS_SPAN
+    segment[LOW], segment[HIGH] = log_y - span, log_y
+    return DONE
 
 
 @kernel
@@ -163,11 +144,15 @@ def look_up(
             row[j] += power * table[k, j]
 
 
-def table_workspace(width: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the arrays `build` works in: solved rows, cosines, description and table."""
-    return (
-        np.zeros((MOST_POINTS + 1, width)),
-        np.zeros(4 * MOST_POINTS),
-        np.zeros(DESCRIPTION),
-        np.zeros((MOST_POINTS, width)),
-    )
+@kernel
+def look_up_turning_point(
+    segment: FloatArray, table: FloatArray, log_y: float
+) -> tuple[float, float]:
+    """Return the loss and the excess duration of the half cycle that starts at ln y = log_y."""
+    z = (log_y - segment[MIDDLE]) / segment[HALF_SPAN]
+    last = int(segment[POINTS]) - 1
+    loss, excess = table[last, 0], table[last, 1]
+    for k in range(last - 1, -1, -1):
+        loss = loss * z + table[k, 0]
+        excess = excess * z + table[k, 1]
+    return loss, excess

@@ -130,7 +130,7 @@ def _flat_tops(values: FloatArray, off: float) -> int:
     for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
         sides = [values[start - 1]] if start else []
         sides += [values[stop]] if stop < len(values) else []
-        if stop - start >= 3 and sides and top - max(sides) > off:
+        if stop - start >= 3 and sides and top - min(sides) > off:
             runs += 1
             total += stop - start
     return total if runs >= 2 else 0

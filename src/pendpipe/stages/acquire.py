@@ -31,7 +31,7 @@ def acquire_record(campaign: Campaign, name: str, out: Path) -> None:
 
 def _simulated(campaign: Campaign, record: Record) -> Recording:
     """Let the simulated instrument record the simulated pendulum over its serial line."""
-    from pendpipe.acquire import acquire_simulated
+    from pendpipe.acquire.simulated import acquire_simulated
     from pendpipe.simulation.record import SensorVolts, generator, simulated_record
 
     truth = simulated_record(campaign, record)

@@ -10,6 +10,7 @@ from pendpipe.arrays import IntArray
 class Dialect(Protocol):
     """An instrument without its line and its clock: commands in, replies and data out."""
 
+    model: ClassVar[str]
     bits: ClassVar[int]
     range_volts: ClassVar[float]
 

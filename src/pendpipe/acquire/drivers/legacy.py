@@ -184,7 +184,5 @@ def _channels(port: str, model: str, channels: Sequence[int], last: int) -> tupl
     chosen = tuple(sorted(set(channels)))
     if not chosen or chosen[0] < 1 or chosen[-1] > last:
         listed = ", ".join(map(str, channels)) or "none"
-        raise InputError(
-            port, f"the {model} has no channel {listed}", f"choose from 1 to {last}"
-        )
+        raise InputError(port, f"the {model} has no channel {listed}", f"choose from 1 to {last}")
     return chosen

@@ -1,0 +1,76 @@
+"""Record from a simulated device: the device, its line, the driver and the recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
+from pendpipe.acquire.recorder import Progress, record
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+
+def acquire_simulated(
+    device_kind: str,
+    signal: Signal | Mapping[int, Signal],
+    *,
+    rate_hz: float,
+    duration_s: float,
+    clock_scale: float = 1000.0,
+    channels: Sequence[int] = (1,),
+    raw_path: str | Path | None = None,
+    volts_per_radian: float | None = None,
+    link: str | None = None,
+    rate_error: float = 0.0,
+    progress: Progress | None = None,
+) -> Recording:
+    """Start a simulated device on a line of its own and record from it.
+
+    Parameters
+    ----------
+    device_kind
+        ``"di154"`` (12 bits, at most 480 Hz) or ``"di2108"`` (16 bits).
+    signal
+        Times in s since the start to volts at the terminals, noise included; or a mapping
+        from channel to that. See `SimulatedDevice`.
+    rate_hz, duration_s, channels, raw_path, volts_per_radian, progress
+        See `recorder.record`.
+    clock_scale
+        How many seconds of device and recorder pass in one of the wall's.
+    link
+        ``"pty"``, ``"socket"``, or ``None`` for what the system has.
+    rate_error
+        The device's clock is fast by this fraction.
+
+    Returns
+    -------
+    Recording
+        In volts.
+
+    Raises
+    ------
+    InputError
+        As `recorder.record`; and whatever `signal` raises.
+    """
+    with SimulatedDevice(
+        device_kind, signal, clock_scale=clock_scale, link=link, rate_error=rate_error
+    ) as device:
+        try:
+            return record(
+                device.port,
+                device_kind,
+                channels=channels,
+                rate_hz=rate_hz,
+                duration_s=duration_s,
+                clock=device.clock,
+                raw_path=raw_path,
+                volts_per_radian=volts_per_radian,
+                source=f"simulated {device.dialect.model}",
+                progress=progress,
+            )
+        except InputError:
+            # A device whose signal has failed is silent; the failure is the better answer.
+            if device.failure is not None:
+                raise device.failure from None
+            raise

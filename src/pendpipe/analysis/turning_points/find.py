@@ -1,0 +1,203 @@
+"""Turning points of a free decay, each from all the readings of its half cycle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.turning_points import kernels
+from pendpipe.analysis.turning_points.follow import first_places, follow_tail, resmoothed
+from pendpipe.analysis.turning_points.harmonics import odd_harmonics
+from pendpipe.analysis.turning_points.level import Level, estimate_level
+from pendpipe.analysis.turning_points.measure import Measured, Places, measure
+from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
+from pendpipe.analysis.turning_points.samples import Samples, prepare
+from pendpipe.analysis.turning_points.shape import LossRates, half_cycle_shape, loss_rates
+from pendpipe.analysis.turning_points.table import TurningPoints
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.errors import NotAnalysableError
+from pendpipe.recording import Recording
+
+_LEAST_SHARE: Final = 0.3
+"""Of the information that a whole half cycle holds; less is not kept."""
+
+
+def find_turning_points(recording: Recording, place: str | Path = "recording") -> TurningPoints:
+    """Measure the turning points of a free decay.
+
+    Extremes give the half cycles' rough places; their times, smoothed over neighbours,
+    the phase; then every half cycle is fitted by least squares with the shape that its
+    losses give it (`shape.py`), at a level common to all (or slowly wandering). The
+    errors of different half cycles are independent but for the level.
+
+    Parameters
+    ----------
+    recording
+        Angles (rad), displacements (m), or volts with a known sensor constant, of a free
+        decay: what stands before the release is cut already. Times may be uneven.
+    place
+        Named in messages.
+
+    Returns
+    -------
+    TurningPoints
+        Time, signed angle and level of each, with standard deviations.
+
+    Raises
+    ------
+    NotAnalysableError
+        Dead or saturated channel, amplitude below the noise, under three half cycles.
+    InputError
+        An angle beyond pi about its centre (a wrong unit).
+    """
+    samples = prepare(recording, place)
+    rough, stride = rough_half_cycles(samples)
+    if len(rough.number) < 3:
+        raise NotAnalysableError(place, *_too_few(samples, len(rough.number)))
+    places, first = _locate(samples.strided(stride), rough)
+    amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
+    places, measured, shape = _shaped(samples, places, amplitude, rates, level)
+    samples = replace(samples, noise_rms=_noise(samples, measured))
+    return _finish(samples, places, measured, shape, level, recording, place)
+
+
+def _too_few(samples: Samples, found: int) -> tuple[str, str]:
+    """What to say of a record without three half cycles."""
+    swing = float(samples.values.max() - samples.values.min())
+    if swing < 12.0 * samples.noise_rms:
+        problem = f"no motion stands out of the noise ({samples.noise_rms:.3g} rms)"
+        return problem, "raise the amplitude, or pick another channel"
+    return f"fewer than three half cycles ({found} turning points)", "record longer"
+
+
+def _plain(number: int) -> FloatArray:
+    """The shape of a half cycle without losses: a cosine."""
+    return np.zeros((number, 4 + kernels.HARMONICS))
+
+
+def _locate(samples: Samples, rough: Rough) -> tuple[Places, Measured]:
+    """Lock on to the half cycles with a bare cosine, and follow them into the tail."""
+    places = first_places(rough)
+    for _ in range(2):
+        measured = measure(samples, places, rough.level, _plain(len(places.number)))
+        places = resmoothed(places, measured, samples.noise_rms)
+    places, measured = follow_tail(samples, places, measured, rough.level)
+    return places, measured
+
+
+def _losses(
+    places: Places, measured: Measured, noise: float, start: float
+) -> tuple[FloatArray, LossRates, float]:
+    """Amplitudes at the mean level, the rates they fall at, and that level."""
+    known = np.isfinite(measured.amplitude) & (measured.count > 4) & ~measured.lopsided
+    shift = float(np.sum(measured.score[known]) / np.sum(measured.information[known]))
+    amplitude = measured.amplitude - places.side * measured.coupling * shift
+    sd = noise * np.sqrt(measured.variance)
+    use = known & (amplitude > 2.0 * sd)
+    if use.sum() >= 3:
+        rates = loss_rates(places.centre_s[use], amplitude[use], sd[use])
+    else:
+        rates = LossRates(0.0, 0.0, 0.0)
+    return np.nan_to_num(amplitude), rates, start + shift
+
+
+def _shaped(
+    samples: Samples, places: Places, amplitude: FloatArray, rates: LossRates, level: float
+) -> tuple[Places, Measured, FloatArray]:
+    """Measure again with the shape that the losses, and odd harmonics, give the half cycles."""
+    shape = half_cycle_shape(amplitude, places.angular_frequency, rates)
+    measured = measure(samples, places, level, shape, amplitude=amplitude)
+    places = resmoothed(places, measured, samples.noise_rms)
+    shape, measured = odd_harmonics(samples, places, level, shape, measured)
+    return places, measured, shape
+
+
+def _noise(samples: Samples, measured: Measured) -> float:
+    """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
+    known = np.isfinite(measured.amplitude) & (measured.count > 6)
+    size = 2 + measured.harmonics.shape[1]
+    shift = measured.score / np.maximum(measured.information, 1e-300)
+    # The level is common; what a half cycle wants of its own is not noise of the readings.
+    square = measured.residual_square - measured.score * shift
+    freedom = float(np.sum(measured.count[known] - size - 1))
+    if freedom < 8:
+        return samples.noise_rms
+    pooled = float(np.sqrt(max(float(np.sum(square[known])), 0.0) / freedom))
+    return max(pooled, quantisation_rms(samples.step))
+
+
+def _finish(
+    samples: Samples,
+    places: Places,
+    measured: Measured,
+    shape: FloatArray,
+    start: float,
+    recording: Recording,
+    place: str | Path,
+) -> TurningPoints:
+    """Put level, amplitude and time together, and leave out what is too little known."""
+    noise = samples.noise_rms
+    keep = _kept(samples, places, measured)
+    if keep.sum() < 3:
+        raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
+    level = estimate_level(measured.information[keep], measured.score[keep], noise, start)
+    column = {name: getattr(measured, name)[keep] for name in ("amplitude", "sine", "coupling")}
+    side, rate = places.side[keep], places.angular_frequency[keep]
+    amplitude = column["amplitude"] - side * column["coupling"] * (level.value - start)
+    sd = noise * np.sqrt(measured.variance[keep])
+    sine_sd = noise * np.sqrt(measured.sine_variance[keep])
+    phase = measured.phase(noise)[keep]
+    height = 1.0 + shape[keep, 4:].sum(axis=1)
+    height_free = measured.harmonics[keep].sum(axis=1)
+    turned = amplitude * height + height_free + _late(amplitude, column["sine"], sd, sine_sd)
+    clear = np.maximum(np.abs(amplitude), sd)
+    return TurningPoints(
+        half_cycle=places.number[keep] - places.number[keep][0],
+        time_s=places.centre_s[keep] + phase / rate,
+        time_sd_s=np.minimum(sine_sd / clear, 1.0) / rate,
+        angle_rad=side * turned,
+        angle_sd_rad=sd * height,
+        level_rad=level.value,
+        level_sd_rad=float(np.mean(level.sd)),
+        level_coupling=float(np.mean(column["coupling"] * height)),
+        noise_rms_rad=noise,
+        step_rad=samples.step or 0.0,
+        samples=len(samples),
+        unit="m" if recording.quantity == "displacement_m" else "rad",
+        wanders=level.wanders,
+        notes=_notes(samples, places, keep, level),
+    )
+
+
+def _late(amplitude: FloatArray, sine: FloatArray, sd: FloatArray, sine_sd: FloatArray) -> FloatArray:
+    """What a small error of phase has taken off the amplitude; unbiased by the noise."""
+    strong = amplitude > 5.0 * sd
+    lost = (sine**2 - sine_sd**2) / (2.0 * np.where(strong, amplitude, 1.0))
+    return np.where(strong, lost, 0.0)
+
+
+def _kept(samples: Samples, places: Places, measured: Measured) -> BoolArray:
+    """Half cycles that hold enough readings, and whose turning lies among the readings."""
+    information = 1.0 / measured.variance
+    usual = float(np.nanmedian(information))
+    turning = places.centre_s
+    slack = 0.02 * places.half_period_s
+    inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
+    return inside & (np.nan_to_num(information) > _LEAST_SHARE * usual)
+
+
+def _notes(samples: Samples, places: Places, keep: BoolArray, level: Level) -> tuple[str, ...]:
+    notes = []
+    inner = keep[int(np.argmax(keep)) : len(keep) - int(np.argmax(keep[::-1]))]
+    lost = int(np.count_nonzero(~inner))
+    if lost:
+        notes.append(f"{lost} half cycle(s) are left out for lack of readings")
+    if level.wanders:
+        notes.append("the level wanders; it is followed by local lines")
+    if samples.counts:
+        notes.append("one row a count: the times of the counts are the data")
+    return tuple(notes)

@@ -1,0 +1,131 @@
+"""Measure amplitude, phase and level of half cycles whose places are known."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points import kernels
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+
+_LOPSIDED: Final = 0.3
+_PHASE_PRIOR: Final = 0.05
+_NONE: Final = np.zeros(0)
+
+
+class Places(NamedTuple):
+    """Where the half cycles are: consecutive numbers, times of turning, half periods."""
+
+    number: IntArray
+    centre_s: FloatArray
+    half_period_s: FloatArray
+    side: FloatArray
+    """+1 above the level, -1 below."""
+
+    @property
+    def angular_frequency(self) -> FloatArray:
+        """Phase per second."""
+        return np.pi / self.half_period_s
+
+
+class Measured(NamedTuple):
+    """What the readings of each half cycle say, shape (k,) each; NaN where there are none."""
+
+    amplitude: FloatArray
+    """Factor of the shape, positive on the half cycle's own side."""
+    sine: FloatArray
+    """Factor of the sine: amplitude times the phase by which the turning is late."""
+    variance: FloatArray
+    """Of the amplitude, for unit noise."""
+    sine_variance: FloatArray
+    coupling: FloatArray
+    """Fall of the signed amplitude for a rise of the level."""
+    harmonics: FloatArray
+    """Free odd harmonics, shape (k, free)."""
+    information: FloatArray
+    score: FloatArray
+    residual_square: FloatArray
+    count: FloatArray
+    lopsided: BoolArray
+    """Whether readings of one side are missing, so that amplitude and phase mix."""
+
+    def phase(self, noise: float) -> FloatArray:
+        """Phase by which each turning point is late, in rad; at most 1."""
+        floor = 3.0 * noise * np.sqrt(self.variance)
+        return np.clip(self.sine / np.maximum(smoothed(self.amplitude), floor), -1.0, 1.0)
+
+
+def smoothed(amplitude: FloatArray, window: int = 3) -> FloatArray:
+    """Geometric-like local mean that leaves a strong decay alone: over y where noise is small."""
+    filled = np.where(np.isfinite(amplitude), amplitude, 0.0)
+    ones = np.isfinite(amplitude).astype(np.float64)
+    kernel = np.ones(2 * window + 1)
+    if len(filled) < len(kernel):
+        return filled
+    mean = np.convolve(filled, kernel, "same") / np.maximum(np.convolve(ones, kernel, "same"), 1.0)
+    return np.maximum(filled, mean)
+
+
+def edges(samples: Samples, places: Places) -> IntArray:
+    """First sample and the one after the last of each half cycle, shape (k, 2)."""
+    start = places.centre_s - 0.5 * places.half_period_s
+    stop = places.centre_s + 0.5 * places.half_period_s
+    between = 0.5 * (stop[:-1] + start[1:])
+    bounds = np.concatenate([start[:1], between, stop[-1:]])
+    where = np.searchsorted(samples.time_s, bounds)
+    return np.stack([where[:-1], where[1:]], axis=1)
+
+
+def measure(
+    samples: Samples,
+    places: Places,
+    level: float,
+    shape: FloatArray,
+    *,
+    free: int = 0,
+    amplitude: FloatArray | None = None,
+) -> Measured:
+    """Fit every half cycle by linear least squares at a given level.
+
+    Parameters
+    ----------
+    samples, places
+        The readings, and where the half cycles are.
+    level
+        Taken off the readings; the result says how the rest depends on it.
+    shape
+        From `shape.half_cycle_shape`.
+    free
+        Number of odd harmonics fitted besides.
+    amplitude
+        Known before; it holds the phase of a half cycle of which only a side is there.
+    """
+    number = len(places.number)
+    gram, right, square = kernels.half_cycle_sums(
+        samples.time_s, samples.values, _NONE, edges(samples, places),
+        places.centre_s, places.angular_frequency, np.full(number, level), shape, free,
+    )  # fmt: skip
+    prior = np.zeros(number)
+    lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
+    if amplitude is not None:
+        size = np.maximum(smoothed(amplitude), 1e-12)
+        held = (samples.noise_rms / (size * _PHASE_PRIOR)) ** 2
+        prior = np.where(lopsided, held, 0.0)
+    solution, inverse = kernels.solve_half_cycles(gram, right, prior)
+    flat = gram[:, 1:, 0]
+    best = solution[:, :, 0]
+    return Measured(
+        amplitude=best[:, 0] * places.side,
+        sine=best[:, 1] * places.side,
+        variance=inverse[:, 0, 0],
+        sine_variance=inverse[:, 1, 1],
+        coupling=solution[:, 0, 1],
+        harmonics=best[:, 2:] * places.side[:, None],
+        information=gram[:, 0, 0] - np.sum(flat * solution[:, :, 1], axis=1),
+        score=right[:, 0] - np.sum(flat * best, axis=1),
+        residual_square=square - np.sum(best * right[:, 1:], axis=1),
+        count=gram[:, 0, 0],
+        lopsided=lopsided,
+    )

@@ -1,0 +1,145 @@
+"""The readings that turning points are taken from, and what makes them unfit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.noise import find_step, noise_rms
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError, NotAnalysableError
+from pendpipe.recording import Recording
+
+_CHUNK: Final = 1 << 20
+_FEWEST: Final = 16
+_SATURATED: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Readings against time, with their noise.
+
+    Parameters
+    ----------
+    time_s, values
+        Shape (n,), finite, times strictly rising.
+    step
+        The step of the readings; None where there is none, or where the times of the
+        steps are the data (`counts`).
+    noise_rms
+        First estimate of one reading's standard deviation.
+    counts
+        Whether each row marks the passage of one count of an encoder: the angle is then
+        exact, and the error is in the time.
+    """
+
+    time_s: FloatArray
+    values: FloatArray
+    step: float | None
+    noise_rms: float
+    counts: bool = False
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def strided(self, stride: int) -> Samples:
+        """Every `stride`-th reading: enough for a first look at a long record."""
+        if stride <= 1:
+            return self
+        return replace(self, time_s=self.time_s[::stride], values=self.values[::stride])
+
+
+def prepare(recording: Recording, place: str | Path) -> Samples:
+    """Take the readings of a recording, or say why they can't be used.
+
+    Nothing is copied where every row is good, so that a record may fill the memory.
+
+    Raises
+    ------
+    NotAnalysableError
+        Dead or saturated channel, too few readings.
+    InputError
+        Readings that are still volts; an angle beyond pi about its centre.
+    """
+    if recording.quantity == "volts":
+        recording = recording.as_motion()
+    time, values = recording.time_s, recording.values
+    if recording.quality is not None or not _all_finite(values):
+        time, values = time[recording.usable], values[recording.usable]
+    if len(values) < _FEWEST:
+        raise NotAnalysableError(
+            place, f"{len(values)} readings are too few", "record at least three half cycles"
+        )
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        raise NotAnalysableError(
+            place, f"the channel is dead: it reads {low:.6g} throughout", "check the sensor"
+        )
+    _refuse_saturated(values, low, high, place)
+    if recording.quantity == "angle_rad" and high - low > 2.0 * math.pi:
+        raise InputError(
+            place,
+            f"the angle reaches {0.5 * (high - low):.3g} rad about its centre, beyond pi",
+            "give --unit (deg, V, m), or --volts-per-radian",
+        )
+    step = recording.resolution or find_step(values)
+    if step is not None and _one_row_a_count(time, values, step):
+        return _edges(time, values, step)
+    return Samples(time, values, step, noise_rms(values, step))
+
+
+def _all_finite(values: FloatArray) -> bool:
+    """Whether all are finite, looked through in pieces."""
+    return all(
+        bool(np.isfinite(values[i : i + _CHUNK]).all()) for i in range(0, len(values), _CHUNK)
+    )
+
+
+def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | Path) -> None:
+    """Refuse a channel that spends its turning points at the end of its range.
+
+    A sine spends (2/pi) sqrt(2 step/y) of its time within a step of its extremes, both
+    together, and a decaying one less: long stays at the very largest and smallest value
+    are the converter's.
+    """
+    piece = values[: 1 << 18]
+    levels = np.unique(piece)
+    if len(levels) < 16:
+        return
+    for extreme, next_level in ((low, levels[1]), (high, levels[-2])):
+        at = piece == extreme
+        share = float(np.mean(at))
+        expected = math.sqrt(max(abs(next_level - extreme), 1e-12) / (high - low))
+        runs = np.count_nonzero(np.diff(at.astype(np.int8)) == 1) + int(at[0])
+        if share > max(_SATURATED, 2.0 * expected) and np.count_nonzero(at) > 8 * runs:
+            raise NotAnalysableError(
+                place,
+                f"the channel is saturated: {100.0 * share:.0f} % of the readings are"
+                f" {extreme:.6g}",
+                "lower the gain or the starting amplitude, or cut with --start",
+            )
+
+
+def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
+    """Whether rows come when the count changes, rather than by the clock."""
+    piece, when = values[: 1 << 16], time[: 1 << 16]
+    change = np.abs(np.diff(piece))
+    intervals = np.diff(when)
+    single = float(np.mean(np.abs(change - step) < 0.1 * step))
+    uneven = float(np.percentile(intervals, 90)) > 1.5 * float(np.percentile(intervals, 10))
+    return len(piece) > 50 and single > 0.98 and uneven
+
+
+def _edges(time: FloatArray, values: FloatArray, step: float) -> Samples:
+    """Turn counts into the angles at which they changed, half a step back.
+
+    The same edge is then passed upwards and downwards at the same angle, so that the
+    encoder's width of a step is no friction.
+    """
+    angles = values[1:] - 0.5 * np.copysign(step, np.diff(values))
+    # The lines of a scale are placed to a small part of its step.
+    return Samples(time[1:], angles, None, 0.05 * step, counts=True)

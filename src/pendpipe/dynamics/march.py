@@ -1,0 +1,210 @@
+"""Half cycle after half cycle, from the release to the last sample or to the stop."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from pendpipe.dynamics.emission import emit, rest
+from pendpipe.dynamics.half_cycle import direct_half_cycle
+from pendpipe.dynamics.panel import kernel
+from pendpipe.dynamics.table import (
+    DONE,
+    HIGH,
+    LOW,
+    MORE_PANELS,
+    PANELS,
+    SMOOTH_FROM,
+    WIDEST,
+    build,
+    half_cycles_and_span,
+    look_up,
+    look_up_turning_point,
+    points_for,
+)
+from pendpipe.dynamics.workspace import HEAD, MOST_PANELS, carve, panel_width, row_width
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.workspace import Work
+
+RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
+
+
+@kernel
+def sticks(shape: FloatArray, y: float) -> bool:
+    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y."""
+    m, h, q = shape[0], shape[1], shape[2]
+    # The friction less the restoring torque is q (y - m)(y - larger root).
+    return y <= m or q * (y + m) >= 1.0 - h
+
+
+@kernel
+def _advance(work: Work, y: float) -> None:
+    """Carry dy/dp and dtau/dp over the half cycle in `work.row`, which started at y."""
+    row, columns = work.row, work.amplitude.size
+    for c in range(columns):
+        before = work.amplitude[c]
+        work.amplitude[c] = row[HEAD] * before
+        work.clock[c] += row[HEAD + columns] / y * before
+        if c > 0:
+            work.amplitude[c] += y * row[HEAD + c]
+            work.clock[c] += row[HEAD + columns + c]
+
+
+@kernel
+def _lay_out(
+    work: Work, log_y: float, half_cycles: float, polynomials: int, wanted: FloatArray
+) -> bool:
+    """Tabulate from ln y downwards if it pays; else note how far to go without a table.
+
+    `wanted` holds the number of panels last used, and the ln y down to which no table is tried.
+    """
+    room = WIDEST
+    if work.shape[0] > 0.0:
+        room = min(room, log_y - math.log(SMOOTH_FROM * work.shape[0]))
+    count, span = half_cycles_and_span(work.shape, log_y, half_cycles, room)
+    panels = int(wanted[0])
+    while count > 1.5 * points_for(span):
+        outcome = build(work, log_y, span, panels, polynomials)
+        if outcome == DONE:
+            wanted[0] = panels
+            return True
+        if outcome == MORE_PANELS and panels < MOST_PANELS:
+            panels *= 2
+        else:
+            span *= 0.5
+            count *= 0.5
+    wanted[1] = log_y - span
+    return False
+
+
+@kernel
+def _record(
+    work: Work, k: int, tau: float, y: float, signs: FloatArray, turning: FloatArray
+) -> None:
+    """Write the time and the angle of turning point k, and their derivatives if there is room."""
+    omega, release_s, offset = work.motion[0], work.motion[1], work.motion[2]
+    turning[0, k] = release_s + tau / omega
+    turning[1, k] = signs[0] * y + offset
+    directions, columns = work.rates.size, work.amplitude.size
+    if columns == 0:
+        return
+    times, angles = turning[2 : 2 + directions + 4, k], turning[6 + directions :, k]
+    times[directions], angles[directions] = -tau / (omega * omega), 0.0
+    for c in range(directions):
+        times[c] = work.clock[c + 1] / omega
+        angles[c] = signs[0] * work.amplitude[c + 1]
+        times[directions] -= work.rates[c] / omega * times[c]
+        angles[directions] -= work.rates[c] / omega * angles[c]
+    times[directions + 1] = signs[1] * work.clock[0] / omega
+    angles[directions + 1] = signs[0] * signs[1] * work.amplitude[0]
+    times[directions + 2], angles[directions + 2] = 1.0, 0.0
+    times[directions + 3], angles[directions + 3] = 0.0, 1.0
+
+
+@kernel
+def _emit_row(
+    work: Work, y: float, tau: float, signs: FloatArray, polynomials: int, time_s: FloatArray,
+    first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,
+) -> tuple[int, int]:  # fmt: skip
+    """Write the samples of a half cycle read from the table."""
+    row, panels = work.row, int(work.segment[PANELS])
+    width, at, start = panel_width(polynomials), HEAD + 2 * work.sigma.size, 0.0
+    for p in range(panels):
+        end = math.pi * (p + 1) / panels + row[at]
+        stop = emit(
+            work, row[at + 1 : at + width], tau + start, end - start, y, signs,
+            time_s, first, guess, angle_rad, jacobian,
+        )  # fmt: skip
+        first, guess, at, start = stop, stop - first, at + width, end
+    return first, guess
+
+
+@kernel
+def march(
+    shape: FloatArray, directions: FloatArray, rates: FloatArray, motion: FloatArray,
+    signs: FloatArray, y: float, tabulate: bool, most: int, until_s: float,
+    time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
+    buffer: FloatArray,
+) -> tuple[int, int]:  # fmt: skip
+    """Follow the pendulum from its release.
+
+    Parameters
+    ----------
+    shape, directions, rates, motion
+        See `workspace.Work`.
+    signs
+        The side of the turning point in hand, and of the release: twice the same at first.
+    y
+        The amplitude of the release.
+    tabulate
+        Whether to tabulate the half-cycle map where that pays.
+    most, until_s
+        Where to end: at this number of turning points, or with the first not before this time
+        (with samples, the time of the last).
+    time_s, angle_rad, jacobian
+        Ascending times, and what receives the samples and their derivatives; may be empty.
+        The last column of the Jacobian, by the offset, is left to the caller.
+    turning
+        Receives the turning points, a column each; may be empty.
+
+    Returns
+    -------
+    The number of turning points, and RUNNING, STOPPED or OVERDAMPED.
+    """
+    columns = rates.size + 1 if directions.shape[1] > 0 else 0
+    polynomials = columns + 1 if time_s.size > 0 else 0
+    work = carve(buffer, shape, directions, rates, motion, columns, polynomials)
+    work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
+    for c in range(columns):
+        work.amplitude[c], work.clock[c] = (1.0 if c == 0 else 0.0), 0.0
+    wanted = work.wanted
+    wanted[0], wanted[1] = 1.0, math.inf
+    log_y, excess, k, level, first, guess = math.log(y), 0.0, 0, 0, 0, 0
+    narrow = columns == 0 and polynomials == 0
+    while True:
+        tau = math.pi * k + excess
+        if k < turning.shape[1]:
+            _record(work, k, tau, y, signs, turning)
+        k += 1
+        if sticks(shape, y):
+            rest(work, y, signs, first, angle_rad, jacobian)
+            return k, STOPPED
+        now_s = motion[1] + tau / motion[0]
+        done = first >= time_s.size if time_s.size > 0 else now_s >= until_s
+        if k >= most or done:
+            return k, RUNNING
+        listed = work.segment[LOW] <= log_y <= work.segment[HIGH]
+        if tabulate and not listed and log_y < wanted[1] and y > SMOOTH_FROM * shape[0]:
+            ahead = min(float(most - k), (until_s - now_s) * motion[0] / math.pi) + 2.0
+            listed = _lay_out(work, log_y, ahead, polynomials, wanted)
+        if listed and narrow:
+            loss, more = look_up_turning_point(work.segment, work.table, log_y)
+            log_y -= loss
+            y = math.exp(log_y)
+            excess += more
+        elif listed:
+            width = row_width(columns, polynomials, int(work.segment[PANELS]))
+            look_up(work.segment, work.table, log_y, width, work.row)
+            if polynomials > 0:
+                first, guess = _emit_row(
+                    work, y, tau, signs, polynomials, time_s, first, guess, angle_rad, jacobian
+                )
+            _advance(work, y)
+            log_y -= work.row[0]
+            y = math.exp(log_y)
+            excess += work.row[1]
+        else:
+            if k % 8 == 0 and level > 0:
+                level -= 1  # the damping may have eased
+            after, more, first, level = direct_half_cycle(
+                work, y, tau, signs, level, polynomials, time_s, first, guess, angle_rad, jacobian
+            )
+            if level < 0:
+                return k, OVERDAMPED
+            _advance(work, y)
+            y = after
+            log_y = math.log(y) if y > 0.0 else -math.inf
+            excess += more
+        signs[0] = -signs[0]

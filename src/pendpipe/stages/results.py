@@ -1,0 +1,60 @@
+"""What the stages have left of each record, read back for the campaign's own stages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.records import Record
+from pendpipe.estimate import Estimate
+from pendpipe.files import read_json
+
+
+@dataclass(frozen=True)
+class RecordResult:
+    """One record's fit and calibration, or why it has none."""
+
+    record: Record
+    fit: dict[str, Any]
+    calibration: dict[str, Any]
+    refused: str | None = None
+
+    def parameter(self, name: str) -> Estimate:
+        """One of the fit's parameters (``a``, ``b``, ``c``, ``frequency``, ...)."""
+        return estimate(self.fit["parameters"][name])
+
+    @property
+    def quality_factor_limit(self) -> Estimate | None:
+        """Q with a = c = 0, where b is not zero."""
+        content = self.fit["quality_factor_limit"]
+        return None if content is None or content["value"] is None else estimate(content)
+
+
+def estimate(content: dict[str, Any]) -> Estimate:
+    """Read an estimate back; what has no finite value is NaN."""
+    value, sd = (
+        float("nan") if content.get(key) is None else float(content[key]) for key in ("value", "sd")
+    )
+    interval = content.get("interval95")
+    both = interval and None not in interval
+    return Estimate(
+        value,
+        sd,
+        content.get("unit", ""),
+        (float(interval[0]), float(interval[1])) if interval and both else None,
+        bool(content.get("at_bound", False)),
+    )
+
+
+def read_results(campaign: Campaign) -> list[RecordResult]:
+    """Read every record's fit, in the order of the table."""
+    folder = Path(campaign.configuration.results)
+    return [_read(folder / record.record, record) for record in campaign.records]
+
+
+def _read(folder: Path, record: Record) -> RecordResult:
+    fit = read_json(folder / "fit.json")
+    calibration = read_json(folder / "calibration.json")
+    return RecordResult(record, fit, calibration, fit.get("refused"))

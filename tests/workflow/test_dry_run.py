@@ -1,0 +1,71 @@
+"""`snakemake -n` on a clean checkout: no port, no recordings, the campaign's jobs counted."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def dry_run(
+    results: Path, *arguments: str, override: str = "seed=1"
+) -> subprocess.CompletedProcess[str]:
+    """Ask Snakemake what it would do, with an empty folder of results."""
+    command = [sys.executable, "-m", "snakemake", "-n", "--nolock", *arguments]
+    return subprocess.run(
+        [*command, "--config", f"results={results.as_posix()}", override],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def jobs(output: str) -> dict[str, int]:
+    """The table of jobs that Snakemake prints."""
+    return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", output, flags=re.MULTILINE)}
+
+
+def test_the_default_campaign_has_a_job_a_record_in_each_stage_up_to_the_fit(
+    tmp_path: Path,
+) -> None:
+    done = dry_run(tmp_path / "results")
+    assert done.returncode == 0, done.stdout + done.stderr
+    counted = jobs(done.stdout + done.stderr)
+    for stage in ("acquire", "calibrate", "turning_points", "fit"):
+        assert counted[stage] == 27
+    for stage in ("separate", "compare", "figures", "report"):
+        assert counted[stage] == 1
+    assert counted["total"] == 114
+
+
+def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
+    """On a clean checkout there is no ../shared; the records are then refused, one by one."""
+    done = dry_run(tmp_path / "results", "--configfile", "config/recordings.yaml")
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = (ROOT / "config/recordings.tsv").read_text(encoding="utf-8").splitlines()
+    records = [row for row in rows[1:] if not row.startswith(("#", "record\t"))]
+    assert jobs(done.stdout + done.stderr)["acquire"] == len(records)
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("sed=2", "did you mean 'seed'?"),
+        ("simulated={drag_facto: 1}", "did you mean 'drag_factor'?"),
+        ("records=none.tsv", "there is no such table"),
+    ],
+)
+def test_a_faulty_configuration_stops_before_any_job(
+    tmp_path: Path, override: str, said: str
+) -> None:
+    done = dry_run(tmp_path / "results", override=override)
+    assert done.returncode != 0
+    lines = (done.stdout + done.stderr).splitlines()
+    assert any(said in line for line in lines), lines
+    assert not any("Traceback" in line for line in lines)
