@@ -7,13 +7,14 @@ rule caliper:
     conda:
         "../envs/pendpipe.yaml"
     params:
+        arm=jobs.caliper_arm(CAMPAIGN),
         depends=jobs.caliper(CAMPAIGN),
-        code=code_version("pendpipe.stages.caliper"),
+        code=code_version("pendpipe.stages.caliper") + code_version("pendpipe.commands.calibrate"),
     message:
         "the sensor against a caliper"
     shell:
-        "pendpipe calibrate --campaign {CONFIGURATION} --table {output.table}"
-        " --out {output.sensor} 2> {log}"
+        "pendpipe acquire --campaign {CONFIGURATION} --caliper --out {output.table} 2> {log}"
+        " && pendpipe calibrate {output.table} {params.arm} --out {output.sensor} 2>> {log}"
 
 
 rule calibrate:

@@ -59,6 +59,7 @@ def decode_recording(
         raw.arrival_s,
         _scans_arrived(raw.arrived_bytes, losses, decoder.bytes_per_scan),
         float(raw.header["rate_hz"]),
+        float(raw.header.get("clock_scale", 1.0)),
     )
     step = driver.range_volts / 2 ** (driver.bits - 1)
     grid = _place(len(counts), [loss for loss in losses if 0 < loss.after_scan < len(counts)])

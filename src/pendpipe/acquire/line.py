@@ -18,7 +18,7 @@ import serial
 from pendpipe.errors import InputError
 
 _PERMISSION: Final = {
-    "linux": "join the group that owns it (often: sudo usermod -aG dialout $USER), then log in again",
+    "linux": "join its group (often: sudo usermod -aG dialout $USER) and log in again",
     "darwin": "use the /dev/cu.* name and close the programs that hold it",
     "win32": "close the program that holds it (WinDaq, a terminal)",
 }

@@ -24,6 +24,8 @@ from pendpipe.recording import Recording
 _POLLS: Final = 256
 """Time stamps of a recording, at least, so that its rate can be measured."""
 _SHORTEST_POLL_S, _LONGEST_POLL_S = 0.001, 0.02
+_BACKLOG: Final = 2048
+"""So many bytes at once say that more wait: a pseudo-terminal hands out 4 kB at a time."""
 _SILENCE_S: Final = 3.0
 """Seconds of the host without a byte (beyond the time of a few scans) that end a session."""
 _PATIENCE_S: Final = 5.0
@@ -177,7 +179,7 @@ def _stream(
                 reason = "scans"
             elif elapsed_s >= (wish.duration_s if fast else latest_s):
                 reason = "time"
-            else:
+            elif len(data) < _BACKLOG:
                 time.sleep(poll_s)
         instrument.stop()
     except LineLostError as fault:

@@ -14,11 +14,13 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 
-_BLOCKS: Final = 12
-_FEWEST_PER_BLOCK: Final = 3
+_STRETCHES: Final = 12
+_FEWEST_IN_STRETCH: Final = 3
+_STAMP_S: Final = 1e-4
+"""Standard deviation, in seconds of the host, below which no time stamp is believed."""
 _TRUST: Final = 6.0
 """How many standard deviations the measured rate must differ from the nominal one before
-it is believed. With ten degrees of freedom chance alone does that once in 8000 records."""
+it is believed: by chance alone (ten degrees of freedom) once in 8000 records."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,9 @@ class TimeBase:
         return self.measured_hz if self.chosen == "measured" else self.nominal_hz
 
 
-def measure_rate(arrival_s: FloatArray, scans: FloatArray, nominal_hz: float) -> TimeBase:
+def measure_rate(
+    arrival_s: FloatArray, scans: FloatArray, nominal_hz: float, clock_scale: float = 1.0
+) -> TimeBase:
     """Measure the scan rate from times of arrival.
 
     Parameters
@@ -66,6 +70,8 @@ def measure_rate(arrival_s: FloatArray, scans: FloatArray, nominal_hz: float) ->
         How many scans had arrived by then, shape (n,).
     nominal_hz
         The device's own word, kept beside.
+    clock_scale
+        Seconds of the recorder's clock in one of the host's.
 
     Returns
     -------
@@ -77,19 +83,20 @@ def measure_rate(arrival_s: FloatArray, scans: FloatArray, nominal_hz: float) ->
     The arrivals are cut into twelve stretches with equally many; in each the least late one
     counts (late relative to the straight line through the ends). A least-squares line through
     the twelve gives the interval, its scatter the standard deviation: a constant delay
-    changes nothing, and a stretch in which the host slept throughout shows up as scatter. No
-    standard deviation is taken smaller than what one scan more or less at the end makes.
+    changes nothing, and a stretch in which the host slept throughout shows up as scatter.
+    Delays that drift do not scatter, so a time stamp is never believed to better than 0.1 ms of
+    the host (0.1 s of a clock a thousand times as fast), nor a count to better than one scan.
     """
     fresh = np.flatnonzero(np.diff(scans, prepend=-1.0) > 0)
     arrival_s, scans = arrival_s[fresh], scans[fresh]
     nothing = TimeBase(nominal_hz)
-    if len(scans) < _BLOCKS * _FEWEST_PER_BLOCK or arrival_s[-1] <= arrival_s[0]:
+    if len(scans) < _STRETCHES * _FEWEST_IN_STRETCH or arrival_s[-1] <= arrival_s[0]:
         return nothing
     slope = (arrival_s[-1] - arrival_s[0]) / (scans[-1] - scans[0])
     late = arrival_s - slope * scans
     first = [
         stretch[np.argmin(late[stretch])]
-        for stretch in np.array_split(np.arange(len(scans)), _BLOCKS)
+        for stretch in np.array_split(np.arange(len(scans)), _STRETCHES)
     ]
     x, y = scans[first], arrival_s[first]
     x_mean, y_mean = x.mean(), y.mean()
@@ -98,7 +105,7 @@ def measure_rate(arrival_s: FloatArray, scans: FloatArray, nominal_hz: float) ->
     if interval <= 0:
         return nothing
     residual = y - y_mean - interval * (x - x_mean)
-    variance = float(np.sum(residual**2)) / (_BLOCKS - 2) / spread
-    one_scan = interval / (math.sqrt(12.0) * (scans[-1] - scans[0]))
-    sd = math.hypot(math.sqrt(variance), one_scan)
+    variance = float(np.sum(residual**2)) / (_STRETCHES - 2) / spread
+    floor = math.hypot(interval / math.sqrt(12.0), _STAMP_S * clock_scale)
+    sd = math.hypot(math.sqrt(variance), floor / (scans[-1] - scans[0]))
     return TimeBase(nominal_hz, 1.0 / interval, sd / interval**2)

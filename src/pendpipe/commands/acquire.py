@@ -12,10 +12,12 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
+from pendpipe.commands._campaign import add_campaign, add_record
 from pendpipe.errors import InputError
 
 if TYPE_CHECKING:
     from pendpipe.acquire.devices.simulated import Signal
+    from pendpipe.acquire.progress import ProgressLine
     from pendpipe.recording import Recording
 
 
@@ -38,6 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--clock-scale", type=float, default=1.0, help="simulated seconds in one of the wall's (1)"
     )
+    workflow = parser.add_argument_group("as a stage of a campaign")
+    add_campaign(workflow)
+    add_record(workflow)
+    workflow.add_argument(
+        "--caliper", action="store_true", help="the campaign's caliper run instead of a record"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -46,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _list(arguments.port)
     if not arguments.out:
         raise InputError("--out", "no file is named", "give --out FILE.csv")
+    if arguments.campaign:
+        return _stage(arguments)
     from pendpipe.acquire.progress import ProgressLine
     from pendpipe.recording import write_plain
 
@@ -64,6 +74,30 @@ def run(arguments: argparse.Namespace) -> int:
     rate = recording.metadata["sample_rate_hz"]
     print(f"{arguments.out}: {len(recording)} samples at {float(rate):.6g} Hz")
     return 0
+
+
+def _stage(arguments: argparse.Namespace) -> int:
+    """Acquire one record of a campaign, or its caliper run."""
+    from pathlib import Path
+
+    from pendpipe.commands._campaign import load
+
+    campaign, out = load(arguments.campaign), Path(arguments.out)
+    if arguments.caliper:
+        from pendpipe.stages.caliper import run_caliper
+
+        run_caliper(campaign, out)
+        return 0
+    from pendpipe.stages.acquire import acquire_record
+    from pendpipe.stages.refusal import run_stage
+
+    return run_stage(
+        "acquire",
+        arguments.record,
+        lambda: acquire_record(campaign, arguments.record, out),
+        outputs=[out],
+        refused=arguments.refused,
+    )
 
 
 def _real(arguments: argparse.Namespace, progress: ProgressLine) -> Recording:

@@ -75,6 +75,16 @@ def caliper(campaign: Campaign) -> str:
     return digest(content)
 
 
+def caliper_arm(campaign: Campaign) -> str:
+    """The option that turns the caliper's displacements into angles."""
+    run = campaign.configuration.calibration
+    return (
+        ""
+        if run is None
+        else f"--arm-m {run.arm_m!r} --displacement-sd-m {run.displacement_sd_m!r}"
+    )
+
+
 def theory(campaign: Campaign) -> str:
     """Digest what the campaign's own stages take from the configuration."""
     content = campaign.configuration.model_dump(

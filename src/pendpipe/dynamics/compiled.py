@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from numba import njit
 
@@ -18,6 +18,8 @@ from pendpipe.dynamics.march import march
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from pendpipe.arrays import FloatArray
 
 _SOURCES = (
     "chebyshev.py", "emission.py", "half_cycle.py", "march.py", "panel.py", "sensitivities.py",
@@ -37,7 +39,16 @@ def engine() -> Callable[..., tuple[int, int]]:
     """Return `march.march`, compiled; the first call in a new installation takes a while."""
     sources = _digest()
 
-    def run(*arguments: Any) -> tuple[int, int]:
-        return march(*arguments) if sources != 0 else (0, 0)
+    def run(
+        shape: FloatArray, directions: FloatArray, rates: FloatArray, motion: FloatArray,
+        signs: FloatArray, amplitude_rad: float, tabulate: bool, most: int, until_s: float,
+        time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
+        buffer: FloatArray,
+    ) -> tuple[int, int]:  # fmt: skip
+        buffer[0] = sources  # a use, so that it is a free variable
+        return march(
+            shape, directions, rates, motion, signs, amplitude_rad, tabulate, most, until_s,
+            time_s, angle_rad, jacobian, turning, buffer,
+        )  # fmt: skip
 
-    return njit(run, cache=True, error_model="numpy")  # type: ignore[no-any-return]
+    return njit(run, cache=True, _nrt=False, error_model="numpy")  # type: ignore[no-any-return]

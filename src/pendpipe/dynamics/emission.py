@@ -116,26 +116,27 @@ def emit(
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
         horner(work.total[0], z, angle_rad[at:stop])
         if work.amplitude.size > 0:
-            _emit_derivatives(work, z, t, jacobian[:, at:stop])
+            _emit_derivatives(work, z, t, jacobian, at)
         at = stop
     return end
 
 
 @kernel
 def _emit_derivatives(
-    work: Work, theta: FloatArray, time_s: FloatArray, jacobian: FloatArray
+    work: Work, theta: FloatArray, time_s: FloatArray, jacobian: FloatArray, at: int
 ) -> None:
     """Write the columns of the Jacobian for a block of samples."""
     omega, release_s, directions = work.motion[0], work.motion[1], work.rates.size
-    by_omega, by_time = jacobian[directions], jacobian[directions + 2]
+    stop = at + theta.size
+    by_omega, by_time = jacobian[directions, at:stop], jacobian[directions + 2, at:stop]
     horner(work.total[1], theta, by_time)
-    horner(work.total[2], theta, jacobian[directions + 1])
+    horner(work.total[2], theta, jacobian[directions + 1, at:stop])
     # By omega at fixed rates: time runs faster, and delta, h, q, g fall as 1/omega.
     for i in range(theta.size):
         by_omega[i] = (time_s[i] - release_s) * by_time[i]
         by_time[i] *= -omega
     for c in range(directions):
-        column, rate = jacobian[c], work.rates[c] / omega
+        column, rate = jacobian[c, at:stop], work.rates[c] / omega
         horner(work.total[3 + c], theta, column)
         for i in range(theta.size):
             by_omega[i] -= rate * column[i]
@@ -147,14 +148,18 @@ def rest(
     jacobian: FloatArray,
 ) -> None:  # fmt: skip
     """Write the samples after the stop: the last turning point, exactly."""
-    angle_rad[first:] = signs[0] * y + work.motion[2]
-    directions = work.rates.size
+    directions, omega = work.rates.size, work.motion[0]
+    for i in range(first, angle_rad.size):
+        angle_rad[i] = signs[0] * y + work.motion[2]
     if work.amplitude.size == 0:
         return
-    jacobian[directions, first:] = 0.0
+    by_omega = 0.0
     for c in range(directions):
-        derivative = signs[0] * work.amplitude[c + 1]
-        jacobian[c, first:] = derivative
-        jacobian[directions, first:] -= work.rates[c] / work.motion[0] * derivative
-    jacobian[directions + 1, first:] = signs[0] * signs[1] * work.amplitude[0]
-    jacobian[directions + 2, first:] = 0.0
+        by_rate = signs[0] * work.amplitude[c + 1]
+        by_omega -= work.rates[c] / omega * by_rate
+        for i in range(first, angle_rad.size):
+            jacobian[c, i] = by_rate
+    for i in range(first, angle_rad.size):
+        jacobian[directions, i] = by_omega
+        jacobian[directions + 1, i] = signs[0] * signs[1] * work.amplitude[0]
+        jacobian[directions + 2, i] = 0.0

@@ -94,15 +94,15 @@ def _in_time(
     time_nodes(node, half_width, work.chebyshev)
     waveform = work.columns[count]
     for j in range(n):
-        waveform[j] = (work.shape[0] + radius * (1.0 + node[LOSS, j]) * node[COS, j]) / y
-    polynomial(node, waveform, work.chebyshev, polynomials[:n])
-    resolved = unresolved(waveform) <= WAVEFORM_TOLERANCE
+        waveform[j] = (work.shape[0] + radius * (1.0 + node[LOSS + j]) * node[COS + j]) / y
+    polynomial(node, waveform, work.chebyshev, polynomials, 0)
+    resolved = unresolved(waveform, 0) <= WAVEFORM_TOLERANCE
     for c in range(count):
         column = work.columns[c]
         if c > 0:
             for j in range(n):
                 column[j] /= y
-        polynomial(node, column, work.chebyshev, polynomials[(c + 1) * n : (c + 2) * n])
+        polynomial(node, column, work.chebyshev, polynomials, (c + 1) * n)
     return resolved
 
 
@@ -122,11 +122,11 @@ def even_half_cycle(work: Work, y: float, panels: int, polynomials: int, row: Fl
             row[at + 1 : at + width],
         ):  # fmt: skip
             return False
-        excess += work.node[EXCESS, DEGREE]
+        excess += work.node[EXCESS + DEGREE]
         if polynomials > 0:
             row[at] = excess
             at += width
-        change += work.node[LOSS, DEGREE] * (1.0 + change)
+        change += work.node[LOSS + DEGREE] * (1.0 + change)
     row[0] = -math.log1p((radius * change - 2.0 * m) / y)
     row[1] = excess
     _end(work, radius * (1.0 + change), y, row)
@@ -154,27 +154,29 @@ def direct_half_cycle(
     while k < 1 << level:
         half_width = 0.5 * math.pi / (1 << level)
         start = 2.0 * k * half_width
-        work.kept[0, :], work.kept[1, :] = work.sigma, work.shift
+        for c in range(work.sigma.size):
+            work.kept[0, c], work.kept[1, c] = work.sigma[c], work.shift[c]
         if not _solve_panel(
             work, radius * (1.0 + change), start, half_width, y, level >= FINEST,
             row[at : at + width],
         ):  # fmt: skip
             if level >= FINEST:
                 return y, 0.0, first, -1
-            work.sigma[:], work.shift[:] = work.kept[0], work.kept[1]
+            for c in range(work.sigma.size):
+                work.sigma[c], work.shift[c] = work.kept[0, c], work.kept[1, c]
             level, k = level + 1, 2 * k
             continue
         if coarsest < 0:
             coarsest = level
-        duration = 2.0 * half_width + work.node[EXCESS, DEGREE]
+        duration = 2.0 * half_width + work.node[EXCESS + DEGREE]
         if polynomials > 0:
             end = emit(
                 work, row[at : at + width], begin + start + excess, duration, y, signs,
                 time_s, first, guess, angle_rad, jacobian,
             )  # fmt: skip
             first, guess = end, end - first
-        excess += work.node[EXCESS, DEGREE]
-        change += work.node[LOSS, DEGREE] * (1.0 + change)
+        excess += work.node[EXCESS + DEGREE]
+        change += work.node[LOSS + DEGREE] * (1.0 + change)
         k += 1
         if k % 2 == 0 and level > 0:
             k, level = k // 2, level - 1

@@ -31,44 +31,46 @@ if TYPE_CHECKING:
 
 NODE_COUNT = DEGREE + 1
 
-# Rows of the workspace `node`, each with a value a node of the panel.
-COS, SIN, LOSS, BEFORE, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(10)
-BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(10, 16)  # derivatives, in sensitivities.py
-ROWS = 16
+# Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
+# known to the compiler, so that it sees that they do not overlap and can vectorise.
+COS, SIN, LOSS, BEFORE, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(0, 200, 20)
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(200, 320, 20)  # sensitivities.py
+NODE_SIZE = 320
 
-_OPTIONS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
+_OPTIONS = {"_nrt": False, "error_model": "numpy", "fastmath": {"contract"}}
 kernel = njit(**_OPTIONS)
 """How every function of the engine is compiled: no exceptions, fused multiply-add."""
 
 
 @kernel
-def multiply(transposed: FloatArray, v: FloatArray, out: FloatArray) -> None:
-    """Write the product of a matrix, given transposed, and the 17 values `v` to `out`.
+def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to: int) -> None:
+    """Write the product of a matrix, given transposed, and the 17 values x[p:] to out[to:].
 
     Written out, because a product of this size is the engine's innermost work, and as a double
     loop it takes six times as long.
     """
     a = transposed
-    v0, v1, v2, v3, v4, v5, v6, v7, v8 = v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]
-    v9, v10, v11, v12, v13, v14, v15, v16 = v[9], v[10], v[11], v[12], v[13], v[14], v[15], v[16]
+    x0, x1, x2, x3, x4, x5 = x[p], x[p + 1], x[p + 2], x[p + 3], x[p + 4], x[p + 5]
+    x6, x7, x8, x9, x10, x11 = x[p + 6], x[p + 7], x[p + 8], x[p + 9], x[p + 10], x[p + 11]
+    x12, x13, x14, x15, x16 = x[p + 12], x[p + 13], x[p + 14], x[p + 15], x[p + 16]
     for i in range(NODE_COUNT):
-        out[i] = (
-            (a[0, i] * v0 + a[1, i] * v1 + a[2, i] * v2 + a[3, i] * v3)
-            + (a[4, i] * v4 + a[5, i] * v5 + a[6, i] * v6 + a[7, i] * v7)
-            + (a[8, i] * v8 + a[9, i] * v9 + a[10, i] * v10 + a[11, i] * v11)
-            + (a[12, i] * v12 + a[13, i] * v13 + a[14, i] * v14 + a[15, i] * v15)
-            + a[16, i] * v16
+        out[to + i] = (
+            (a[0, i] * x0 + a[1, i] * x1 + a[2, i] * x2 + a[3, i] * x3)
+            + (a[4, i] * x4 + a[5, i] * x5 + a[6, i] * x6 + a[7, i] * x7)
+        ) + (
+            (a[8, i] * x8 + a[9, i] * x9 + a[10, i] * x10 + a[11, i] * x11)
+            + (a[12, i] * x12 + a[13, i] * x13 + a[14, i] * x14 + a[15, i] * x15 + a[16, i] * x16)
         )
 
 
 @kernel
-def unresolved(values: FloatArray) -> float:
+def unresolved(values: FloatArray, at: int) -> float:
     """Return the estimated size of the Chebyshev coefficients left out, extrapolated."""
     last, before = 0.0, 1e-300
     for k in range(DEGREE - 3, DEGREE + 1):
         coefficient = 0.0
         for j in range(NODE_COUNT):
-            coefficient += ANALYSIS[k, j] * values[j]
+            coefficient += ANALYSIS[k, j] * values[at + j]
         if k < DEGREE - 1:
             before = max(before, abs(coefficient))
         else:
@@ -84,10 +86,10 @@ def place(node: FloatArray, placed: FloatArray, start: float, half_width: float)
     placed[0], placed[1] = start, half_width
     for j in range(NODE_COUNT):
         psi = start + half_width * (1.0 + NODES[j])
-        node[COS, j] = math.cos(psi)
-        node[SIN, j] = math.sin(psi)
-        node[LOSS, j] = 0.0
-        node[BEFORE, j] = 0.0
+        node[COS + j] = math.cos(psi)
+        node[SIN + j] = math.sin(psi)
+        node[LOSS + j] = 0.0
+        node[BEFORE + j] = 0.0
 
 
 @kernel
@@ -108,27 +110,26 @@ def solve(
         r at the start of the panel.
     """
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
-    loss, last, new, slope = node[LOSS], node[BEFORE], node[SCRATCH], node[SLOPE]
-    cos, sin = node[COS], node[SIN]
     for j in range(NODE_COUNT):
-        guess = 2.0 * loss[j] - last[j]
-        last[j] = loss[j]
-        loss[j] = guess
+        guess = 2.0 * node[LOSS + j] - node[BEFORE + j]
+        node[BEFORE + j] = node[LOSS + j]
+        node[LOSS + j] = guess
     before = 1.0
     for _ in range(60):
         for j in range(NODE_COUNT):
-            r = radius * (1.0 + loss[j])
+            grown, cos, sin = 1.0 + node[LOSS + j], node[COS + j], node[SIN + j]
+            r = radius * grown
             # |.| because rounding can make the square negative where x and u vanish together
-            distance = math.sqrt(abs(r * r + m * (2.0 * r * cos[j] + m)))
-            nu = (r + 2.0 * m * cos[j]) * (h / (distance + m) + q) + 2.0 * g * sin[j]
-            slope[j] = -(1.0 + loss[j]) * nu * sin[j] / (1.0 - nu * cos[j])
-        multiply(INTEGRATION_T, slope, new)
+            reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
+            force = (r + 2.0 * m * cos) * (h + q * reach) + 2.0 * g * sin * reach  # nu (R + m)
+            node[SLOPE + j] = -grown * force * sin / (reach - force * cos)
+        multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = 0.0, 1e-300
         for j in range(NODE_COUNT):
-            value = half_width * new[j]
-            change += abs(value - loss[j])
+            value = half_width * node[SCRATCH + j]
+            change += abs(value - node[LOSS + j])
             size += abs(value)
-            loss[j] = value
+            node[LOSS + j] = value
         # The error left is the change times the rate at which changes shrink.
         if change * min(1.0, change / before) <= 1e-14 * size:
             return _finish(node, shape, radius, half_width, tolerance)
@@ -142,23 +143,22 @@ def _finish(
 ) -> bool:
     """Integrate tau - psi, and say whether the panel is resolved to `tolerance`."""
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
-    scratch, excess = node[SCRATCH], node[EXCESS]
     largest, least = 0.0, 1.0
     for j in range(NODE_COUNT):
-        cos = node[COS, j]
-        r = radius * (1.0 + node[LOSS, j])
+        cos = node[COS + j]
+        r = radius * (1.0 + node[LOSS + j])
         distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-        nu = (r + 2.0 * m * cos) * (h / (distance + m) + q) + 2.0 * g * node[SIN, j]
-        node[SLIP, j] = 1.0 / (1.0 - nu * cos)
-        scratch[j] = nu * cos * node[SLIP, j]
+        nu = (r + 2.0 * m * cos) * (h / (distance + m) + q) + 2.0 * g * node[SIN + j]
+        node[SLIP + j] = 1.0 / (1.0 - nu * cos)
+        node[SCRATCH + j] = nu * cos * node[SLIP + j]
         largest = max(largest, abs(nu))
         least = min(least, 1.0 - nu * cos)
     if not least > 0.0:
         return False
-    multiply(INTEGRATION_T, scratch, excess)
+    multiply(INTEGRATION_T, node, SCRATCH, node, EXCESS)
     for j in range(NODE_COUNT):
-        excess[j] *= half_width
-    error = max(unresolved(node[SLOPE]), unresolved(scratch))
+        node[EXCESS + j] *= half_width
+    error = max(unresolved(node, SLOPE), unresolved(node, SCRATCH))
     return error * half_width <= tolerance * largest
 
 
@@ -169,15 +169,14 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
     Writes T_k at those places to ``chebyshev[k]`` and returns the panel's duration (radians).
     Newton's iteration on tau(zeta) = half_width (1 + zeta) + excess(zeta), all nodes at once.
     """
-    coefficients, zeta = node[COLUMN], node[ZETA]
-    multiply(ANALYSIS_T, node[EXCESS], coefficients)
-    duration = 2.0 * half_width + node[EXCESS, DEGREE]
+    multiply(ANALYSIS_T, node, EXCESS, node, COLUMN)
+    duration = 2.0 * half_width + node[EXCESS + DEGREE]
     for i in range(NODE_COUNT):
-        zeta[i] = NODES[i]
+        node[ZETA + i] = NODES[i]
     for _ in range(20):
         worst = 0.0
         for i in range(NODE_COUNT):
-            z = zeta[i]
+            z = node[ZETA + i]
             value, slope = 0.0, 0.0
             value_before, slope_before = 0.0, 0.0
             for k in range(DEGREE, 0, -1):
@@ -185,37 +184,32 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
                     2.0 * value + 2.0 * z * slope - slope_before,
                     slope,
                 )
-                value, value_before = coefficients[k] + 2.0 * z * value - value_before, value
+                value, value_before = node[COLUMN + k] + 2.0 * z * value - value_before, value
             slope = value + z * slope - slope_before
-            value = coefficients[0] + z * value - value_before
+            value = node[COLUMN] + z * value - value_before
             target = 0.5 * duration * (1.0 + NODES[i])
             step = (half_width * (1.0 + z) + value - target) / (half_width + slope)
-            zeta[i] = min(1.0, max(-1.0, z - step))
+            node[ZETA + i] = min(1.0, max(-1.0, z - step))
             worst = max(worst, abs(step))
         if worst < 1e-9:  # quadratic convergence: the next step would be below 1e-16
             break
     for i in range(NODE_COUNT):
         chebyshev[0, i] = 1.0
-        chebyshev[1, i] = zeta[i]
+        chebyshev[1, i] = node[ZETA + i]
     for k in range(2, NODE_COUNT):
         for i in range(NODE_COUNT):
-            chebyshev[k, i] = 2.0 * zeta[i] * chebyshev[k - 1, i] - chebyshev[k - 2, i]
+            chebyshev[k, i] = 2.0 * node[ZETA + i] * chebyshev[k - 1, i] - chebyshev[k - 2, i]
     return duration
 
 
 @kernel
 def polynomial(
-    node: FloatArray, values: FloatArray, chebyshev: FloatArray, out: FloatArray
+    node: FloatArray, values: FloatArray, chebyshev: FloatArray, out: FloatArray, to: int
 ) -> None:
     """Turn values at the phase nodes into a polynomial in time, in powers of theta in [-1, 1].
 
-    `values` is replaced by the values at the time nodes.
+    `values` is replaced by the values at the time nodes; the 17 coefficients go to out[to:].
     """
-    coefficients = node[COLUMN]
-    multiply(ANALYSIS_T, values, coefficients)
-    for i in range(NODE_COUNT):
-        values[i] = 0.0
-    for k in range(NODE_COUNT):
-        for i in range(NODE_COUNT):
-            values[i] += coefficients[k] * chebyshev[k, i]
-    multiply(POWERS_T, values, out)
+    multiply(ANALYSIS_T, values, 0, node, COLUMN)
+    multiply(chebyshev, node, COLUMN, values, 0)
+    multiply(POWERS_T, values, 0, out, to)

@@ -42,8 +42,8 @@ def _differentiate_nu(node: FloatArray, shape: FloatArray, radius: float) -> Non
     """Write the derivatives of nu by ln r, m, h and q (by g it is 2 sin psi)."""
     m, h, q = shape[0], shape[1], shape[2]
     for j in range(NODE_COUNT):
-        cos = node[COS, j]
-        r = radius * (1.0 + node[LOSS, j])
+        cos = node[COS + j]
+        r = radius * (1.0 + node[LOSS + j])
         x = m + r * cos
         distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
         inverse = 1.0 / (distance + m)
@@ -52,21 +52,20 @@ def _differentiate_nu(node: FloatArray, shape: FloatArray, radius: float) -> Non
         lever = r + 2.0 * m * cos
         stiffness = h * inverse + q
         drop = lever * h * inverse * inverse
-        node[BY_RADIUS, j] = r * (stiffness - drop * (r + m * cos) * direction)
-        node[BY_CENTRE, j] = 2.0 * cos * stiffness - drop * (1.0 + x * direction)
-        node[BY_H, j] = lever * inverse
-        node[BY_Q, j] = lever
+        node[BY_RADIUS + j] = r * (stiffness - drop * (r + m * cos) * direction)
+        node[BY_CENTRE + j] = 2.0 * cos * stiffness - drop * (1.0 + x * direction)
+        node[BY_H + j] = lever * inverse
+        node[BY_Q + j] = lever
 
 
 @kernel
 def _grow(node: FloatArray, half_width: float) -> None:
     """Write the integrating factor exp(integral of F_s)."""
-    scratch, growth = node[SCRATCH], node[GROWTH]
     for j in range(NODE_COUNT):
-        scratch[j] = -node[SIN, j] * node[SLIP, j] ** 2 * node[BY_RADIUS, j]
-    multiply(INTEGRATION_T, scratch, growth)
+        node[SCRATCH + j] = -node[SIN + j] * node[SLIP + j] ** 2 * node[BY_RADIUS + j]
+    multiply(INTEGRATION_T, node, SCRATCH, node, GROWTH)
     for j in range(NODE_COUNT):
-        growth[j] = math.exp(half_width * growth[j])
+        node[GROWTH + j] = math.exp(half_width * node[GROWTH + j])
 
 
 @kernel
@@ -96,32 +95,31 @@ def sensitivities(
     """
     _differentiate_nu(node, shape, radius)
     _grow(node, half_width)
-    growth, scratch, integral = node[GROWTH], node[SCRATCH], node[COLUMN]
     for c in range(sigma.size):
         dm, dh, dq, dg = 0.0, 0.0, 0.0, 0.0
         if c > 0:
             dm, dh = directions[c - 1, 0], directions[c - 1, 1]
             dq, dg = directions[c - 1, 2], directions[c - 1, 3]
-        forcing, column = node[FORCING], columns[c]
+        column = columns[c]
         for j in range(NODE_COUNT):
-            forcing[j] = (
-                dm * node[BY_CENTRE, j]
-                + dh * node[BY_H, j]
-                + dq * node[BY_Q, j]
-                + 2.0 * dg * node[SIN, j]
+            node[FORCING + j] = (
+                dm * node[BY_CENTRE + j]
+                + dh * node[BY_H + j]
+                + dq * node[BY_Q + j]
+                + 2.0 * dg * node[SIN + j]
             )
-            scratch[j] = -node[SIN, j] * node[SLIP, j] ** 2 * forcing[j] / growth[j]
-        multiply(INTEGRATION_T, scratch, integral)
+            node[SCRATCH + j] = -node[SIN + j] * node[SLIP + j] ** 2 * node[FORCING + j] / node[GROWTH + j]
+        multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
         for j in range(NODE_COUNT):
-            column[j] = growth[j] * (sigma[c] + half_width * integral[j])
-            scratch[j] = (
-                node[COS, j] * node[SLIP, j] ** 2 * (node[BY_RADIUS, j] * column[j] + forcing[j])
+            column[j] = node[GROWTH + j] * (sigma[c] + half_width * node[COLUMN + j])
+            node[SCRATCH + j] = (
+                node[COS + j] * node[SLIP + j] ** 2 * (node[BY_RADIUS + j] * column[j] + node[FORCING + j])
             )
-        multiply(INTEGRATION_T, scratch, integral)
+        multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
         sigma_end = column[DEGREE]
         for j in range(NODE_COUNT):
-            r = radius * (1.0 + node[LOSS, j])
-            delay = shift[c] + half_width * integral[j]
-            column[j] = dm + r * (node[COS, j] * column[j] + node[SIN, j] * delay)
+            r = radius * (1.0 + node[LOSS + j])
+            delay = shift[c] + half_width * node[COLUMN + j]
+            column[j] = dm + r * (node[COS + j] * column[j] + node[SIN + j] * delay)
         sigma[c] = sigma_end
-        shift[c] += half_width * integral[DEGREE]
+        shift[c] += half_width * node[COLUMN + DEGREE]

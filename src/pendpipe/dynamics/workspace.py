@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from pendpipe.dynamics.panel import NODE_COUNT, ROWS, kernel
+from pendpipe.dynamics.panel import NODE_COUNT, NODE_SIZE, kernel
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -28,7 +28,7 @@ class Work(NamedTuple):
     motion: FloatArray
     """omega, the time of the release, the offset."""
     node: FloatArray
-    """(ROWS, 17): the panel in hand; see `panel.py`."""
+    """The panel in hand; see `panel.py`."""
     placed: FloatArray
     """Start and half width of that panel."""
     sigma: FloatArray
@@ -77,7 +77,7 @@ def buffer_size(sensitivities: int, polynomials: int) -> int:
     """Return how long a buffer `carve` needs."""
     per_panel = 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
     width = HEAD + 2 * sensitivities + MOST_PANELS * per_panel
-    fixed = ROWS * NODE_COUNT + 2 + NODE_COUNT * NODE_COUNT + 4 * MOST_POINTS + _DESCRIPTION + _THETA + 2
+    fixed = NODE_SIZE + 2 + NODE_COUNT * NODE_COUNT + 4 * MOST_POINTS + _DESCRIPTION + _THETA + 2
     return fixed + 6 * sensitivities + (2 * sensitivities + 3) * NODE_COUNT + (
         2 * MOST_POINTS + 2
     ) * width
@@ -97,8 +97,7 @@ def carve(
     s, n = sensitivities, NODE_COUNT
     width = row_width(s, polynomials, MOST_PANELS)
     points = MOST_POINTS
-    node = buffer[: ROWS * n].reshape(ROWS, n)
-    rest = buffer[ROWS * n :]
+    node, rest = buffer[:NODE_SIZE], buffer[NODE_SIZE:]
     placed, rest = rest[:2], rest[2:]
     sigma, rest = rest[:s], rest[s:]
     shift, rest = rest[:s], rest[s:]

@@ -133,9 +133,12 @@ class SensorVolts:
         self.record = record
         self.random = random
 
+    def angle(self, time_s: FloatArray) -> FloatArray:
+        """Return the true angle in rad at ascending times since the record's start."""
+        return sample(self.record.model, self.record.release, time_s)
+
     def __call__(self, time_s: FloatArray) -> FloatArray:
         """Return volts at ascending times since the record's start; shape (n,)."""
         sensor = self.record.sensor
-        angle = sample(self.record.model, self.record.release, time_s)
         noise = sensor.noise_volts * self.random.standard_normal(len(time_s))
-        return sensor.offset_volts + sensor.volts_per_radian * angle + noise
+        return sensor.offset_volts + sensor.volts_per_radian * self.angle(time_s) + noise

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.errors import InputError
@@ -35,9 +37,12 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
     from pendpipe.simulation.record import SensorVolts, generator, simulated_record
 
     truth = simulated_record(campaign, record)
+    signal = SensorVolts(truth, generator(campaign, record.record))
+    # The engine is compiled on its first call on a machine; a device must not wait for it.
+    signal.angle(np.zeros(1))
     recording = acquire_simulated(
         truth.device.kind,
-        SensorVolts(truth, generator(campaign, record.record)),
+        signal,
         rate_hz=truth.rate_hz,
         duration_s=truth.duration_s,
         clock_scale=truth.device.clock_scale,

@@ -10,11 +10,11 @@ from typing import Final, Self, TypeAlias
 
 import numpy as np
 
-from pendpipe.acquire.clock import Clock, ScaledClock
+from pendpipe.acquire.clock import Clock, SimulatedClock
 from pendpipe.acquire.devices.converter import convert
-from pendpipe.acquire.devices.dialect import Dialect
 from pendpipe.acquire.devices.di154rs import SimulatedDI154RS
 from pendpipe.acquire.devices.di2108 import SimulatedDI2108
+from pendpipe.acquire.devices.dialect import Dialect
 from pendpipe.acquire.devices.links import open_link
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
@@ -32,8 +32,6 @@ _BLOCKS: Final = (1 << 10, 1 << 14)
 neither a short nor a long recording pays for the signal twice."""
 _REST_S: Final = 0.002
 """The shortest time between two pieces of data, in seconds of the host."""
-_BACKLOG: Final = 1 << 20
-"""Bytes kept for a host that does not read; beyond them the converter waits."""
 
 
 class SimulatedDevice:
@@ -82,7 +80,7 @@ class SimulatedDevice:
                 f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
             )
         self.dialect = DEVICES[kind]()
-        self.clock: Clock = ScaledClock(clock_scale)
+        self.clock = SimulatedClock(clock_scale)
         self.failure: BaseException | None = None
         self._signal = signal
         self._rate_error = rate_error
@@ -135,14 +133,22 @@ class SimulatedDevice:
                     stream.begin(self.clock)
                 if not self.dialect.streaming:
                     stream = None
-                elif stream and len(self._outbox) < _BACKLOG:
+                elif stream and not self._outbox:
                     self._outbox += stream.due(self.clock)
-                if self._outbox:
-                    with memoryview(self._outbox) as view:
-                        sent = self._link.send(view)
-                    del self._outbox[:sent]
+                self._send()
         except BaseException as fault:
             self.failure = fault
+
+    def _send(self) -> None:
+        """Send what the line takes; while it is full, simulated time stands still."""
+        if self._outbox:
+            with memoryview(self._outbox) as view:
+                sent = self._link.send(view)
+            del self._outbox[:sent]
+        if self._outbox:
+            self.clock.hold()
+        else:
+            self.clock.release()
 
 
 class _Stream:
@@ -174,7 +180,6 @@ class _Stream:
         taken = math.floor(elapsed * self._rate_hz) + 1
         packet = self._dialect.packet_bytes
         size = max(0, taken * self._scan_bytes // packet * packet - self._released)
-        size = min(size, max(packet, _BACKLOG // packet * packet))
         while len(self._ready) < size:
             self._compute()
         piece, self._ready = self._ready[:size], self._ready[size:]
