@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from pendpipe import physics
+from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
-from pendpipe.configuration.models import Apparatus, Fluid, Geometry
+from pendpipe.configuration.models import Apparatus, Fluid
 from pendpipe.configuration.records import Record
 from pendpipe.errors import InputError
 
@@ -36,7 +38,7 @@ def pendulum(campaign: Campaign, record: Record) -> Pendulum:
     where = f"{settings.records}, record {record.record}"
     if settings.apparatus is None or geometry is None or not record.fluid:
         raise InputError(where, "no apparatus, geometry or fluid is given", "fill the cells")
-    parts = pendulum_parts(settings.apparatus, geometry)
+    parts = pendulum_parts(settings.apparatus, geometry.weights_m, sphere=geometry.sphere)
     fluid = fluid_at(settings.fluids[record.fluid], record.temperature_c)
     moving = physics.swing(
         parts,
@@ -51,22 +53,24 @@ def pendulum(campaign: Campaign, record: Record) -> Pendulum:
     return Pendulum(parts, fluid, geometry.sphere, moving)
 
 
-def pendulum_parts(apparatus: Apparatus, geometry: Geometry) -> list[physics.Part]:
-    """List the parts of the pendulum with their positions below the axis."""
+def pendulum_parts(
+    apparatus: Apparatus, weights_m: Mapping[str, float | FloatArray], *, sphere: bool
+) -> list[physics.Part]:
+    """List the parts of the pendulum; the weights' places below the axis may be arrays."""
     parts: list[physics.Part] = [physics.Rod(apparatus.rod.mass_kg, apparatus.rod.length_m)]
-    for name, position in geometry.weights_m.items():
+    for name, position in weights_m.items():
         weight = apparatus.weights[name]
         if weight.radius_m:
             parts.append(physics.Sphere(weight.mass_kg, weight.radius_m, position))
         else:
             parts.append(physics.PointMass(weight.mass_kg, position))
-    if geometry.sphere and (sphere := apparatus.sphere):
+    if sphere and (ball := apparatus.sphere):
         parts.append(
-            physics.Sphere(sphere.mass_kg, sphere.diameter_m / 2, sphere.distance_m, submerged=True)
+            physics.Sphere(ball.mass_kg, ball.diameter_m / 2, ball.distance_m, submerged=True)
         )
         # The screw's mass is counted with the sphere; under water it displaces some more.
         parts.append(
-            physics.PointMass(0.0, sphere.screw_distance_m, displaced_m3=sphere.screw_volume_m3)
+            physics.PointMass(0.0, ball.screw_distance_m, displaced_m3=ball.screw_volume_m3)
         )
     return parts
 

@@ -37,9 +37,12 @@ COS, SIN, LOSS, BEFORE, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(0, 20
 BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(200, 320, 20)  # sensitivities.py
 NODE_SIZE = 320
 
-_OPTIONS = {"_nrt": False, "error_model": "numpy", "fastmath": {"contract"}}
-kernel = njit(**_OPTIONS)
-"""How every function of the engine is compiled: no exceptions, fused multiply-add."""
+# No exceptions, and no reference counts (which forbids to allocate): both cost more than they
+# are worth here. Multiplications and additions may be fused.
+kernel = njit(_nrt=False, error_model="numpy", fastmath={"contract"})
+"""How every function of the engine is compiled."""
+reduction = njit(_nrt=False, error_model="numpy", fastmath={"contract", "reassoc"})
+"""How its sums are: in any order."""
 
 
 @kernel
@@ -63,7 +66,7 @@ def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to:
         )
 
 
-@kernel
+@reduction
 def unresolved(values: FloatArray, at: int) -> float:
     """Return the estimated size of the Chebyshev coefficients left out, extrapolated."""
     last, before = 0.0, 1e-300
@@ -90,6 +93,18 @@ def place(node: FloatArray, placed: FloatArray, start: float, half_width: float)
         node[SIN + j] = math.sin(psi)
         node[LOSS + j] = 0.0
         node[BEFORE + j] = 0.0
+
+
+@reduction
+def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
+    """Take over the iterate; return the sums of its changes and of its values."""
+    change, size = 0.0, 1e-300
+    for j in range(NODE_COUNT):
+        value = half_width * node[SCRATCH + j]
+        change += abs(value - node[LOSS + j])
+        size += abs(value)
+        node[LOSS + j] = value
+    return change, size
 
 
 @kernel
@@ -124,12 +139,7 @@ def solve(
             force = (r + 2.0 * m * cos) * (h + q * reach) + 2.0 * g * sin * reach  # nu (R + m)
             node[SLOPE + j] = -grown * force * sin / (reach - force * cos)
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
-        change, size = 0.0, 1e-300
-        for j in range(NODE_COUNT):
-            value = half_width * node[SCRATCH + j]
-            change += abs(value - node[LOSS + j])
-            size += abs(value)
-            node[LOSS + j] = value
+        change, size = _renew(node, half_width)
         # The error left is the change times the rate at which changes shrink.
         if change * min(1.0, change / before) <= 1e-14 * size:
             return _finish(node, shape, radius, half_width, tolerance)
@@ -143,23 +153,24 @@ def _finish(
 ) -> bool:
     """Integrate tau - psi, and say whether the panel is resolved to `tolerance`."""
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
-    largest, least = 0.0, 1.0
+    turned_back = 0
     for j in range(NODE_COUNT):
-        cos = node[COS + j]
+        cos, sin = node[COS + j], node[SIN + j]
         r = radius * (1.0 + node[LOSS + j])
-        distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-        nu = (r + 2.0 * m * cos) * (h / (distance + m) + q) + 2.0 * g * node[SIN + j]
-        node[SLIP + j] = 1.0 / (1.0 - nu * cos)
-        node[SCRATCH + j] = nu * cos * node[SLIP + j]
-        largest = max(largest, abs(nu))
-        least = min(least, 1.0 - nu * cos)
-    if not least > 0.0:
+        reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
+        force = (r + 2.0 * m * cos) * (h + q * reach) + 2.0 * g * sin * reach
+        scale = 1.0 / (reach - force * cos)
+        node[SLIP + j] = reach * scale
+        node[SCRATCH + j] = force * cos * scale
+        turned_back += node[SLIP + j] <= 0.0
+    if turned_back > 0:
         return False
     multiply(INTEGRATION_T, node, SCRATCH, node, EXCESS)
     for j in range(NODE_COUNT):
         node[EXCESS + j] *= half_width
     error = max(unresolved(node, SLOPE), unresolved(node, SCRATCH))
-    return error * half_width <= tolerance * largest
+    strength = max(abs(node[SLOPE + DEGREE // 2]), abs(node[SCRATCH]), abs(node[SCRATCH + DEGREE]))
+    return error * half_width <= tolerance * strength
 
 
 @kernel
