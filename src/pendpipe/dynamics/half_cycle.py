@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.workspace import Work
 
-LOSS_TOLERANCE = 5e-10
-"""Bound of `solve`'s estimate, which is a thousand times the error: 5e-13 of a half cycle's loss."""
+LOSS_TOLERANCE = 5e-9
+"""Bound of `solve`'s estimate, which is a thousand times the error: 5e-12 of a half cycle's loss."""
 WAVEFORM_TOLERANCE = 1e-12
 """Of the polynomial in time, relative to the amplitude."""
 FINEST = 30

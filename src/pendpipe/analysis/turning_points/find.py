@@ -112,6 +112,7 @@ def _shaped(
     shape = half_cycle_shape(amplitude, places.angular_frequency, rates)
     measured = measure(samples, places, level, shape, amplitude=amplitude)
     places = resmoothed(places, measured, samples.noise_rms)
+    measured = measure(samples, places, level, shape, amplitude=amplitude)
     shape, measured = odd_harmonics(samples, places, level, shape, measured)
     return places, measured, shape
 
