@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
-from pendpipe.acquire.recorder import Progress, record
+from pendpipe.acquire.recorder import Progress, Wish, record
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
+
+_LINE_BYTES_PER_S: Final = 2e6
+"""What a pseudo-terminal is asked to carry at most; it was seen to carry twice as much."""
+_SHORTEST_S: Final = 0.1
+"""Seconds of the wall that a recording takes at least."""
 
 
 def acquire_simulated(
@@ -37,7 +43,9 @@ def acquire_simulated(
     rate_hz, duration_s, channels, raw_path, volts_per_radian, progress
         See `recorder.record`.
     clock_scale
-        How many seconds of device and recorder pass in one of the wall's.
+        How many seconds of device and recorder pass in one of the wall's. It is lowered to
+        what the line can carry (2 MB/s of the wall), and so that a recording takes 0.1 s at
+        least: in less the rate can't be measured.
     link
         ``"pty"``, ``"socket"``, or ``None`` for what the system has.
     rate_error
@@ -53,8 +61,14 @@ def acquire_simulated(
     InputError
         As `recorder.record`; and whatever `signal` raises.
     """
+    wish = Wish(tuple(channels), rate_hz, duration_s)
+    fastest = min(
+        _LINE_BYTES_PER_S / (2 * len(wish.channels or (1,)) * wish.rate_hz),
+        wish.duration_s / _SHORTEST_S,
+    )
+    scale = min(clock_scale, max(1.0, fastest))
     with SimulatedDevice(
-        device_kind, signal, clock_scale=clock_scale, link=link, rate_error=rate_error
+        device_kind, signal, clock_scale=scale, link=link, rate_error=rate_error
     ) as device:
         try:
             return record(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from pendpipe.dynamics.chebyshev import powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.panel import kernel
-from pendpipe.dynamics.workspace import HEAD, MOST_POINTS, row_width
+from pendpipe.dynamics.workspace import HEAD, MOST_POINTS, panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -24,8 +24,10 @@ WIDEST = 5.2
 """The widest range of ln y that one table spans, and its points; see `points_for`."""
 SMOOTH_FROM = 20.0
 """Below this multiple of m, half cycles are solved one by one."""
-_LOSS_TOLERANCE = 1e-12
-_WAVEFORM_TOLERANCE = 1e-11
+_LOSS_TOLERANCE = 5e-11
+"""Of the last two coefficients, relative to the least loss; what follows is 30 times less."""
+_WAVEFORM_TOLERANCE = 1e-10
+_LOW_POWERS = 4
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
 
@@ -84,7 +86,8 @@ def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) 
         y = math.exp(log_y - half + half * cosines[2 * i + 1])
         if not even_half_cycle(work, y, panels, polynomials, work.rows[i]):
             return MORE_PANELS
-    if not _interpolate(points, width, work.rows, cosines, work.sigma.size, work.table):
+    first, per_panel = HEAD + 2 * work.sigma.size, panel_width(polynomials)
+    if not _interpolate(points, width, work.rows, cosines, first, per_panel, work.table):
         return LESS_SPAN
     segment[LOW], segment[HIGH] = log_y - span, log_y
     return DONE
@@ -96,7 +99,8 @@ def _interpolate(
     width: int,
     rows: FloatArray,
     cosines: FloatArray,
-    columns: int,
+    first: int,
+    per_panel: int,
     table: FloatArray,
 ) -> bool:
     """Turn the solved rows into polynomials in z; say whether their coefficients have died out."""
@@ -118,8 +122,10 @@ def _interpolate(
         if k >= points - 2:
             resolved = resolved and abs(scratch[0]) <= _LOSS_TOLERANCE * least
             resolved = resolved and abs(scratch[1]) <= _LOSS_TOLERANCE * least
-            for j in range(HEAD + 2 * columns, width):
-                resolved = resolved and abs(scratch[j]) <= _WAVEFORM_TOLERANCE
+            # The low powers of time in x/y stand for all: the high ones are mostly rounding.
+            for j in range(first, width):
+                if 0 < (j - first) % per_panel <= _LOW_POWERS:
+                    resolved = resolved and abs(scratch[j]) <= _WAVEFORM_TOLERANCE
         for i in range(k + 1):
             power = _POWERS[k, i]
             if power != 0.0:

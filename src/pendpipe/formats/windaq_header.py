@@ -148,4 +148,4 @@ def _size(data: bytes) -> tuple[int, list[str]]:
 def _channel(data: bytes, at: int, place: int) -> Channel:
     slope, intercept = struct.unpack_from("<dd", data, at + 8)
     unit = data[at + 24 : at + 30].split(b"\0")[0].decode("latin-1").strip()
-    return Channel(place + 1, slope, intercept, unit, max(data[at + 30 + 0], 1) if data[at + 30] else 1)
+    return Channel(place + 1, slope, intercept, unit, max(data[at + 31], 1))

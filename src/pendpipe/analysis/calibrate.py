@@ -1,0 +1,181 @@
+"""The sensor's constant: a straight line of volts against angle, and whether it is one.
+
+Both the volts and the angles may have errors (a caliper reads to a hundredth of a
+millimetre). The line is the one of maximum likelihood, found as in D. York et al.,
+Am. J. Phys. 72 (2004) 367, for errors that are independent of each other; without errors
+in the angle it is ordinary (weighted) least squares.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pendpipe.analysis.calibration import Calibration, Linearity
+from pendpipe.analysis.significance import (
+    chi_square_p_value,
+    student_quantile95,
+    variance_ratio_p_value,
+)
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.estimate import Estimate
+
+FEWEST_POINTS = 3
+_ROUNDS = 100
+
+
+def calibrate(
+    angle_rad: FloatArray,
+    volts: FloatArray,
+    *,
+    volts_sd: FloatArray | None = None,
+    angle_sd_rad: FloatArray | float = 0.0,
+    relative_scale_sd: float = 0.0,
+    place: str = "calibration",
+) -> Calibration:
+    """Fit the sensor's line.
+
+    Parameters
+    ----------
+    angle_rad, volts
+        The points, shape (n,), n >= 3.
+    volts_sd
+        Standard deviations of the volts, shape (n,). Without them the errors' common
+        size is taken from the residuals, and `angle_sd_rad` serves as weights only.
+    angle_sd_rad
+        Standard deviations of the angles, shape (n,) or a number.
+    relative_scale_sd
+        Relative standard deviation that all angles share (the caliper's arm); it widens
+        the constant's error and no other.
+    place
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        With too few points, identical angles, or errors that are not positive.
+    """
+    count = len(angle_rad)
+    angle_sd = np.broadcast_to(np.asarray(angle_sd_rad, dtype=np.float64), (count,))
+    _check(place, angle_rad, volts, volts_sd, angle_sd)
+    known = volts_sd is not None
+    spread = volts_sd if volts_sd is not None else np.full(count, 0.0 if angle_sd.any() else 1.0)
+    slope, offset, weights, placed, covariance = _line(angle_rad, volts, spread, angle_sd)
+    residual = volts - offset - slope * angle_rad
+    chi2 = float(np.sum(weights * residual**2))
+    scale = 1.0 if known else chi2 / (count - 2)
+    reach = 1.959963984540054 if known else student_quantile95(count - 2)
+    variances = scale * covariance
+    slope_sd = float(np.hypot(np.sqrt(variances[1, 1]), relative_scale_sd * slope))
+    return Calibration(
+        volts_per_radian=_within(slope, slope_sd, "V/rad", reach),
+        offset=_within(offset, float(np.sqrt(variances[0, 0])), "V", reach),
+        covariance=float(variances[0, 1]),
+        angle_rad=angle_rad,
+        volts=volts,
+        volts_sd=spread if known else np.sqrt(scale) * spread,
+        angle_sd_rad=angle_sd if known or not angle_sd.any() else np.sqrt(scale) * angle_sd,
+        residual_sd_volts=float(np.sqrt(np.sum(residual**2) / (count - 2))),
+        chi2_p_value=chi_square_p_value(chi2, count - 2) if known else float("nan"),
+        linearity=_linearity(placed, residual, weights, slope, known=known),
+    )
+
+
+def _line(
+    angle: FloatArray, volts: FloatArray, volts_sd: FloatArray, angle_sd: FloatArray
+) -> tuple[float, float, FloatArray, FloatArray, FloatArray]:
+    """York's iteration.
+
+    Slope, offset, weights in 1/V^2, the angles at which the points belong on the line,
+    covariance of (offset, slope).
+    """
+    slope = float(np.polyfit(angle, volts, 1)[0])
+    for _ in range(_ROUNDS):
+        weights = 1.0 / (volts_sd**2 + (slope * angle_sd) ** 2)
+        centre = np.average(angle, weights=weights), np.average(volts, weights=weights)
+        u, v = angle - centre[0], volts - centre[1]
+        # Where the point would lie on the line, as an angle from the centre.
+        adjusted = weights * (u * volts_sd**2 + slope * v * angle_sd**2)
+        previous = slope
+        slope = float(np.sum(weights * adjusted * v) / np.sum(weights * adjusted * u))
+        if abs(slope - previous) <= 1e-15 * abs(slope):
+            break
+    placed = centre[0] + adjusted
+    mean = float(np.average(placed, weights=weights))
+    slope_variance = 1.0 / float(np.sum(weights * (placed - mean) ** 2))
+    offset_variance = 1.0 / float(np.sum(weights)) + mean**2 * slope_variance
+    mixed = -mean * slope_variance
+    covariance = np.array([[offset_variance, mixed], [mixed, slope_variance]])
+    return slope, float(centre[1] - slope * centre[0]), weights, placed, covariance
+
+
+def _linearity(
+    angle: FloatArray, residual: FloatArray, weights: FloatArray, slope: float, *, known: bool
+) -> Linearity | None:
+    """Fit a cubic to the residuals of the line; test its two additional terms.
+
+    The angles are those placed on the line: the measured ones share their errors with
+    the residuals and would show a curve of their own.
+    """
+    count = len(angle)
+    if count < 5 or len(np.unique(angle)) < 4:
+        return None
+    largest = float(np.max(np.abs(angle)))
+    powers = np.vander(angle / largest, 4, increasing=True) * np.sqrt(weights)[:, np.newaxis]
+    target = np.sqrt(weights) * residual
+    coefficients = np.linalg.lstsq(powers, target, rcond=None)[0]
+    chi2_curve = float(np.sum((target - powers @ coefficients) ** 2))
+    improvement = float(np.sum(target**2)) - chi2_curve
+    scale = 1.0 if known else chi2_curve / (count - 4)
+    sds = np.sqrt(scale * np.diag(np.linalg.inv(powers.T @ powers)))
+    # An exact line leaves residuals of rounding only, in which there is nothing to test.
+    exact = np.max(np.abs(residual)) <= 1e-13 * abs(slope) * largest
+    if known:
+        p_value = chi_square_p_value(improvement, 2)
+    else:
+        p_value = 1.0 if exact else variance_ratio_p_value(improvement / 2 / scale, 2, count - 4)
+    curve = powers @ coefficients / np.sqrt(weights)
+    return Linearity(
+        quadratic=Estimate(
+            float(coefficients[2] / largest**2), float(sds[2] / largest**2), "V/rad^2"
+        ),
+        cubic=Estimate(float(coefficients[3] / largest**3), float(sds[3] / largest**3), "V/rad^3"),
+        p_value=p_value,
+        largest_deviation=float(np.max(np.abs(curve)) / (abs(slope) * np.ptp(angle))),
+    )
+
+
+def _check(
+    place: str,
+    angle: FloatArray,
+    volts: FloatArray,
+    volts_sd: FloatArray | None,
+    angle_sd: FloatArray,
+) -> None:
+    """Refuse points through which no line can be drawn."""
+    if len(angle) < FEWEST_POINTS:
+        raise InputError(
+            place, f"{len(angle)} point(s) are too few for a line", f"give {FEWEST_POINTS} or more"
+        )
+    if not (np.isfinite(angle).all() and np.isfinite(volts).all()):
+        raise InputError(place, "a value is NaN or infinite", "drop the row")
+    # Angles made from lengths may differ by rounding only.
+    if np.ptp(angle) <= 1e-12 * np.max(np.abs(angle)):
+        raise InputError(place, "all the angles are the same", "move the sensor between readings")
+    if np.ptp(volts) == 0.0:
+        raise InputError(place, "all the volts are the same", "check the sensor's connection")
+    spread = np.zeros_like(angle) if volts_sd is None else volts_sd
+    negative = (spread < 0.0) | (angle_sd < 0.0)
+    # Without any, all weigh the same; with some, a point without would outweigh the rest.
+    unweighted = (spread == 0.0) & (angle_sd == 0.0)
+    none_given = volts_sd is None and not angle_sd.any()
+    if negative.any() or not np.isfinite(spread + angle_sd).all():
+        raise InputError(place, "a standard deviation is negative or not finite", "mend it")
+    if unweighted.any() and not none_given:
+        raise InputError(
+            place, "a point has no error, neither in volts nor in angle", "give its volts_sd"
+        )
+
+
+def _within(value: float, sd: float, unit: str, reach: float) -> Estimate:
+    return Estimate(value, sd, unit, (value - reach * sd, value + reach * sd))

@@ -1,0 +1,91 @@
+"""Levenberg-Marquardt within bounds, for a handful of parameters.
+
+scipy's optimisers cost more to import (0.7 s) than a thousand of these fits, and none of
+them combines bounds, a prior and normal equations summed piece by piece.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.quadratic import bounded_step
+from pendpipe.arrays import FloatArray
+
+_DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
+
+
+class Quadratic(NamedTuple):
+    """chi^2 at a point, with minus half its gradient and its normal matrix."""
+
+    chi2: float
+    gradient: FloatArray
+    normal: FloatArray
+
+
+class Minimum(NamedTuple):
+    """Where the search ended."""
+
+    value: FloatArray
+    quadratic: Quadratic
+    converged: bool
+    evaluations: int
+
+
+def minimise(
+    evaluate: Callable[[FloatArray], Quadratic],
+    start: FloatArray,
+    lower: FloatArray,
+    *,
+    held: Sequence[int] = (),
+    tolerance: float = 1e-5,
+    most: int = 60,
+) -> Minimum:
+    """Minimise chi^2 by damped Gauss-Newton steps that respect lower bounds.
+
+    Parameters
+    ----------
+    evaluate
+        chi^2, gradient and normal matrix at a point; an infinite chi^2 refuses it.
+    start, lower
+        Shape (n,); `lower` is -inf where there is no bound.
+    held
+        Entries that are not fitted.
+    tolerance
+        The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
+        standard deviations. That step is still taken, on trust.
+    most
+        Greatest number of evaluations.
+    """
+    value = np.maximum(start, lower)
+    now = evaluate(value)
+    level, spent = 0, 1
+    while spent < most:
+        damped = now.normal + _DAMPING[level] * np.diag(np.diag(now.normal))
+        step = bounded_step(damped, now.gradient, lower - value, held)
+        promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
+        if promised < tolerance and level < 3:
+            return Minimum(np.maximum(value + step, lower), _moved(now, step), True, spent)
+        trial = np.maximum(value + step, lower)
+        then = evaluate(trial)
+        spent += 1
+        if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:
+            if now.chi2 - then.chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2:
+                return Minimum(trial, then, True, spent)
+            value, now = trial, then
+            level = max(level - 2, 0)
+        elif level == len(_DAMPING) - 1:
+            return Minimum(value, now, False, spent)
+        else:
+            level += 1
+    return Minimum(value, now, False, spent)
+
+
+def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
+    """The quadratic about a point a step further."""
+    chi2 = quadratic.chi2 - 2.0 * quadratic.gradient @ step + step @ quadratic.normal @ step
+    return Quadratic(
+        float(chi2), quadratic.gradient - quadratic.normal @ step, quadratic.normal
+    )

@@ -1,0 +1,108 @@
+"""Eq. 8's frequency from the times of turning points."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import FloatArray
+
+_SHARES: Final = (0.0, 0.5, 1.0)
+_LOUD: Final = 2.0
+
+
+class Period(NamedTuple):
+    """Eq. 8's angular frequency and the time of the first turning point."""
+
+    angular_frequency: float
+    time_s: float
+    covariance: FloatArray
+    """Of the two, shape (2, 2); it holds what the unknown share adds."""
+    chi2_per_dof: float
+
+
+def period_excess(
+    amplitude: FloatArray, angular_frequency: float, a: float, b: float, c: float, share: float
+) -> FloatArray:
+    """Relative lengthening of a half period by the losses of Eq. 8, to second order.
+
+    ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2
+    + (pi^2/8) (2 a y + b_h)(a y^2 + b_h y + c)/(y w^2)``,
+    which is Eq. 6 (1/(8 Q_v^2)) for viscous damping, pi^2/(32 Q_h^2) for hysteretic
+    damping, and nothing for Coulomb friction alone.
+
+    Parameters
+    ----------
+    amplitude
+        y at the turning points, rad.
+    angular_frequency, a, b, c
+        omega and the rates of Eq. 13.
+    share
+        b_h/b, the hysteretic part.
+    """
+    y = np.maximum(amplitude, 1e-300)
+    hysteretic, viscous = share * b, (1.0 - share) * b
+    slope = 2.0 * a * y + hysteretic
+    friction = a * y + hysteretic + c / y
+    excess = 0.5 * viscous**2 + 4.0 / 3.0 * viscous * slope + math.pi**2 / 8.0 * slope * friction
+    return np.asarray(np.minimum(excess / angular_frequency**2, 0.5))
+
+
+def fit_period(
+    points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float,
+    *, held: float | None = None,
+) -> Period:  # fmt: skip
+    """Fit a straight line to the times, in half cycles lengthened by the losses.
+
+    Turning points cannot tell how b divides into hysteretic and viscous: the middle is
+    taken, and what the ends would change is added to the standard deviations.
+
+    Parameters
+    ----------
+    points
+        The turning points.
+    amplitude, a, b, c
+        What Eq. 14 made of them.
+    held
+        An angular frequency that is not to be fitted.
+    """
+    omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
+    trials = [_line(points, amplitude, a, b, c, share, omega, held) for share in _SHARES]
+    middle = trials[1]
+    spread = (trials[2][0] - trials[0][0]) / math.sqrt(12.0)
+    matrix = middle[1] * max(middle[2], 1.0) if middle[2] > _LOUD else middle[1]
+    return Period(
+        float(middle[0][0]), float(middle[0][1]), matrix + np.outer(spread, spread), middle[2]
+    )
+
+
+def _line(
+    points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float, share: float,
+    omega: float, held: float | None,
+) -> tuple[FloatArray, FloatArray, float]:  # fmt: skip
+    """Angular frequency and first time for one share; their covariance; chi^2 per dof."""
+    weight = 1.0 / points.time_sd_s**2
+    reference = float(points.time_s[0])
+    time = points.time_s - reference
+    number = points.half_cycle.astype(np.float64)
+    excess = period_excess(amplitude, omega, a, b, c, share)
+    middle = 0.5 * (excess[1:] + excess[:-1])
+    stretched = number + np.concatenate([[0.0], np.cumsum(middle * np.diff(number))])
+    columns = np.stack([stretched, np.ones_like(stretched)], axis=1)
+    if held is not None:
+        first = float(np.average(time - stretched * math.pi / held, weights=weight))
+        residual = time - stretched * math.pi / held - first
+        inverse = np.diag([0.0, 1.0 / weight.sum()])
+        slope = math.pi / held
+    else:
+        normal = (columns * weight[:, None]).T @ columns
+        inverse = np.linalg.inv(normal)
+        slope, first = inverse @ ((columns * weight[:, None]).T @ time)
+        residual = time - columns @ np.array([slope, first])
+    jacobian = np.diag([-math.pi / slope**2, 1.0])
+    chi2 = float(np.sum(weight * residual**2)) / max(len(time) - 2, 1)
+    best = np.array([math.pi / slope, reference + first])
+    return best, jacobian @ inverse @ jacobian, chi2

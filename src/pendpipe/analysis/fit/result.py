@@ -1,0 +1,179 @@
+"""The result of a fit, and its form on disk (``fit.json``)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.estimate import Estimate
+from pendpipe.files import read_json
+
+Method = Literal["waveform", "turning-points"]
+Baseline = Literal["eq8", "viscous"]
+PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
+
+
+def units(unit: str) -> dict[str, str]:
+    """Unit of each parameter, for motions in rad or in m."""
+    return {
+        "a": f"1/({unit} s)",
+        "b": "1/s",
+        "c": f"{unit}/s",
+        "frequency": "Hz",
+        "amplitude": unit,
+        "phase": "rad",
+        "offset": unit,
+    }
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What one recording says of a, b, c and the rest.
+
+    Parameters
+    ----------
+    method, baseline
+        How it was fitted, and with which model.
+    parameters
+        The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
+        |y| at the first turning point kept, the phase at the first sample kept (the motion
+        is there ``offset + amplitude cos(phase)`` to first order), and the level.
+    quality_factor_limit
+        pi f/b: the Q that the exponential losses alone would give; None for b = 0.
+    quality_factor_hysteretic, quality_factor_viscous
+        The parts of b, given Eq. 8's form; None where they were not asked for.
+    covariance_order, covariance
+        Names and matrix, shape (n, n).
+    noise_rms_rad, residual_rms_rad, chi2_per_dof
+        Noise of one reading (never below step/sqrt(12)); what the model leaves; and their
+        comparison.
+    samples, turning_points
+        How many of each were used.
+    cuts
+        Spans left out: ``start_s``, ``stop_s``, ``reason``.
+    provenance, warnings
+        Where it comes from; and what the reader should know.
+    """
+
+    method: Method
+    baseline: Baseline
+    parameters: Mapping[str, Estimate]
+    quality_factor_limit: Estimate | None
+    covariance_order: tuple[str, ...]
+    covariance: FloatArray
+    noise_rms_rad: float
+    residual_rms_rad: float
+    chi2_per_dof: float
+    samples: int
+    turning_points: int
+    quality_factor_hysteretic: Estimate | None = None
+    quality_factor_viscous: Estimate | None = None
+    cuts: tuple[Mapping[str, Any], ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def value(self, name: str) -> float:
+        """Value of one parameter."""
+        return self.parameters[name].value
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content of ``fit.json``."""
+        limit = self.quality_factor_limit
+        if limit is None:
+            limit = Estimate(math.nan, math.nan, "", (math.nan, math.nan))
+        return {
+            "schema_version": 1,
+            "method": self.method,
+            "baseline": self.baseline,
+            "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
+            "quality_factor_limit": limit.as_json(),
+            "quality_factor_hysteretic": _optional(self.quality_factor_hysteretic),
+            "quality_factor_viscous": _optional(self.quality_factor_viscous),
+            "covariance": {
+                "order": list(self.covariance_order),
+                "matrix": self.covariance.tolist(),
+            },
+            "noise_rms_rad": self.noise_rms_rad,
+            "residual_rms_rad": self.residual_rms_rad,
+            "chi2_per_dof": self.chi2_per_dof,
+            "samples": self.samples,
+            "turning_points": self.turning_points,
+            "cuts": [dict(cut) for cut in self.cuts],
+            "provenance": dict(self.provenance),
+            "warnings": list(self.warnings),
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> FitResult:
+        """Rebuild a result from the content of ``fit.json``."""
+        limit = content["quality_factor_limit"]
+        covariance = content["covariance"]
+        return cls(
+            method=content["method"],
+            baseline=content["baseline"],
+            parameters={
+                name: _estimate(entry) for name, entry in content["parameters"].items()
+            },
+            quality_factor_limit=None if limit["value"] is None else _estimate(limit),
+            covariance_order=tuple(covariance["order"]),
+            covariance=np.array(covariance["matrix"], dtype=np.float64),
+            noise_rms_rad=_number(content["noise_rms_rad"]),
+            residual_rms_rad=_number(content["residual_rms_rad"]),
+            chi2_per_dof=_number(content["chi2_per_dof"]),
+            samples=content["samples"],
+            turning_points=content["turning_points"],
+            quality_factor_hysteretic=_maybe(content["quality_factor_hysteretic"]),
+            quality_factor_viscous=_maybe(content["quality_factor_viscous"]),
+            cuts=tuple(content["cuts"]),
+            provenance=content["provenance"],
+            warnings=tuple(content["warnings"]),
+        )
+
+
+def read_fit(path: str | Path) -> FitResult:
+    """Read ``fit.json``.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, is no fit, or holds the refusal of its record.
+    """
+    try:
+        content = read_json(path)
+    except FileNotFoundError:
+        raise InputError(path, "there is no such file", "run pendpipe fit") from None
+    except ValueError:
+        raise InputError(path, "this is no JSON", "make it again with pendpipe fit") from None
+    if "refused" in content:
+        raise InputError(path, f"the record was refused ({content['refused']})", "mend it first")
+    try:
+        return FitResult.from_json(content)
+    except (KeyError, TypeError) as fault:
+        raise InputError(path, f"this is no fit ({fault})", "run pendpipe fit") from None
+
+
+def _optional(estimate: Estimate | None) -> dict[str, Any] | None:
+    return None if estimate is None else estimate.as_json()
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _maybe(entry: Mapping[str, Any] | None) -> Estimate | None:
+    return None if entry is None else _estimate(entry)
+
+
+def _estimate(entry: Mapping[str, Any]) -> Estimate:
+    low, high = (_number(end) for end in entry["interval95"])
+    return Estimate(
+        _number(entry["value"]), _number(entry["sd"]), entry["unit"], (low, high),
+        bool(entry["at_bound"]),
+    )  # fmt: skip

@@ -1,0 +1,45 @@
+"""The arguments that every command shares which reads a recording."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pendpipe.formats import ReadOptions
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare FILE and the overrides of a reader's guesses."""
+    parser.add_argument("file", metavar="FILE", help="a recording in any supported format")
+    group = parser.add_argument_group("where a guess is wrong")
+    group.add_argument("--channel", metavar="CHANNEL", help="number (from 1) or name, see inspect")
+    group.add_argument(
+        "--column", metavar="COLUMN", help="number (from 1) or name; X,Y for a position; TIME:COLUMN"
+    )
+    group.add_argument("--unit", metavar="UNIT", help="rad, deg, V, mV, m, mm, ...; or ms:deg")
+    group.add_argument("--sample-rate", metavar="HZ", type=float, help="samples a second")
+    group.add_argument("--decimal", metavar="SIGN", help="decimal sign, '.' or ','")
+    group.add_argument("--delimiter", metavar="SIGN", help="sign between cells, or tab, space")
+    group.add_argument(
+        "--volts-per-radian", metavar="V", type=float, help="the sensor's constant, V/rad"
+    )
+    group.add_argument("--start", metavar="S", type=float, help="first time to read, seconds")
+    group.add_argument("--stop", metavar="S", type=float, help="last time to read, seconds")
+
+
+def options(arguments: argparse.Namespace) -> ReadOptions:
+    """Turn the parsed arguments into the readers' options."""
+    from pendpipe.formats import ReadOptions
+
+    return ReadOptions(
+        channel=arguments.channel,
+        column=arguments.column,
+        unit=arguments.unit,
+        sample_rate=arguments.sample_rate,
+        decimal=arguments.decimal,
+        delimiter=arguments.delimiter,
+        volts_per_radian=arguments.volts_per_radian,
+        start_s=arguments.start,
+        stop_s=arguments.stop,
+    )

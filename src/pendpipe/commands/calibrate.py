@@ -1,0 +1,123 @@
+"""The sensor's constant in V/rad from a table of volts against angles.
+
+FILE is a CSV with a header: `volts` and one of `angle_rad`, `angle_deg`, `displacement_m`
+(with --arm-m, the distance from the axis to where the caliper touches), and optionally
+`volts_sd` and `angle_sd_rad`. Lines that start with # are remarks.
+
+With --record (the workflow's way) FILE is a recording instead, and the result says which
+constant holds for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pendpipe.commands._campaign import add_record
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.calibration import Calibration
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe calibrate``."""
+    parser.add_argument("file", metavar="FILE", type=Path, help="table of volts against angles")
+    parser.add_argument("--out", type=Path, metavar="JSON", help="write the result here")
+    parser.add_argument("--arm-m", type=float, metavar="M", help="arm of the displacements, metres")
+    parser.add_argument(
+        "--arm-sd-m", type=float, default=0.0, metavar="M", help="its standard deviation"
+    )
+    parser.add_argument(
+        "--displacement-sd-m",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="standard deviation of a displacement (the caliper's)",
+    )
+    parser.add_argument("--delimiter", help="between the cells; guessed from the header")
+    parser.add_argument("--decimal", choices=".,", help="decimal mark; guessed from the delimiter")
+    workflow = parser.add_argument_group("with --record")
+    add_record(parser)
+    workflow.add_argument("--sensor", type=Path, metavar="JSON", help="the campaign's calibration")
+    workflow.add_argument(
+        "--volts-per-radian", type=float, metavar="V/RAD", help="a known constant"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Calibrate a sensor, or pick the constant of a record."""
+    return _sensor(arguments) if arguments.record is None else _record(arguments)
+
+
+def _sensor(arguments: argparse.Namespace) -> int:
+    """Fit, print and write a sensor's line."""
+    from pendpipe.analysis.calibrate import calibrate
+    from pendpipe.analysis.caliper_table import read_caliper_table
+    from pendpipe.files import write_json
+
+    table = read_caliper_table(
+        arguments.file,
+        arm_m=arguments.arm_m,
+        displacement_sd_m=arguments.displacement_sd_m,
+        delimiter=arguments.delimiter,
+        decimal=arguments.decimal,
+    )
+    relative_sd = arguments.arm_sd_m / arguments.arm_m if table.by_displacement else 0.0
+    calibration = calibrate(
+        table.angle_rad,
+        table.volts,
+        volts_sd=table.volts_sd,
+        angle_sd_rad=table.angle_sd_rad,
+        relative_scale_sd=relative_sd,
+        place=str(arguments.file),
+    )
+    print(_statement(calibration))
+    if arguments.out:
+        write_json(arguments.out, calibration.as_json())
+    return 0
+
+
+def _statement(calibration: Calibration) -> str:
+    """Say the result in a few lines."""
+    constant, offset = calibration.volts_per_radian, calibration.offset
+    low, high = calibration.angle_rad.min(), calibration.angle_rad.max()
+    lines = [
+        f"volts_per_radian {constant.value:.7g} +- {constant.sd:.2g} V/rad",
+        f"offset           {offset.value:.5g} +- {offset.sd:.2g} V",
+        f"points           {len(calibration.volts)}, from {low:.4g} to {high:.4g} rad",
+        f"residual sd      {calibration.residual_sd_volts:.3g} V",
+    ]
+    if calibration.chi2_p_value == calibration.chi2_p_value:
+        lines.append(f"lack of fit      p = {calibration.chi2_p_value:.3g}")
+    if curve := calibration.linearity:
+        verdict = "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
+        lines.append(
+            f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
+            f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
+        )
+    else:
+        lines.append("linearity        not tested: it takes five points at four angles")
+    return "\n".join(lines)
+
+
+def _record(arguments: argparse.Namespace) -> int:
+    """Pick the constant that holds for one record of a campaign."""
+    from pendpipe.errors import InputError
+    from pendpipe.stages.calibrate import calibrate_record
+    from pendpipe.stages.refusal import run_stage
+
+    if arguments.out is None:
+        raise InputError("--out", "it is missing", "give the file for the record's constant")
+    return run_stage(
+        "calibrate",
+        arguments.record,
+        lambda: calibrate_record(
+            arguments.file,
+            arguments.out,
+            sensor=arguments.sensor,
+            given=arguments.volts_per_radian,
+        ),
+        outputs=[arguments.out],
+        refused=arguments.refused,
+    )

@@ -1,0 +1,52 @@
+"""Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pendpipe.commands import _reading
+
+if TYPE_CHECKING:
+    from pendpipe.formats import Inspection
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe inspect``."""
+    _reading.add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Inspect and print."""
+    from pendpipe.files import finite
+    from pendpipe.formats import inspect
+
+    found = inspect(arguments.file, _reading.options(arguments))
+    if arguments.json:
+        print(json.dumps(finite(found.as_json()), indent=1, ensure_ascii=False))
+    else:
+        print("\n".join(_lines(arguments.file, found)))
+    return 0
+
+
+def _lines(file: str, found: Inspection) -> Iterator[str]:
+    """Say it in words, a fact a line."""
+    yield file
+    yield f"  format      {found.format}"
+    for number, (name, unit) in enumerate(found.channels, start=1):
+        yield f"  channel {number:<3} {name}" + (f" [{unit}]" if unit else "")
+    even = "evenly spaced" if found.uniform else "not evenly spaced (median interval)"
+    yield f"  samples     {found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"
+    yield f"  span        {found.duration_s:.6g} s"
+    step = "none found" if found.resolution is None else f"{found.resolution:.6g} {found.unit}"
+    yield f"  step        {step}"
+    yield f"  clipped     {found.clipped_samples} sample(s)"
+    for gap in found.gaps:
+        yield f"  gap         {gap.missing_s:.6g} s after sample {gap.after_sample}"
+    for mark in found.markers:
+        yield f"  marker      {mark.time_s:.6g} s (sample {mark.sample}) {mark.comment}".rstrip()
+    for warning in found.warnings:
+        yield f"  note        {warning}"

@@ -1,0 +1,140 @@
+"""MATLAB files (version 5 to 7): plain arrays, structures, Simulink's logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.formats.names import role_of
+from pendpipe.formats.options import ReadOptions
+from pendpipe.formats.table import Column, NotThisFormatError, Table
+
+_RATES = ("fs", "samplerate", "sample_rate", "srate", "rate", "sampling_rate", "samplingrate")
+_INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat")
+
+
+def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the arrays of one length, with the names of the variables they are in.
+
+    Of several lengths the one is taken that the array the user named has, else the
+    longest that comes with a time.
+    """
+    if data[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in data[:128]:
+        raise InputError(
+            place, "this is a MATLAB 7.3 file (HDF5)", "save it in MATLAB with save(..., '-v7')"
+        )
+    if not data.startswith(b"MATLAB 5.0") and place.suffix.lower() != ".mat":
+        raise NotThisFormatError("the file does not begin with 'MATLAB 5.0'")
+    arrays = dict(_numbers(_load(place, data)))
+    columns = {name: values for name, values in arrays.items() if values.size > 3}
+    if not columns:
+        raise InputError(place, "there is no array of numbers in it", "save the time and the angle")
+    length = _length(columns, options)
+    chosen = {name: values for name, values in columns.items() if len(values) == length}
+    notes = []
+    left = [name for name in columns if name not in chosen]
+    if left:
+        notes.append(f"arrays of another length left out: {', '.join(left[:8])}")
+    chosen = _one_clock(chosen)
+    return Table(
+        place=place,
+        format="matlab-v5",
+        columns=tuple(
+            Column(name=name, unit="", values=values, number=number)
+            for number, (name, values) in enumerate(chosen.items(), start=1)
+        ),
+        interval_s=_interval(arrays),
+        notes=tuple(notes),
+    )
+
+
+def _load(place: Path, data: bytes) -> dict[str, Any]:
+    import io
+    import warnings
+
+    from scipy.io import loadmat
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            loaded = loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=True)
+    except Exception as fault:  # scipy raises whatever its parser stumbles on
+        raise InputError(
+            place, f"the MATLAB file can't be read ({fault})", "save it again with '-v7'"
+        ) from None
+    return {name: value for name, value in loaded.items() if not name.startswith("__")}
+
+
+def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, FloatArray]]:
+    """Walk through variables and structures; give every real array as columns with a name."""
+    if depth > 6:
+        return
+    if isinstance(tree, dict):
+        for name, value in tree.items():
+            yield from _numbers(value, f"{path}.{name}" if path else name, depth + 1)
+        return
+    array = np.asarray(tree)
+    if array.dtype.names:
+        if array.size == 1:
+            record = array.reshape(-1)[0]
+            yield from _numbers({name: record[name] for name in array.dtype.names}, path, depth)
+        return
+    if array.dtype == object:
+        for number, entry in enumerate(array.reshape(-1)[:64], start=1):
+            name = path if array.size == 1 else f"{path}({number})"
+            yield from _numbers(entry, name, depth + 1)
+        return
+    if array.dtype.kind not in "fiub" or array.ndim > 2 or not array.size:
+        return
+    # Simulink's "structure with time" keeps the readings in NAME.signals.values.
+    path = path.removesuffix(".signals.values").removesuffix(".values").removesuffix(".Data")
+    if array.ndim < 2:
+        yield path, np.atleast_1d(array).astype(np.float64)
+        return
+    tall = array if array.shape[0] >= array.shape[1] else array.T
+    if tall.shape[1] <= 64:
+        for number in range(tall.shape[1]):
+            yield f"{path}({number + 1})", np.ascontiguousarray(tall[:, number], dtype=np.float64)
+
+
+def _last(name: str) -> str:
+    """The last part of a dotted name, without a column's number."""
+    return name.rsplit(".", 1)[-1].split("(")[0]
+
+
+def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
+    for name, values in columns.items():
+        if options.reading_column in (name, _last(name)) or options.channel == name:
+            return len(values)
+    timed = [len(values) for name, values in columns.items() if role_of(_last(name)) == "time"]
+    paired = [n for n in timed if sum(len(values) == n for values in columns.values()) > 1]
+    return max(paired or [len(values) for values in columns.values()])
+
+
+def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Keep one of several equal time columns, and put it first."""
+    clocks: list[FloatArray] = []
+    first: dict[str, FloatArray] = {}
+    rest: dict[str, FloatArray] = {}
+    for name, values in columns.items():
+        if role_of(_last(name)) != "time":
+            rest[name] = values
+        elif not any(np.array_equal(values, clock) for clock in clocks):
+            clocks.append(values)
+            first[name] = values
+    return first | rest
+
+
+def _interval(arrays: dict[str, FloatArray]) -> float | None:
+    for name, values in arrays.items():
+        word = _last(name).lower()
+        if values.size == 1 and values[0] > 0 and word in _RATES:
+            return float(1.0 / values[0])
+        if values.size == 1 and values[0] > 0 and word in _INTERVALS:
+            return float(values[0])
+    return None

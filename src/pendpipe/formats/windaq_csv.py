@@ -1,0 +1,137 @@
+"""Spreadsheet exports of WinDaq: ``Relative Time,Date,...`` with units for names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.formats.cells import column_of_clock_times
+from pendpipe.formats.layout import Layout
+from pendpipe.formats.options import ReadOptions
+from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
+from pendpipe.formats.text import decode, table_of_text
+from pendpipe.formats.units import unit_of
+
+_CLOCK_NAMES = ("date", "time stamp", "timestamp", "clock")
+
+
+def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read an export; its columns are named by their units, so they go by their place.
+
+    Relative Time is rounded to microseconds: times are the index over the rate, where the
+    rounding allows. The last column holds ``Resume`` or a comment at an event; what the
+    clock columns gained over Relative Time there is the pause.
+    """
+    if b"elative Time" not in data[:4096].replace(b"\0", b""):
+        raise NotThisFormatError("there is no line that begins with 'Relative Time'")
+    text = decode(data)
+    lines = text.split("\n")
+    starts = (n for n, line in enumerate(lines) if re.match(r'\W*relative time', line, re.I))
+    top = next(starts, None)
+    if top is None:
+        raise NotThisFormatError("there is no line that begins with 'Relative Time'")
+    table = table_of_text(place, text, options, "windaq-csv")
+    sign = ";" if ";" in lines[top] else "\t" if "\t" in lines[top] else ","
+    layout = Layout(sign, ",", 0) if sign == ";" else Layout(sign, ".", 0)
+    names = [name.strip() for name in layout.split(lines[top])]
+    rows = [layout.split(lines[line - 1]) for line in (table.lines if table.lines is not None else ())]
+    time = next((column for column in table.columns if column.number == 1), None)
+    if time is None or time.fault is not None or not np.isfinite(time.values).all():
+        return table
+    seconds, pauses = _with_pauses(_evened(time.values), names, rows)
+    events = _events(names, rows, seconds)
+    columns = []
+    for column in table.columns:
+        label = names[column.number - 1] if column.number <= len(names) else ""
+        if column is time or label.lower().startswith(_CLOCK_NAMES) or "event" in label.lower():
+            continue
+        place_of = len(columns) + 1
+        unit = label if unit_of(label) else ""
+        columns.append(
+            replace(column, name=f"channel {place_of}", unit=unit or label, time_s=seconds)
+        )
+    start = _recorded_at(names, rows)
+    return replace(
+        table,
+        columns=tuple(columns),
+        markers=events,
+        metadata={**table.metadata, **({"recorded_at": start} if start else {})},
+        notes=(*table.notes, *pauses),
+    )
+
+
+def _evened(time: FloatArray) -> FloatArray:
+    """Undo the rounding of evenly spaced times, if it is no more than that."""
+    if len(time) < 3:
+        return time
+    rate = (len(time) - 1) / (time[-1] - time[0]) if time[-1] > time[0] else 0.0
+    if not rate:
+        return time
+    # WinDaq's rates are mostly whole: take the whole one if it fits as well.
+    for candidate in (float(round(rate)), rate):
+        if candidate <= 0:
+            continue
+        even = time[0] + np.arange(len(time)) / candidate
+        if np.abs(even - time).max() <= 1.5e-6:
+            return even
+    return time
+
+
+def _column_of(names: Sequence[str], words: Sequence[str]) -> int | None:
+    found = (i for i, name in enumerate(names) if any(word in name.lower() for word in words))
+    return next(found, None)
+
+
+def _clock(names: Sequence[str], rows: Sequence[Sequence[str]]) -> FloatArray | None:
+    """Read the time-of-day column."""
+    place = _column_of(names[1:], ("time stamp", "timestamp", "clock"))
+    if place is None or any(len(row) <= place + 1 for row in rows):
+        return None
+    return column_of_clock_times([row[place + 1] for row in rows])
+
+
+def _with_pauses(
+    time: FloatArray, names: Sequence[str], rows: Sequence[Sequence[str]]
+) -> tuple[FloatArray, list[str]]:
+    """Put the pauses back at rows marked ``Resume``, from the clock column's seconds."""
+    place = _column_of(names, ("event",))
+    clock = _clock(names, rows) if place is not None else None
+    if place is None or clock is None:
+        return time, []
+    time = time.copy()
+    notes = []
+    for row in range(1, len(rows)):
+        cells = rows[row]
+        if len(cells) <= place or cells[place].lower() != "resume":
+            continue
+        missing = (clock[row] - clock[row - 1]) - (time[row] - time[row - 1])
+        if missing > 1.0:
+            time[row:] += missing
+            notes.append(f"pause of {missing:.0f} s before row {row + 1}, by the clock column")
+    return time, notes
+
+
+def _events(
+    names: Sequence[str], rows: Sequence[Sequence[str]], time: FloatArray
+) -> tuple[Marker, ...]:
+    place = _column_of(names, ("event",))
+    if place is None:
+        return ()
+    return tuple(
+        Marker(row, float(time[row]), cells[place])
+        for row, cells in enumerate(rows)
+        if len(cells) > place and cells[place]
+    )
+
+
+def _recorded_at(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    date = _column_of(names, ("date",))
+    clock = _column_of(names[1:], ("time stamp", "timestamp", "clock"))
+    if date is None or clock is None or not rows or len(rows[0]) <= max(date, clock + 1):
+        return ""
+    return f"{rows[0][date]} {rows[0][clock + 1]}"

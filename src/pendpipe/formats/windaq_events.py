@@ -1,0 +1,167 @@
+"""What stands behind a WinDaq file's samples: events, annotations, comments; and pauses."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.formats.table import Marker
+from pendpipe.formats.windaq_header import WindaqHeader
+
+_COMMENT_FLAG: Final = -0x80000000
+_PAUSE: Final = 2.0
+"""Stamps are whole seconds: less than this is no pause."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event: scan, its stamp (seconds after the opening, where given), comment."""
+
+    scan: int
+    stamp_s: int | None
+    comment: str
+
+
+@dataclass(frozen=True)
+class Trailers:
+    """Events in the order of the file, and a text for each channel."""
+
+    events: tuple[Event, ...]
+    annotations: tuple[str, ...]
+
+
+def parse_trailers(
+    data: bytes, at: int, event_bytes: int, header: WindaqHeader, scans: int
+) -> Trailers | None:
+    """Read the trailers from byte `at`; ``None`` if what stands there can't be trailers.
+
+    Trailer 1 is a list of 32-bit integers: a pointer to a scan (to a sample, in HiRes
+    files), then a time stamp if the pointer is not negative, then a comment's place if the
+    next integer has its top bit set.
+    """
+    count = event_bytes // 4
+    if event_bytes % 4 or at + event_bytes > len(data):
+        return None
+    words = struct.unpack_from(f"<{count}i", data, at)
+    texts = data[at + event_bytes :]
+    per_scan = len(header.channels) if header.hires else 1
+    events: list[Event] = []
+    place, last = 0, -1
+    while place < count:
+        pointer = words[place]
+        place += 1
+        scan = abs(pointer) // per_scan
+        if not (last <= scan <= scans):
+            return None
+        stamp, comment = None, ""
+        if pointer >= 0:
+            if place >= count:
+                return None
+            stamp = words[place]
+            place += 1
+        # Pointers end at the number of samples; what lies far below zero is a comment.
+        if place < count and words[place] < _COMMENT_FLAG // 2:
+            offset = words[place] & 0x7FFFFFFF
+            place += 1
+            if offset >= len(texts):
+                return None
+            comment = texts[offset:].split(b"\0")[0].decode("latin-1").strip()
+        events.append(Event(scan, stamp, comment))
+        last = scan
+    names = tuple(text.decode("latin-1").strip() for text in texts.split(b"\0"))
+    return Trailers(tuple(events), names[: len(header.channels)])
+
+
+def _is_text(data: bytes) -> bool:
+    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data)
+
+
+def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers | None] | None:
+    """Find sizes under which a file with damaged ones makes sense from end to end.
+
+    The data size is sought among the header's with bits taken away (a bit that was set by
+    damage is the commonest fault), then among all. The trailers it implies must read as
+    events, then as texts to the end of the file.
+    """
+    unit = 2 * len(header.channels)
+    available = len(data) - header.size
+    tail = available // unit * unit
+    sizes = [size for size in _submasks(header.data_bytes) if 0 < size <= available]
+    for size in (size for size in sizes if size % unit == 0):
+        found = _consistent(data, header, size)
+        if found is not None:
+            return found
+    # A recording without comments ends a few hundred bytes after its samples.
+    for size in range(tail, max(tail - 4096, 0), -unit):
+        found = _consistent(data, header, size)
+        if found is not None and found[1] is not None and found[1].events:
+            return found
+    return None
+
+
+def _submasks(value: int) -> list[int]:
+    """List the numbers that have no bit which `value` has not, largest first."""
+    bits = [bit for bit in range(32) if value >> bit & 1]
+    if len(bits) > 12:
+        return []
+    masks = [0]
+    for bit in bits:
+        masks += [mask | 1 << bit for mask in masks]
+    return sorted(masks, reverse=True)
+
+
+def _consistent(
+    data: bytes, header: WindaqHeader, size: int
+) -> tuple[WindaqHeader, Trailers] | None:
+    """Try one data size: some length of the event list must leave texts to the end."""
+    at = header.size + size
+    rest = len(data) - at
+    for event_bytes in range(8, min(rest, 4096) + 1, 4):
+        texts = data[at + event_bytes :]
+        enough = texts.count(0) >= len(header.channels)
+        if not enough or not _is_text(texts) or struct.unpack_from("<i", data, at)[0] > 0:
+            continue
+        changed = replace(header, data_bytes=size, event_bytes=event_bytes)
+        trailers = parse_trailers(data, at, event_bytes, header, size // (2 * len(header.channels)))
+        if trailers is not None and trailers.events:
+            return changed, trailers
+    return None
+
+
+def scan_times(
+    header: WindaqHeader, scans: int, events: Sequence[Event]
+) -> tuple[FloatArray, list[str]]:
+    """Give every scan its time, pauses included.
+
+    WinDaq strings the samples together over a pause; only the stamp of the event that
+    follows tells of it. A stamp that is ahead of the samples by more than two seconds (and
+    more than 1 % of the time since the last event, which a rate may be off) is a pause,
+    known to a second.
+    """
+    time = np.arange(scans) * header.interval_s
+    notes = []
+    lag, since = 0.0, 0.0
+    for event in events:
+        if event.stamp_s is None or not 0 < event.scan < scans:
+            continue
+        expected = event.scan * header.interval_s + lag
+        missing = event.stamp_s - expected
+        if missing > max(_PAUSE, 0.01 * (expected - since)):
+            time[event.scan :] += missing
+            lag += missing
+            notes.append(f"pause of {missing:.0f} s before scan {event.scan}, by its time stamp")
+        since = event.stamp_s
+    return time, notes
+
+
+def markers(events: Sequence[Event], time_s: FloatArray) -> tuple[Marker, ...]:
+    """Turn events into markers of the recording."""
+    last = len(time_s) - 1
+    return tuple(
+        Marker(event.scan, float(time_s[min(event.scan, last)]), event.comment) for event in events
+    )
