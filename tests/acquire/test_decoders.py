@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -159,7 +160,7 @@ def test_how_the_bytes_are_cut_changes_nothing(
 ) -> None:
     data = damaged(b"".join(frame(scan) for scan in codes), damage)
     edges = [0, *sorted(cut % (len(data) + 1) for cut in cuts), len(data)]
-    pieces = [data[a:b] for a, b in zip(edges, edges[1:], strict=False)]
+    pieces = [data[a:b] for a, b in pairwise(edges)]
     whole_counts, whole_losses = decode(make(), data)
     counts, losses = decode(make(), *pieces)
     assert np.array_equal(counts, whole_counts)

@@ -107,7 +107,7 @@ def test_another_model_is_refused(script: Any) -> None:
 
 
 def test_di2108_session(script: Any) -> None:
-    echoed = ["encode 0", "slist 0 0", "slist 1 6", "srate 1200", "dec 500", "deca 1"]
+    echoed = ["encode 0", "slist 0 0", "slist 1 6", "srate 60000", "dec 10", "deca 1"]
     line = script(
         (b"stop\r", b"\x00\x40stop\r"),
         (b"info 0\r", b"info 0 DATAQ\r"),
@@ -116,14 +116,13 @@ def test_di2108_session(script: Any) -> None:
         (b"info 6\r", b"info 6 5F2A\r"),
         *[(f"{text}\r".encode(), f"{text}\r".encode()) for text in echoed],
         (b"filter * 0\r", b"filter * 0\r"),
-        (b"ps 1\r", b"ps 1\r"),
+        (b"ps 0\r", b"ps 0\r"),
         (b"start\r", bytes.fromhex("FF 7F 00 80 00 40")),
         (b"stop\r", b"\x01stop\r"),
     )
     driver = DI2108(line, FAST)
     identity = driver.identify()
     assert (identity.model, identity.firmware, identity.serial_number) == ("DI-2108", "141", "5F2A")
-    driver._divisors = lambda rate_hz: (1200, 500, 1)  # type: ignore[method-assign]
     assert driver.configure([1, 7], 100.0).rate_hz == 100.0
     driver.start()
     assert driver.read(1.0).counts.tolist() == [[32767, -32768]]

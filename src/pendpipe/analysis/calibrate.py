@@ -77,7 +77,9 @@ def calibrate(
         angle_sd_rad=angle_sd if known or not angle_sd.any() else np.sqrt(scale) * angle_sd,
         residual_sd_volts=float(np.sqrt(np.sum(residual**2) / (count - 2))),
         chi2_p_value=chi_square_p_value(chi2, count - 2) if known else float("nan"),
-        linearity=_linearity(placed, residual, weights, slope, known=known),
+        linearity=_linearity(placed, residual, weights, slope, known=known)
+        if count >= 5 and len(np.unique(angle_rad)) >= 4
+        else None,
     )
 
 
@@ -111,15 +113,13 @@ def _line(
 
 def _linearity(
     angle: FloatArray, residual: FloatArray, weights: FloatArray, slope: float, *, known: bool
-) -> Linearity | None:
+) -> Linearity:
     """Fit a cubic to the residuals of the line; test its two additional terms.
 
     The angles are those placed on the line: the measured ones share their errors with
     the residuals and would show a curve of their own.
     """
     count = len(angle)
-    if count < 5 or len(np.unique(angle)) < 4:
-        return None
     largest = float(np.max(np.abs(angle)))
     powers = np.vander(angle / largest, 4, increasing=True) * np.sqrt(weights)[:, np.newaxis]
     target = np.sqrt(weights) * residual

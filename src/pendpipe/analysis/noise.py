@@ -12,7 +12,7 @@ from pendpipe.arrays import FloatArray
 _ORDER: Final = 4
 _BLOCK: Final = 64
 _BLOCKS: Final = 2048
-_LATTICE: Final = 65536
+_LATTICE: Final = 8192
 
 
 def quantisation_rms(step: float | None) -> float:

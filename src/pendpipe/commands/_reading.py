@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("where a guess is wrong")
     group.add_argument("--channel", metavar="CHANNEL", help="number (from 1) or name, see inspect")
     group.add_argument(
-        "--column", metavar="COLUMN", help="number (from 1) or name; X,Y for a position; TIME:COLUMN"
+        "--column",
+        metavar="COLUMN",
+        help="number (from 1) or name; X,Y for a position; TIME:COLUMN",
     )
     group.add_argument("--unit", metavar="UNIT", help="rad, deg, V, mV, m, mm, ...; or ms:deg")
     group.add_argument("--sample-rate", metavar="HZ", type=float, help="samples a second")

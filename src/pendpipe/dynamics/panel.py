@@ -33,9 +33,9 @@ NODE_COUNT = DEGREE + 1
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
-COS, SIN, LOSS, BEFORE, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(0, 200, 20)
-BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(200, 320, 20)  # sensitivities.py
-NODE_SIZE = 320
+COS, SIN, LOSS, BEFORE, EARLIER, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(0, 220, 20)
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(220, 340, 20)  # sensitivities.py
+NODE_SIZE = 340
 
 # No exceptions, and no reference counts (which forbids to allocate): both cost more than they
 # are worth here. Multiplications and additions may be fused.
@@ -91,6 +91,7 @@ def place(node: FloatArray, placed: FloatArray, start: float, half_width: float)
         node[SIN + j] = math.sin(psi)
         node[LOSS + j] = 0.0
         node[BEFORE + j] = 0.0
+        node[EARLIER + j] = 0.0
 
 
 @kernel
@@ -118,8 +119,8 @@ def solve(
     Parameters
     ----------
     node
-        The workspace: cos and sin as `place` left them. Rows LOSS and BEFORE hold the solutions
-        of the last two half cycles on this panel, from which the first guess is extrapolated.
+        The workspace: cos and sin as `place` left them. LOSS, BEFORE and EARLIER hold the
+        solutions of the last three half cycles on this panel, from which the first guess is extrapolated.
         On return LOSS holds r/radius - 1, SLOPE its derivative by psi, SLIP 1/(1 - nu cos psi), and EXCESS tau - psi since the start of the panel.
     shape
         m, h, q, g.
@@ -128,10 +129,10 @@ def solve(
     """
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
     for j in range(NODE_COUNT):
-        guess = 2.0 * node[LOSS + j] - node[BEFORE + j]
-        node[BEFORE + j] = node[LOSS + j]
-        node[LOSS + j] = guess
-    before = 1.0
+        latest, before, earlier = node[LOSS + j], node[BEFORE + j], node[EARLIER + j]
+        node[EARLIER + j], node[BEFORE + j] = before, latest
+        node[LOSS + j] = 3.0 * (latest - before) + earlier
+    before = 0.0
     for _ in range(60):
         for j in range(NODE_COUNT):
             grown, cos, sin = 1.0 + node[LOSS + j], node[COS + j], node[SIN + j]
@@ -142,8 +143,8 @@ def solve(
             node[SLOPE + j] = -grown * force * sin / (reach - force * cos)
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = _renew(node, half_width)
-        # The error left is the change times the rate at which changes shrink.
-        if change * min(1.0, change / before) <= 1e-14 * size:
+        # The error left is the change times the rate at which changes shrink, once that is known.
+        if change <= 1e-13 * size or change * change <= 1e-13 * size * before:
             return _finish(node, shape, radius, half_width, tolerance)
         before = change
     return False

@@ -200,21 +200,22 @@ def _readings(channels: Sequence[Column]) -> tuple[tuple[Column, ...], tuple[str
     """Choose the reading by its name, then by its unit, then by how it swings."""
     alive = [column for column in channels if _moves(column)]
     pair = _position_pair(alive)
-    candidates: list[tuple[float, float, int, tuple[Column, ...]]] = []
-    for place, column in enumerate(alive):
+    candidates: list[tuple[float, float, tuple[Column, ...]]] = []
+    for column in alive:
         worth = _WORTH[meaning(column)]
         if worth <= 0:
             continue
-        # Among columns of equal worth with units told, the one that swings most is meant.
         swing = oscillation(column.values) if meaning(column) != "unknown" else 0.0
         unit = unit_of(column.unit)
-        candidates.append((worth, swing * (unit.factor if unit else 1.0), -place, (column,)))
+        candidates.append((worth, swing * (unit.factor if unit else 1.0), (column,)))
     if pair is not None:
-        candidates.append((5.0, 0.0, 0, pair))
+        candidates.append((5.0, 0.0, pair))
     if not candidates:
         return (), ()
-    best = max(candidates, key=lambda entry: entry[:3])
-    chosen = best[3]
+    worth = max(entry[0] for entry in candidates)
+    swing = max(entry[1] for entry in candidates if entry[0] == worth)
+    # The first of equals, unless another swings far more (a channel that nothing moves).
+    chosen = next(e[2] for e in candidates if e[0] == worth and e[1] >= swing / 3)
     labels = " and ".join(f"'{column.label}'" for column in chosen)
     others = [column.label for column in channels if column not in chosen]
     rest = f" (not {', '.join(others[:8])})" if others else ""
@@ -238,6 +239,9 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
         radius = np.hypot(x.values, y.values)
         radius = radius[np.isfinite(radius)]
         sided = abs(np.nanmean(np.sign(y.values))) > 0.95
-        if sided and np.std(radius) < 0.08 * np.mean(radius) and oscillation(x.values) > 0:
+        if not sided or np.std(radius) > 0.08 * np.mean(radius) or oscillation(x.values) == 0:
+            continue
+        # On a circle y follows x squared; two columns without names must show it.
+        if x.name or np.corrcoef(x.values**2, np.abs(y.values))[0, 1] < -0.5:
             return x, y
     return None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +32,7 @@ class Header:
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     interval_s: float | None = None
-    metadata: dict[str, str] | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -73,14 +73,15 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
         for cells in (layout.split(line.strip("\n")), layout.split(bare), bare.split()):
             while len(cells) > layout.width and not cells[-1]:
                 cells.pop()
-            texts = [cell for cell in cells if cell and not layout.is_number(cell)]
+            texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]
+            texts = [cell for cell in texts if not layout.is_number(cell)]
             if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
                 continue
             if len(cells) < layout.width and not is_comment(line):
                 continue
             if all(map(unit_of, cells)) and candidates and candidates[-1][0] == len(cells):
                 continue
-            if layout.width == 1 and len(bare.split()) > 4:
+            if layout.width == 1 and (len(bare.split()) > 4 or "," in bare or ":" in bare):
                 continue
             candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
             break
@@ -116,7 +117,7 @@ def _refuse_spoilt_rows(
 
 def _interval(lines: Sequence[str]) -> float | None:
     """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
-    for line, follower in zip(lines, [*lines[1:], ""], strict=True):
+    for line, follower in zip(lines, [*lines, ""][1:], strict=True):
         for words, inverse in ((_RATE_WORD, True), (_INTERVAL_WORD, False)):
             found = words.search(line)
             if found is None:
@@ -141,7 +142,7 @@ def _interval(lines: Sequence[str]) -> float | None:
 
 def _metadata(lines: Sequence[str]) -> dict[str, str]:
     """Keep ``key: value`` lines (with or without a comment sign) as they stand."""
-    kept = {}
+    kept = {"header": " ".join(lines)[:4000]}
     for line in lines[:200]:
         key, colon, value = line.strip().lstrip("#%/! ").partition(":")
         if colon and value.strip() and 0 < len(key) <= 40:

@@ -155,15 +155,15 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
     It has the usual width and at least half of its filled cells are numbers; so has the
     next row (a lone row of numbers above the block belongs to the header).
     """
-    rows = [
-        (place, _is_row(line, layout))
-        for place, line in enumerate(lines)
-        if line.strip() and not is_comment(line)
-    ]
-    for (place, fits), follower in zip(rows, [*rows[1:], (0, True)], strict=True):
-        if fits and follower[1]:
-            return place
-    fitting = [place for place, fits in rows if fits]
+    held: int | None = None
+    for place, line in enumerate(lines):
+        if not line.strip() or is_comment(line):
+            continue
+        fits = _is_row(line, layout)
+        if fits and held is not None:
+            return held
+        held = place if fits else None
+    fitting = [place for place, line in enumerate(lines) if _is_row(line, layout)]
     if not fitting:
         raise NotThisFormatError("no row of numbers was found")
     return fitting[0]

@@ -22,7 +22,7 @@ class Marker:
     comment: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
     """One column of a table, or one channel of an instrument.
 
@@ -62,7 +62,7 @@ class Column:
         return self.name or f"column {self.number}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """All that a reader found in a file.
 

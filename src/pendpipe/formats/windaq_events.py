@@ -78,7 +78,8 @@ def parse_trailers(
 
 
 def _is_text(data: bytes) -> bool:
-    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data)
+    high = sum(byte >= 0x80 for byte in data)
+    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data) and 8 * high <= len(data)
 
 
 def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers | None] | None:
@@ -121,7 +122,8 @@ def _consistent(
     """Try one data size: some length of the event list must leave texts to the end."""
     at = header.size + size
     rest = len(data) - at
-    for event_bytes in range(8, min(rest, 4096) + 1, 4):
+    # Texts can't be read as events, but events now and then as texts: the longest list first.
+    for event_bytes in range(min(rest, 4096) // 4 * 4, 7, -4):
         texts = data[at + event_bytes :]
         enough = texts.count(0) >= len(header.channels)
         if not enough or not _is_text(texts) or struct.unpack_from("<i", data, at)[0] > 0:

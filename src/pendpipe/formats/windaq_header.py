@@ -148,4 +148,6 @@ def _size(data: bytes) -> tuple[int, list[str]]:
 def _channel(data: bytes, at: int, place: int) -> Channel:
     slope, intercept = struct.unpack_from("<dd", data, at + 8)
     unit = data[at + 24 : at + 30].split(b"\0")[0].decode("latin-1").strip()
+    # DOS wrote the degree sign as byte 0xF8, which is another letter today.
+    unit = unit.replace("ø", "°")
     return Channel(place + 1, slope, intercept, unit, max(data[at + 31], 1))

@@ -60,7 +60,12 @@ def _instrument(record: Record) -> Recording:
         raise InputError(
             f"record {record.record}", "how long to record is not said", "give stop_s in seconds"
         )
-    return record_from_port(port, channel=record.channel, duration_s=record.stop_s)
+    if record.channel and not record.channel.isdecimal():
+        raise InputError(
+            f"record {record.record}", f"channel '{record.channel}' is no number", "mend the cell"
+        )
+    channel = int(record.channel) if record.channel else None
+    return record_from_port(port, channel=channel, duration_s=record.stop_s)
 
 
 def _file(record: Record) -> Recording:

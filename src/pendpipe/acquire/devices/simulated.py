@@ -109,12 +109,17 @@ class SimulatedDevice:
         fault: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._ending.set()
-        self._link.wake()
-        self._thread.join()
-        self._link.close()
+        self.unplug()
         if self.failure is not None:
             raise self.failure
+
+    def unplug(self) -> None:
+        """End the device and its line: the host's next read fails."""
+        if not self._ending.is_set():
+            self._ending.set()
+            self._link.wake()
+            self._thread.join()
+            self._link.close()
 
     def _live(self) -> None:
         """Serve the line until the end; a fault of the signal silences the device."""

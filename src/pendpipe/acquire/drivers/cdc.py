@@ -161,6 +161,6 @@ class DI2108(StreamReader):
 
 
 def _packet_code(bytes_per_second: float) -> int:
-    """Choose packets large enough for about twenty a second, so that none is old."""
+    """Choose the largest packets of which about twenty come in a second, or 16 bytes."""
     wanted = bytes_per_second / _PACKETS_PER_SECOND
-    return sum(size < wanted for size in _PACKETS[1:])
+    return sum(size <= wanted for size in _PACKETS[1:])

@@ -9,13 +9,14 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.fit.minimise import Quadratic, minimise
+from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.shape import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.physics.decay_gradient import amplitude_and_gradient
 
 NAMES: Final = ("a", "b", "c", "amplitude", "level")
-_LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, -np.inf])
+BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
     points
         Turning points with their errors.
     fixed
-        Values of a, b, c or amplitude that are held.
+        Values of a, b, c, amplitude or offset that are held.
     """
     time = points.time_s - points.time_s[0]
     side, weight = points.side, 1.0 / points.angle_sd_rad**2
@@ -76,7 +77,7 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
         )
 
     start, held = _start(points, fixed or {})
-    found = minimise(evaluate, start, _LOWER, held=held)
+    found = minimise(evaluate, start, BOUNDS, held=held)
     residual, _ = parts(found.value)
     model = measured - residual - shared * found.value[4]
     return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
@@ -95,4 +96,7 @@ def _start(points: TurningPoints, fixed: Mapping[str, float]) -> tuple[FloatArra
         if name in fixed:
             start[index] = fixed[name]
             held.append(index)
+    if "offset" in fixed:
+        start[4] = float(np.mean(points.level_rad)) - fixed["offset"]
+        held.append(4)
     return start, tuple(held)

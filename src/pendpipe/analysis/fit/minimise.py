@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.quadratic import bounded_step
+from pendpipe.analysis.fit.quadratic import Bounds, bounded_step
 from pendpipe.arrays import FloatArray
 
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
@@ -37,20 +37,20 @@ class Minimum(NamedTuple):
 def minimise(
     evaluate: Callable[[FloatArray], Quadratic],
     start: FloatArray,
-    lower: FloatArray,
+    bounds: Bounds,
     *,
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
     most: int = 60,
 ) -> Minimum:
-    """Minimise chi^2 by damped Gauss-Newton steps that respect lower bounds.
+    """Minimise chi^2 by damped Gauss-Newton steps that respect bounds.
 
     Parameters
     ----------
     evaluate
         chi^2, gradient and normal matrix at a point; an infinite chi^2 refuses it.
-    start, lower
-        Shape (n,); `lower` is -inf where there is no bound.
+    start, bounds
+        Where to begin, shape (n,), and within what.
     held
         Entries that are not fitted.
     tolerance
@@ -59,16 +59,16 @@ def minimise(
     most
         Greatest number of evaluations.
     """
-    value = np.maximum(start, lower)
+    value = bounds.clip(start)
     now = evaluate(value)
     level, spent = 0, 1
     while spent < most:
         damped = now.normal + _DAMPING[level] * np.diag(np.diag(now.normal))
-        step = bounded_step(damped, now.gradient, lower - value, held)
+        step = bounded_step(damped, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         if promised < tolerance and level < 3:
-            return Minimum(np.maximum(value + step, lower), _moved(now, step), True, spent)
-        trial = np.maximum(value + step, lower)
+            return Minimum(bounds.clip(value + step), _moved(now, step), True, spent)
+        trial = bounds.clip(value + step)
         then = evaluate(trial)
         spent += 1
         if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:

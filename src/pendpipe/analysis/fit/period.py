@@ -53,7 +53,7 @@ def period_excess(
 
 def fit_period(
     points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float,
-    *, held: float | None = None,
+    *, share: float | None = None, held: float | None = None,
 ) -> Period:  # fmt: skip
     """Fit a straight line to the times, in half cycles lengthened by the losses.
 
@@ -66,11 +66,14 @@ def fit_period(
         The turning points.
     amplitude, a, b, c
         What Eq. 14 made of them.
+    share
+        The hysteretic share of b, where it is known.
     held
         An angular frequency that is not to be fitted.
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
-    trials = [_line(points, amplitude, a, b, c, share, omega, held) for share in _SHARES]
+    shares = _SHARES if share is None else (share,) * 3
+    trials = [_line(points, amplitude, a, b, c, each, omega, held) for each in shares]
     middle = trials[1]
     spread = (trials[2][0] - trials[0][0]) / math.sqrt(12.0)
     matrix = middle[1] * max(middle[2], 1.0) if middle[2] > _LOUD else middle[1]

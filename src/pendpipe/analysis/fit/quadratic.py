@@ -3,57 +3,92 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 
 CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
+_FAR: Final = 8.0
+"""Standard deviations from which a bound is out of sight."""
+
+
+class Bounds(NamedTuple):
+    """Least and greatest value of each entry, infinite where there is none; shape (n,) each."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def about(self, value: FloatArray) -> Bounds:
+        """The bounds of a step from `value`."""
+        return Bounds(self.lower - value, self.upper - value)
+
+    def hold(self, value: FloatArray) -> bool:
+        """Whether all entries lie within, to rounding."""
+        slack = 1e-12
+        low = value >= self.lower - slack * np.abs(self.lower)
+        return bool(np.all(low & (value <= self.upper + slack * np.abs(self.upper))))
+
+    def clip(self, value: FloatArray) -> FloatArray:
+        """Put each entry within its bounds."""
+        return np.clip(value, self.lower, self.upper)
+
+    def walls(self, free: IntArray) -> list[tuple[int, float]]:
+        """The finite bounds of the free entries: index and value."""
+        return [
+            (int(j), float(side[j])) for j in free for side in self if np.isfinite(side[j])
+        ]
+
+    def distance(self, value: FloatArray) -> FloatArray:
+        """How far each entry is from its nearer bound."""
+        return np.minimum(value - self.lower, self.upper - value)
 
 
 def bounded_step(
     normal: FloatArray,
     gradient: FloatArray,
-    lowest: FloatArray,
+    bounds: Bounds,
     held: Sequence[int] = (),
 ) -> FloatArray:
-    """Minimise ``d' H d/2 - g' d`` with some entries of d bounded from below.
+    """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
 
-    Every subset of the bounds is tried: there are three or four, hence at most 16 small
+    Every set of active bounds is tried: there are three or four, hence some 20 small
     systems, and in the usual case, where no bound is met, one.
 
     Parameters
     ----------
     normal, gradient
         H, shape (n, n), positive definite in what is free, and g, shape (n,).
-    lowest
-        The least value of each entry of d, -inf where there is none, shape (n,).
+    bounds
+        Of d.
     held
         Entries that stay zero.
     """
     free = np.array([j for j in range(len(gradient)) if j not in held], dtype=np.int64)
     step = np.zeros(len(gradient))
     step[free] = _solve(normal[np.ix_(free, free)], gradient[free])
-    if np.all(step >= lowest):
+    if bounds.hold(step):
         return step
-    bounded = [int(j) for j in free if np.isfinite(lowest[j])]
+    walls = bounds.walls(free)
     best, least = step, math.inf
-    for size in range(1, len(bounded) + 1):
-        for active in combinations(bounded, size):
+    for size in range(1, len(walls) + 1):
+        for active in combinations(walls, size):
+            on = np.array([index for index, _ in active])
+            if len(set(on.tolist())) < size:
+                continue
             trial = np.zeros(len(gradient))
-            on = np.array(active)
-            trial[on] = lowest[on]
-            rest = np.array([j for j in free if j not in active], dtype=np.int64)
+            trial[on] = [wall for _, wall in active]
+            rest = np.setdiff1d(free, on)
             right = gradient[rest] - normal[np.ix_(rest, on)] @ trial[on]
             trial[rest] = _solve(normal[np.ix_(rest, rest)], right)
             value = 0.5 * trial @ normal @ trial - gradient @ trial
-            if value < least and np.all(trial >= lowest - 1e-12 * np.abs(lowest)):
+            if value < least and bounds.hold(trial):
                 best, least = trial, value
-    return np.maximum(best, lowest)
+    return bounds.clip(best)
 
 
 def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
@@ -85,7 +120,7 @@ def interval95(
     value: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
-    lower: FloatArray,
+    bounds: Bounds,
     index: int,
     held: Sequence[int] = (),
 ) -> tuple[float, float]:
@@ -97,8 +132,8 @@ def interval95(
         The bounded optimum, shape (n,).
     normal, gradient
         Of chi^2/2 there; the gradient (-d chi^2/2) is not zero at a bound that is met.
-    lower
-        The bounds, -inf where there is none.
+    bounds
+        Of the parameters.
     index
         The parameter.
     held
@@ -109,35 +144,27 @@ def interval95(
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    sd = math.sqrt(max(float(covariance(normal, held)[index, index]), 0.0))
+    deviations = np.sqrt(np.maximum(np.diag(covariance(normal, held)), 0.0))
+    sd = float(deviations[index])
     half = math.sqrt(CHI2_95) * sd
-    near = [
-        j for j in range(len(value))
-        if np.isfinite(lower[j]) and j not in held
-        and value[j] - lower[j] < 8.0 * math.sqrt(float(covariance(normal, held)[j, j]))
-    ]  # fmt: skip
-    if not near or sd == 0.0:
+    fitted = deviations > 0.0
+    if sd == 0.0 or not np.any(bounds.distance(value)[fitted] < _FAR * deviations[fitted]):
         return value[index] - half, value[index] + half
 
     def rise(distance: float) -> float:
         """Rise of chi^2 when the parameter is moved and the others follow."""
         pulled = gradient - normal[:, index] * distance
-        step = bounded_step(normal, pulled, lower - value, (*held, index))
+        step = bounded_step(normal, pulled, bounds.about(value), (*held, index))
         step[index] = distance
         return float(step @ normal @ step - 2.0 * gradient @ step)
 
-    ends = []
-    for sign in (-1.0, 1.0):
-        reach = sign * 12.0 * sd
-        if sign < 0 and value[index] + reach < lower[index]:
-            reach = float(lower[index] - value[index])
-        ends.append(value[index] + _crossing(rise, reach))
-    return ends[0], ends[1]
+    low = max(-_FAR * sd, float(bounds.lower[index] - value[index]))
+    high = min(_FAR * sd, float(bounds.upper[index] - value[index]))
+    return value[index] + _crossing(rise, low), value[index] + _crossing(rise, high)
 
 
-def _crossing(rise: object, reach: float) -> float:
+def _crossing(rise: Callable[[float], float], reach: float) -> float:
     """Where the rise comes to the 95 % point between 0 and `reach`; `reach` if it does not."""
-    assert callable(rise)
     if rise(reach) <= CHI2_95:
         return reach
     low, high = 0.0, reach

@@ -167,6 +167,8 @@ def _finish(
         level_coupling=float(np.mean(column["coupling"] * height)),
         noise_rms_rad=noise,
         step_rad=samples.step or 0.0,
+        start_s=float(samples.time_s[0]),
+        stop_s=float(samples.time_s[-1]),
         samples=len(samples),
         unit="m" if recording.quantity == "displacement_m" else "rad",
         wanders=level.wanders,

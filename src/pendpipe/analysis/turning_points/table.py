@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +16,9 @@ from pendpipe.files import replaced
 COLUMNS: Final = (
     "half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad",
 )  # fmt: skip
-_NUMBERS: Final = ("level_sd_rad", "level_coupling", "noise_rms_rad", "step_rad")
+_NUMBERS: Final = (
+    "level_sd_rad", "level_coupling", "noise_rms_rad", "step_rad", "start_s", "stop_s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class TurningPoints:
         Standard deviation of one reading, never below step/sqrt(12).
     step_rad
         The step of the readings, 0 where none is known.
+    start_s, stop_s
+        Times of the first and the last reading.
     samples
         How many readings went in.
     unit
@@ -62,6 +66,8 @@ class TurningPoints:
     level_coupling: float = 4.0 / np.pi
     noise_rms_rad: float = float("nan")
     step_rad: float = 0.0
+    start_s: float = 0.0
+    stop_s: float = 0.0
     samples: int = 0
     unit: str = "rad"
     wanders: bool = False
@@ -81,6 +87,11 @@ class TurningPoints:
         """+1 for the half cycles above the level, -1 for those below; shape (k,)."""
         alternating = 1.0 - 2.0 * ((self.half_cycle - self.half_cycle[0]) % 2)
         return np.copysign(alternating, alternating * float(np.sum(alternating * self.angle_rad)))
+
+    def first(self, count: int) -> TurningPoints:
+        """The first `count` of them."""
+        names = ("half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad")
+        return replace(self, **{name: getattr(self, name)[:count] for name in names})
 
     def covariance(self) -> FloatArray:
         """Covariance of the signed angles, shape (k, k): independent and shared parts."""

@@ -1,0 +1,300 @@
+"""A campaign's viscous losses beside Eq. 16: the drag's factor, C_H, the models with and without."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.exponents import Exponent, fit_exponent
+from pendpipe.analysis.losses import SeparatedRecord
+from pendpipe.analysis.significance import chi_square_p_value
+from pendpipe.analysis.viscous import (
+    SharedErrors,
+    Surroundings,
+    ViscousLosses,
+    shared_effects,
+    viscous_losses,
+)
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.estimate import Estimate
+
+
+@dataclass(frozen=True)
+class SharedEstimate:
+    """A number made from all records, its error split by where it comes from.
+
+    Parameters
+    ----------
+    estimate
+        Value with the total error.
+    sd_own
+        From the records' own errors.
+    sd_common
+        From all that the records share.
+    shared
+        The parts of `sd_common` by source, with their signs.
+    chi2, degrees_of_freedom, p_value
+        Of the records about it, with the shared errors in the covariance.
+    """
+
+    estimate: Estimate
+    sd_own: float
+    sd_common: float
+    shared: dict[str, float]
+    chi2: float
+    degrees_of_freedom: int
+    p_value: float
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What one theory says of the limiting Q of every record, beside what was measured.
+
+    Parameters
+    ----------
+    history, hysteresis
+        Whether the theory has Eq. 2's history term, and the internal friction.
+    quality_factor_limit
+        Its limits, shape (n,).
+    ratio
+        Those over the measured ones, shape (n,): above one where theory forgets a loss.
+    chi2, degrees_of_freedom
+        Of the measured rates about it, errors of k included.
+    """
+
+    history: bool
+    hysteresis: bool
+    quality_factor_limit: FloatArray
+    ratio: FloatArray
+    chi2: float
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All that `compare` finds.
+
+    Parameters
+    ----------
+    losses
+        The records that were compared, by frequency; the arrays below follow their order.
+    quality_factor_theory, quality_factor_theory_sd
+        Eq. 16 for each record, and its error from what is shared (k has no part in it).
+    quality_factor_steady, radius_over_depth
+        The steady Stokes law's Q, and a/delta.
+    drag_over_theory
+        Q_v of Eq. 16 over Q_v measured.
+    theory_factor
+        Inverse-variance mean of that (weights from the records' own errors).
+    history_coefficient
+        C_H of Eq. 2, fitted to the drag with the records' own weights.
+    exponents
+        Eq. 11 by branch.
+    steady_stokes_percent
+        How much the steady law underestimates the damping, least and most, per cent.
+    checks
+        The theories with and without history term and hysteresis.
+    budget
+        Relative error of `theory_factor` by source, the records' own first.
+    """
+
+    losses: ViscousLosses
+    quality_factor_theory: FloatArray
+    quality_factor_theory_sd: FloatArray
+    quality_factor_steady: FloatArray
+    radius_over_depth: FloatArray
+    drag_over_theory: FloatArray
+    theory_factor: SharedEstimate
+    history_coefficient: SharedEstimate
+    exponents: dict[str, Exponent]
+    steady_stokes_percent: tuple[float, float]
+    checks: tuple[ModelCheck, ...]
+    budget: dict[str, float]
+
+
+def compare(
+    records: Sequence[SeparatedRecord],
+    surroundings: dict[str, Surroundings],
+    errors: SharedErrors,
+) -> Comparison:
+    """Compare the records in water with Eq. 16.
+
+    Parameters
+    ----------
+    records
+        After Eq. 17; those without surroundings or moment of inertia are left out.
+    surroundings
+        Sphere and fluid by record.
+    errors
+        Of what the records share.
+
+    Raises
+    ------
+    InputError
+        If no record can be compared.
+    """
+    losses = viscous_losses(records, surroundings)
+    if not losses.records:
+        raise InputError(
+            "comparison", "no record swings in a fluid with a known sphere", "add a geometry"
+        )
+    factor = theory_factor(losses, errors)
+    steady = losses.drag_over_theory(0.0)
+    theory = losses.quality_factor_theory()
+    effects = shared_effects(ViscousLosses.quality_factor_theory, losses, errors)
+    return Comparison(
+        losses=losses,
+        quality_factor_theory=theory,
+        quality_factor_theory_sd=np.sqrt(sum(effect**2 for effect in effects.values())),
+        quality_factor_steady=losses.quality_factor_theory(0.0),
+        radius_over_depth=losses.radius_over_depth,
+        drag_over_theory=losses.drag_over_theory(),
+        theory_factor=factor,
+        history_coefficient=history_coefficient(losses, errors),
+        exponents=_exponents(records, surroundings, errors),
+        steady_stokes_percent=(
+            100.0 * float(np.min(steady) - 1.0),
+            100.0 * float(np.max(steady) - 1.0),
+        ),
+        checks=tuple(
+            check_model(losses, errors, history=history, hysteresis=hysteresis)
+            for history in (True, False)
+            for hysteresis in (True, False)
+        ),
+        budget={"the records themselves": factor.sd_own / abs(factor.estimate.value)}
+        | {
+            source: abs(effect / factor.estimate.value)
+            for source, effect in factor.shared.items()
+            if effect != 0.0
+        },
+    )
+
+
+def theory_factor(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
+    """Drag measured over Eq. 2: the inverse-variance mean of Q_v(Eq. 16)/Q_v measured."""
+    return _fit(losses, errors, _drag_over_theory)
+
+
+def history_coefficient(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
+    """Fit C_H of ``drag = 6 pi eta a (1 + C_H a/delta) v`` by weighted least squares.
+
+    The measured drag over the steady one, less 1, is C_H a/delta.
+    """
+    return _fit(losses, errors, _excess_over_steady)
+
+
+def check_model(
+    losses: ViscousLosses, errors: SharedErrors, *, history: bool, hysteresis: bool
+) -> ModelCheck:
+    """Compare the measured limits of Q with a theory that has or lacks two of its terms."""
+
+    def predicted(moved: ViscousLosses) -> FloatArray:
+        viscous = np.pi * moved.frequency_hz / moved.quality_factor_theory(float(history))
+        return viscous + hysteresis * moved.hysteretic_rate_per_s
+
+    def excess(moved: ViscousLosses) -> FloatArray:
+        return moved.rate_per_s + moved.hysteretic_rate_per_s - predicted(moved)
+
+    effects = shared_effects(excess, losses, errors)
+    rate = predicted(losses)
+    return ModelCheck(
+        history=history,
+        hysteresis=hysteresis,
+        quality_factor_limit=np.pi * losses.frequency_hz / rate,
+        ratio=(losses.rate_per_s + losses.hysteretic_rate_per_s) / rate,
+        chi2=_chi2(excess(losses), losses.rate_sd_per_s, effects),
+        degrees_of_freedom=len(rate),
+    )
+
+
+class _Line(NamedTuple):
+    """Points through which a line from the origin is drawn, each of shape (n,)."""
+
+    regressor: FloatArray
+    response: FloatArray
+    sd: FloatArray
+
+    def slope(self) -> float:
+        """The slope of weighted least squares."""
+        x, y = self.regressor / self.sd, self.response / self.sd
+        return float(np.sum(x * y) / np.sum(x * x))
+
+
+def _drag_over_theory(losses: ViscousLosses) -> _Line:
+    per_rate = losses.quality_factor_theory() / (np.pi * losses.frequency_hz)
+    return _Line(
+        np.ones_like(per_rate), per_rate * losses.rate_per_s, per_rate * losses.rate_sd_per_s
+    )
+
+
+def _excess_over_steady(losses: ViscousLosses) -> _Line:
+    per_rate = losses.quality_factor_theory(0.0) / (np.pi * losses.frequency_hz)
+    return _Line(
+        losses.radius_over_depth,
+        per_rate * losses.rate_per_s - 1.0,
+        per_rate * losses.rate_sd_per_s,
+    )
+
+
+def _fit(
+    losses: ViscousLosses, errors: SharedErrors, line_of: Callable[[ViscousLosses], _Line]
+) -> SharedEstimate:
+    """Fit the slope with the records' own weights; follow the shared errors into it."""
+    line = line_of(losses)
+    value = line.slope()
+    effects = shared_effects(lambda moved: line_of(moved).slope(), losses, errors)
+    shared = {source: float(effect) for source, effect in effects.items()}
+    sd_own = float(np.sum((line.regressor / line.sd) ** 2) ** -0.5)
+    sd_common = float(np.sqrt(sum(effect**2 for effect in shared.values())))
+
+    def residual(moved: ViscousLosses) -> FloatArray:
+        return line_of(moved).response - value * line_of(moved).regressor
+
+    spread = shared_effects(residual, losses, errors)
+    # The records are judged about their own best line, found with the same covariance.
+    chi2 = _chi2(residual(losses), line.sd, spread, line.regressor)
+    dof = len(line.sd) - 1
+    return SharedEstimate(
+        estimate=Estimate(value, float(np.hypot(sd_own, sd_common)), ""),
+        sd_own=sd_own,
+        sd_common=sd_common,
+        shared=shared,
+        chi2=chi2,
+        degrees_of_freedom=dof,
+        p_value=chi_square_p_value(chi2, dof),
+    )
+
+
+def _chi2(
+    residual: FloatArray,
+    sd: FloatArray,
+    effects: dict[str, FloatArray],
+    regressor: FloatArray | None = None,
+) -> float:
+    """chi^2 with the shared effects in the covariance, at the best slope if there is one."""
+    covariance = np.diag(sd**2) + sum(np.outer(effect, effect) for effect in effects.values())
+    factor = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(factor, residual)
+    if regressor is not None:
+        direction = np.linalg.solve(factor, regressor)
+        white = white - direction * (direction @ white) / (direction @ direction)
+    return float(white @ white)
+
+
+def _exponents(
+    records: Sequence[SeparatedRecord],
+    surroundings: dict[str, Surroundings],
+    errors: SharedErrors,
+) -> dict[str, Exponent]:
+    """Eq. 11 for each branch of two or more records."""
+    found = {}
+    for branch in sorted({split.measured.branch for split in records} - {""}):
+        members = [split for split in records if split.measured.branch == branch]
+        exponent = fit_exponent(viscous_losses(members, surroundings), errors)
+        if exponent is not None:
+            found[branch] = exponent
+    return found

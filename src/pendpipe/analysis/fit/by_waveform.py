@@ -1,0 +1,214 @@
+"""The refinement and the check: Eq. 8 on all the readings of a free decay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit import waveform
+from pendpipe.analysis.fit.assemble import (
+    Numbers,
+    estimates,
+    misfit,
+    propagated,
+    quality_factor,
+    wrapped,
+)
+from pendpipe.analysis.fit.assemble import warn as warnings_of
+from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.minimise import Minimum, minimise
+from pendpipe.analysis.fit.noise_model import Noise, judge_noise
+from pendpipe.analysis.fit.quadratic import covariance, interval95
+from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
+from pendpipe.analysis.fit.split import split_quality_factors
+from pendpipe.analysis.fit.start import Start, start_values, usable_span
+from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import turning_points_with_jacobian
+
+_GROWTH: Final = 1.6
+_LOST: Final = 1.0
+"""Phase in rad by which a model that has lost the oscillation is told."""
+
+
+class _Fitted(NamedTuple):
+    problem: Waveform
+    minimum: Minimum
+    held: tuple[int, ...]
+    start: Start
+
+
+def fit_waveform(
+    samples: Samples,
+    points: TurningPoints,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+) -> FitResult:
+    """Fit Eq. 8 to the readings, starting from the turning points.
+
+    Parameters
+    ----------
+    samples
+        The readings (`pendpipe.analysis.turning_points.samples.prepare`).
+    points
+        Their turning points.
+    baseline
+        ``"eq8"``, or ``"viscous"`` for Eq. 3.
+    fixed
+        Parameters that are held, by name.
+
+    Returns
+    -------
+    FitResult
+        Without ``cuts`` and ``provenance``, which the caller knows.
+
+    Notes
+    -----
+    The motion is started at a turning point before the first reading, so that every
+    reading counts. b is one parameter; how it divides into hysteretic and viscous is
+    marginalised: any share from 0 to 1 is as likely beforehand.
+    """
+    fixed = fixed or {}
+    fitted = _fit(samples, points, baseline, fixed)
+    residual = fitted.problem.residual(fitted.minimum.value)
+    dof = len(residual) - len(NAMES) + len(fitted.held)
+    noise = judge_noise(samples, points, residual, fitted.problem)
+    rms = float(np.sqrt(np.mean(residual**2)))
+    chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
+    stretched = max(misfit(chi2_per_dof, dof), noise.slow)
+    # The search weighed the readings by its own first guess of the noise.
+    scale = (fitted.problem.noise_rms / noise.rms) ** 2 / stretched
+    numbers, normal = _numbers(fitted, scale, points, samples)
+    parameters = estimates(numbers, points.unit)
+    result = FitResult(
+        method="waveform",
+        baseline=baseline,
+        parameters=parameters,
+        quality_factor_limit=quality_factor(parameters["b"], parameters["frequency"].value),
+        covariance_order=PARAMETERS,
+        covariance=numbers.covariance,
+        noise_rms_rad=noise.rms,
+        residual_rms_rad=rms,
+        chi2_per_dof=chi2_per_dof,
+        samples=len(residual),
+        turning_points=len(points),
+    )
+    hysteretic, viscous, said = split_quality_factors(
+        fitted.minimum.value, covariance(normal, fitted.held), fixed
+    )
+    warnings = [*points.notes, *warnings_of(result, stretched), *said, *fitted.start.warnings]
+    if not fitted.minimum.converged:
+        warnings.append("the waveform fit did not settle")
+    return replace(
+        result,
+        quality_factor_hysteretic=hysteretic,
+        quality_factor_viscous=viscous,
+        warnings=tuple(warnings),
+    )
+
+
+def _fit(
+    samples: Samples, points: TurningPoints, baseline: Baseline, fixed: Mapping[str, float]
+) -> _Fitted:
+    """Start from the turning points; grow the window where the phase would slip."""
+    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
+    start = start_values(points, held_rates, fixed, baseline)
+    held = _held(held_rates, fixed, parts, baseline)
+    span = usable_span(samples, points, start)
+    value, used = start.value, start.reliable
+    while True:
+        stop = span.stop if used >= len(points) else _after(samples, points, used, span)
+        part = slice(span.start, stop)
+        problem = Waveform(
+            samples.time_s[part], samples.values[part], points.noise_rms_rad, parts
+        )
+        minimum = minimise(problem.evaluate, value, waveform.BOUNDS, held=held)
+        if used >= len(points):
+            return _Fitted(problem, minimum, held, start)
+        value = minimum.value
+        used = min(len(points), math.ceil(_GROWTH * used))
+
+
+def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> int:
+    """The reading after the `used`-th turning point."""
+    found = int(np.searchsorted(samples.time_s, points.time_s[used - 1], side="right"))
+    return min(max(found, span.start + 4 * len(NAMES)), span.stop)
+
+
+def _held(
+    held_rates: Mapping[str, float], fixed: Mapping[str, float], parts: Mapping[str, float],
+    baseline: Baseline,
+) -> tuple[int, ...]:  # fmt: skip
+    """Indices of what is not fitted."""
+    index = {"a": 0, "b": 1, "c": 2, "amplitude": waveform.ANGLE, "offset": waveform.OFFSET}
+    held = [index[name] for name in held_rates]
+    if "frequency" in fixed:
+        held.append(waveform.OMEGA)
+    if parts or baseline == "viscous" or held_rates.get("b") == 0.0:
+        held.append(SHARE)
+    return tuple(held)
+
+
+def _numbers(
+    fitted: _Fitted, scale: float, points: TurningPoints, samples: Samples
+) -> tuple[Numbers, FloatArray]:
+    """The seven parameters, with covariance; and the normal matrix at the right noise."""
+    value, held = fitted.minimum.value, fitted.held
+    quadratic = fitted.minimum.quadratic
+    normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
+    normal[SHARE, SHARE] += (1.0 - scale) * waveform.PRIOR_INVERSE
+    first, jacobian = _first_turning_point(fitted, float(samples.time_s[0]))
+    matrix = propagated(jacobian, covariance(normal, held))
+    numbers = np.array(
+        [*value[:3], 0.5 * value[waveform.OMEGA] / math.pi, first[0], first[1],
+         value[waveform.OFFSET]]
+    )  # fmt: skip
+    intervals = {
+        name: interval95(value, normal, gradient, waveform.BOUNDS, index, held)
+        for index, name in enumerate("abc")
+    }
+    at_bound = [
+        name for index, name in enumerate("abc") if index not in held and value[index] <= 0.0
+    ]
+    return Numbers(numbers, matrix, intervals, at_bound), normal
+
+
+def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
+    """Amplitude at the first turning point kept, phase at the first reading; derivatives.
+
+    Returns
+    -------
+    amplitude_and_phase
+        In rad.
+    jacobian
+        Of the seven parameters of the result by ours, shape (7, 8).
+    """
+    value = fitted.minimum.value
+    model, release = fitted.problem.model(value)
+    count = fitted.start.before + 1
+    turning, by_time, by_angle = turning_points_with_jacobian(model, release, count)
+    change = fitted.problem.change(value)
+    late, high = by_time[-1] @ change, by_angle[-1] @ change
+    time, side = float(turning.time_s[-1]), math.copysign(1.0, release.angle_rad)
+    side *= -1.0 if fitted.start.before % 2 else 1.0
+    omega = float(value[waveform.OMEGA])
+    amplitude = side * (float(turning.angle_rad[-1]) - release.offset_rad)
+    jacobian = np.zeros((7, 8))
+    jacobian[0, 0] = jacobian[1, 1] = jacobian[2, 2] = jacobian[6, waveform.OFFSET] = 1.0
+    jacobian[3, waveform.OMEGA] = 0.5 / math.pi
+    jacobian[4] = side * high
+    jacobian[4, waveform.OFFSET] -= side
+    jacobian[5] = -omega * late
+    jacobian[5, waveform.OMEGA] += start_s - time
+    phase = wrapped(omega * (start_s - time) + (0.0 if side > 0 else math.pi))
+    return (amplitude, phase), jacobian
+
+
+__all__ = ["Noise", "fit_waveform"]

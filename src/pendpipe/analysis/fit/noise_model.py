@@ -1,0 +1,64 @@
+"""The noise of the readings about a fitted waveform: white, rounding, and slow."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.waveform import Waveform
+from pendpipe.analysis.noise import quantisation_rms, white_rms
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+
+_CHANCE: Final = 5.0
+_COARSE: Final = 12.0
+"""Readings in a half cycle below which differences see the motion's own misfit."""
+
+
+class Noise(NamedTuple):
+    """Noise of one reading, and how much more there is at the motion's frequency."""
+
+    rms: float
+    slow: float
+    """Variance of the half cycles' amplitudes over what white noise makes of it; 1 where
+    chance explains the difference."""
+
+
+def judge_noise(
+    samples: Samples, points: TurningPoints, residual: FloatArray, problem: Waveform
+) -> Noise:
+    """Estimate the noise from what the fit leaves.
+
+    The white part comes from fourth differences, which a slow misfit cannot touch, and is
+    never taken below step/sqrt(12). What a, b, c suffer from is the noise at the motion's
+    own frequency: drifts and misfits show there as scatter of the half cycles' residual
+    amplitudes.
+    """
+    floor = quantisation_rms(samples.step)
+    per_half_cycle = len(residual) / max(len(points), 1)
+    if samples.counts or per_half_cycle < _COARSE:
+        rms = math.sqrt(float(np.mean(residual**2)))
+    else:
+        rms = white_rms(residual)
+    rms = max(rms, floor, 1e-15 * float(np.max(np.abs(problem.values))))
+    return Noise(rms, _slow(points, residual, problem.time_s, rms))
+
+
+def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
+    """Scatter of the residual's amplitude in each half cycle against white noise's."""
+    middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
+    where = np.searchsorted(time, middles)
+    where = np.unique(where[(where > 0) & (where < len(time))])
+    if len(where) < 9:
+        return 1.0
+    number = np.searchsorted(middles, time)
+    centre, width = points.time_s[number], float(np.median(np.diff(points.time_s)))
+    form = np.cos(np.clip((time - centre) * (np.pi / width), -0.5 * np.pi, 0.5 * np.pi))
+    starts = np.concatenate([[0], where])
+    products = np.add.reduceat(residual * form, starts)[1:-1]
+    squares = np.add.reduceat(form * form, starts)[1:-1]
+    ratio = float(np.mean(products**2 / np.maximum(squares, 1e-12))) / rms**2
+    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(products)) else 1.0

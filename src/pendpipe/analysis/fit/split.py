@@ -1,0 +1,57 @@
+"""How b divides into hysteretic and viscous: only as far as Eq. 8's form is believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.waveform import OMEGA, SHARE, B
+from pendpipe.arrays import FloatArray
+from pendpipe.estimate import Estimate
+
+_KNOWN: Final = 0.1
+"""Standard deviation of the share (0 to 1) below which the waveform has told it."""
+_CAVEAT: Final = (
+    "quality_factor_hysteretic and quality_factor_viscous hold given Eq. 8's form: they rest on"
+    " a third harmonic that another form of drag, or the sensor, would swamp"
+)
+
+
+def split_quality_factors(
+    value: FloatArray, covariance: FloatArray, fixed: Mapping[str, float]
+) -> tuple[Estimate | None, Estimate | None, list[str]]:
+    """Quality factors of the two parts of b, where they are held or well known.
+
+    Returns
+    -------
+    hysteretic, viscous
+        None where the record does not tell them.
+    warnings
+        A clause each.
+    """
+    names = ("quality_factor_hysteretic", "quality_factor_viscous")
+    held = {name: Estimate(fixed[name], 0.0, "") for name in names if name in fixed}
+    if held:
+        return held.get(names[0]), held.get(names[1]), []
+    sd = math.sqrt(max(float(covariance[SHARE, SHARE]), 0.0))
+    if not 0.0 < sd < _KNOWN or value[B] <= 0.0:
+        return None, None, []
+    b, share = float(value[B]), float(value[SHARE])
+    both = np.ix_([B, SHARE], [B, SHARE])
+    parts = []
+    for part, gradient in ((share, [share, b]), (1.0 - share, [1.0 - share, -b])):
+        rate_sd = math.sqrt(float(np.array(gradient) @ covariance[both] @ np.array(gradient)))
+        parts.append(_quality_factor(part * b, rate_sd, float(value[OMEGA])))
+    return parts[0], parts[1], [_CAVEAT]
+
+
+def _quality_factor(rate: float, sd: float, omega: float) -> Estimate | None:
+    """omega/(2 rate), its interval from the rate's; None where the rate may be zero."""
+    low, high = rate - 1.96 * sd, rate + 1.96 * sd
+    if low <= 0.0:
+        return None
+    half = 0.5 * omega
+    return Estimate(half / rate, half * sd / rate**2, "", (half / high, half / low))

@@ -1,0 +1,140 @@
+"""Where the waveform fit begins: the turning points' answer, put before the first reading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.by_points import share_of
+from pendpipe.analysis.fit.envelope import fit_envelope
+from pendpipe.analysis.fit.fixed import loss_rates_of
+from pendpipe.analysis.fit.period import fit_period, period_excess
+from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.physics.decay import amplitude, time_at
+
+_SURE: Final = 0.7
+"""Phase in rad by which the start may be off: half a radian and some more converges."""
+_STOP: Final = 6.0
+"""In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
+
+
+class Start(NamedTuple):
+    """Where the search begins."""
+
+    value: FloatArray
+    before: int
+    """Half cycles from the release to the first turning point kept."""
+    reliable: int
+    """How many turning points the start predicts to a fraction of a radian."""
+    warnings: tuple[str, ...]
+
+
+def start_values(
+    points: TurningPoints,
+    held: Mapping[str, float],
+    fixed: Mapping[str, float],
+    baseline: Baseline,
+) -> Start:
+    """Turn a fit of the turning points into the waveform's eight parameters.
+
+    The release is a turning point before the first reading (a virtual one, if need be),
+    unless the amplitude is held: then it is the first turning point itself.
+    """
+    envelope = fit_envelope(points, held)
+    a, b, c, y0, level = (float(number) for number in envelope.value)
+    parts = loss_rates_of(fixed, points.apparent_frequency_hz)
+    share = share_of(parts, b, baseline)
+    omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
+    period = fit_period(points, envelope.amplitude, a, b, c, share=share, held=omega)
+    known, reliable, warnings = period, len(points), []
+    late = _lateness(points, envelope.amplitude, (a, b, c), known.angular_frequency, known.time_s)
+    if np.max(np.abs(late)) > _SURE and omega is None:
+        reliable = _sure_part(points, envelope.amplitude, (a, b, c))
+        part = points.first(reliable)
+        known = fit_period(part, envelope.amplitude[:reliable], a, b, c, share=share)
+        warnings.append(
+            "the period changes with the amplitude or the time as Eq. 8's does not:"
+            f" {np.ptp(late):.2g} rad of phase along the record"
+        )
+    angle, time, before = _release(points, (a, b, c, y0), known, "amplitude" in fixed)
+    value = np.array(
+        [a, b, c, known.angular_frequency, angle, time,
+         float(np.mean(points.level_rad)) - level, 0.5 if share is None else share]
+    )  # fmt: skip
+    return Start(value, before, reliable, tuple(warnings))
+
+
+def _lateness(
+    points: TurningPoints, amplitudes: FloatArray, rates: tuple[float, float, float],
+    omega: float, first_s: float,
+) -> FloatArray:  # fmt: skip
+    """Phase in rad by which each turning point is later than a frequency says."""
+    excess = period_excess(amplitudes, omega, *rates, 0.5)
+    stretch = np.concatenate([[0.0], np.cumsum(0.5 * (excess[1:] + excess[:-1])
+                                               * np.diff(points.half_cycle))])  # fmt: skip
+    late = omega * (points.time_s - first_s) - math.pi * (points.half_cycle + stretch)
+    # What is not known to a fraction of a radian accuses nobody.
+    return np.asarray(np.where(omega * points.time_sd_s < 0.2, late, 0.0))
+
+
+def _sure_part(
+    points: TurningPoints, amplitudes: FloatArray, rates: tuple[float, float, float]
+) -> int:
+    """The longest beginning over which one frequency describes the times."""
+    count = len(points)
+    while count > 4:
+        count = max(4, int(0.7 * count))
+        part = points.first(count)
+        period = fit_period(part, amplitudes[:count], *rates)
+        late = _lateness(
+            part, amplitudes[:count], rates, period.angular_frequency, period.time_s
+        )
+        if np.max(np.abs(late)) < 0.5 * _SURE:
+            break
+    return count
+
+
+def _release(
+    points: TurningPoints, values: tuple[float, float, float, float], period: object,
+    at_first: bool,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Angle and time of the release, and half cycles from it to the first turning point."""
+    a, b, c, y0 = values
+    omega, first_s = period.angular_frequency, period.time_s  # type: ignore[attr-defined]
+    side = float(points.side[0])
+    if at_first:
+        return side * y0, first_s, 0
+    half_period = math.pi / omega
+    before = max(1, math.ceil((first_s - points.start_s) / half_period + 0.05))
+    back = before * half_period
+    earlier = float(amplitude(-back, y0, a, b, c))
+    if not earlier < 20.0 * y0:
+        earlier = y0 * math.exp(min((a * y0 + b + c / y0) * back, 3.0))
+    return side * (-1.0) ** before * earlier, first_s - back, before
+
+
+def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
+    """The readings that are compared: while the motion is seen, and not about the stop.
+
+    Where Coulomb friction has stopped the pendulum is a discontinuous function of the
+    parameters; so the last half cycles before the stop are left out.
+    """
+    a, b, c, omega = (float(number) for number in start.value[:4])
+    half_period = math.pi / omega
+    first = float(start.value[5]) if start.before == 0 else samples.time_s[0]
+    last = float(points.time_s[-1]) + 0.5 * half_period
+    width = 0.5 * half_period * c
+    y0 = float(points.amplitude_rad[0])
+    if 0.0 < _STOP * width < y0:
+        last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
+    least = float(points.time_s[min(3, len(points) - 1)])
+    begin = int(np.searchsorted(samples.time_s, first))
+    if start.before == 0:
+        begin = int(np.searchsorted(samples.time_s, first + 0.05 * half_period))
+    return slice(begin, int(np.searchsorted(samples.time_s, max(last, least), side="right")))

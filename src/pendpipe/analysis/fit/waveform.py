@@ -1,0 +1,113 @@
+"""Eq. 8 on all the readings, by Gauss-Newton with the engine's exact sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.minimise import Quadratic
+from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
+
+NAMES: Final = ("a", "b", "c", "omega", "angle", "time", "offset", "share")
+A, B, C, OMEGA, ANGLE, TIME, OFFSET, SHARE = range(8)
+BOUNDS: Final = Bounds(
+    np.array([0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, 0.0]),
+    np.array([np.inf] * 7 + [1.0]),
+)
+_PIECE: Final = 1 << 16
+PRIOR_SHARE: Final = 0.5
+PRIOR_INVERSE: Final = 12.0
+"""Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """chi^2 of the readings against Eq. 8.
+
+    Parameters
+    ----------
+    time_s, values
+        The readings, shape (n,).
+    noise_rms
+        Standard deviation of one.
+    split
+        What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
+        held fixed; empty when the share is marginalised over its prior.
+    """
+
+    time_s: FloatArray
+    values: FloatArray
+    noise_rms: float
+    split: Mapping[str, float]
+
+    def model(self, value: FloatArray) -> tuple[Eq8, Release]:
+        """What moves, and from where, for a set of parameters."""
+        hysteretic, viscous = self.parts(value)
+        return (
+            Eq8(value[OMEGA], value[A], hysteretic, viscous, value[C]),
+            Release(value[TIME], value[ANGLE], value[OFFSET]),
+        )
+
+    def parts(self, value: FloatArray) -> tuple[float, float]:
+        """The hysteretic and the viscous part of b."""
+        b = float(value[B])
+        if "hysteretic" in self.split:
+            return min(self.split["hysteretic"], b), max(b - self.split["hysteretic"], 0.0)
+        if "viscous" in self.split:
+            return max(b - self.split["viscous"], 0.0), min(self.split["viscous"], b)
+        return float(value[SHARE]) * b, (1.0 - float(value[SHARE])) * b
+
+    def residual(self, value: FloatArray) -> FloatArray:
+        """Readings less model, shape (n,)."""
+        return self.values - sample(*self.model(value), self.time_s)
+
+    def evaluate(self, value: FloatArray) -> Quadratic:
+        """chi^2, gradient and normal matrix, summed over pieces of the record."""
+        size = len(NAMES)
+        refused = Quadratic(np.inf, np.zeros(size), np.eye(size))
+        model, release = self.model(value)
+        if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
+            return refused
+        chi2, gradient, normal = 0.0, np.zeros(size), np.zeros((size, size))
+        for first in range(0, len(self.time_s), _PIECE):
+            piece = slice(first, first + _PIECE)
+            try:
+                angle, raw = sample_with_jacobian(model, release, self.time_s[piece])
+            except ValueError:
+                # Overdamped: far from anything that turns.
+                return refused
+            residual = self.values[piece] - angle
+            chi2 += float(residual @ residual)
+            gradient += raw.T @ residual
+            normal += raw.T @ raw
+        change = self.change(value)
+        weight = self.noise_rms**-2
+        gradient, normal = change.T @ gradient * weight, change.T @ normal @ change * weight
+        return self._with_prior(value, Quadratic(chi2 * weight, gradient, normal))
+
+    def change(self, value: FloatArray) -> FloatArray:
+        """Derivative of the engine's parameters by ours, shape (8, 8)."""
+        share = float(value[SHARE])
+        if "hysteretic" in self.split:
+            by_b, by_share = (0.0, 1.0), 0.0
+        elif "viscous" in self.split:
+            by_b, by_share = (1.0, 0.0), 0.0
+        else:
+            by_b, by_share = (share, 1.0 - share), float(value[B])
+        change = np.zeros((8, 8))
+        change[0, A] = change[3, C] = change[4, OMEGA] = 1.0
+        change[5, ANGLE] = change[6, TIME] = change[7, OFFSET] = 1.0
+        change[1:3, B] = by_b
+        change[1:3, SHARE] = by_share, -by_share
+        return change
+
+    def _with_prior(self, value: FloatArray, likelihood: Quadratic) -> Quadratic:
+        off = float(value[SHARE]) - PRIOR_SHARE
+        likelihood.gradient[SHARE] -= PRIOR_INVERSE * off
+        likelihood.normal[SHARE, SHARE] += PRIOR_INVERSE
+        return likelihood._replace(chi2=likelihood.chi2 + PRIOR_INVERSE * off**2)

@@ -1,0 +1,182 @@
+"""The half cycles of a record, read off coarsely: when, how far, from where to where.
+
+This is for finding out which part of a record is one free decay, not for measuring:
+turning points are read off a thinned record, without a fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+
+_PER_HALF_CYCLE: Final = 40
+"""Samples a half cycle that are kept: a turning point is then low by 0.03 %."""
+
+
+@dataclass(frozen=True)
+class HalfCycles:
+    """Swings from one turning point to the next.
+
+    Parameters
+    ----------
+    turn_time_s, turn
+        Times and values of the m + 1 turning points.
+    swing
+        Distances between neighbouring turning points, shape (m,), > 0.
+    middle_s
+        When the middle between the two turning points is passed, shape (m,).
+    step
+        The least reversal that was counted, in the unit of the values.
+    """
+
+    turn_time_s: FloatArray
+    turn: FloatArray
+    swing: FloatArray
+    middle_s: FloatArray
+    step: float
+
+    def __len__(self) -> int:
+        return len(self.swing)
+
+
+def noise_of(values: FloatArray, resolution: float | None) -> float:
+    """Estimate the readings' noise from the quietest of twenty parts of the record.
+
+    The third difference of neighbours (which a smooth motion passes by) over sqrt(20), by
+    its median; never below the step over sqrt(12).
+    """
+    floor = (resolution or 0.0) / np.sqrt(12.0)
+    if len(values) < 80:
+        return float(floor)
+    third = np.abs(np.diff(values, 3))
+    parts = np.array_split(third, 20)
+    return float(max(floor, min(float(np.median(part)) for part in parts) / 0.6745 / np.sqrt(20.0)))
+
+
+def turning_samples(values: FloatArray, least: float) -> IntArray:
+    """Find the samples at which the motion turns by more than `least`, alternately up and down.
+
+    The first and the last sample are included where they are extremes of their own swing.
+    """
+    if len(values) < 2:
+        return np.zeros(0, dtype=np.int64)
+    # Only where the slope changes sign can be an extreme: this shortens the loop.
+    slope = np.sign(np.diff(values))
+    moving = np.flatnonzero(slope)
+    if not len(moving):
+        return np.zeros(0, dtype=np.int64)
+    changes = moving[1:][slope[moving[1:]] != slope[moving[:-1]]]
+    before = moving[:-1][slope[moving[1:]] != slope[moving[:-1]]] + 1
+    candidates = np.unique(np.concatenate(([0], before, changes, [len(values) - 1])))
+    turns: list[int] = []
+    low = high = int(candidates[0])
+    direction = 0
+    readings = values.tolist()
+    for at in candidates.tolist():
+        reading = readings[at]
+        if reading > readings[high]:
+            high = at
+        if reading < readings[low]:
+            low = at
+        if direction >= 0 and readings[high] - reading > least:
+            if direction or low != high:
+                turns.append(high)
+            direction, low = -1, at
+        elif direction <= 0 and reading - readings[low] > least:
+            if direction or low != high:
+                turns.append(low)
+            direction, high = 1, at
+        if direction > 0:
+            low = at if reading < readings[low] else low
+    if direction:
+        turns.append(high if direction > 0 else low)
+    return np.array(turns, dtype=np.int64)
+
+
+def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) -> IntArray:
+    """Take out swings that are small beside both neighbours.
+
+    In a free decay each swing is at least as large as the next, so none is small beside
+    both; a wiggle within a swing is.
+    """
+    kept: list[int] = []
+    for turn in turns.tolist():
+        kept.append(turn)
+        while len(kept) >= 4:
+            a, b, c, d = (float(values[at]) for at in kept[-4:])
+            if abs(c - b) >= share * min(abs(b - a), abs(d - c)):
+                break
+            del kept[-3:-1]
+    return np.array(kept, dtype=np.int64)
+
+
+def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
+    """Estimate the half period from the large swings; ``None`` if there are not two."""
+    span = float(np.ptp(values))
+    for share in (0.2, 0.05, 0.02):
+        turns = without_ripples(values, turning_samples(values, share * span))
+        if len(turns) >= 4:
+            return float(np.median(np.diff(time_s[turns])))
+    return None
+
+
+def thinned(
+    time_s: FloatArray, values: FloatArray, half_period_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Put the record on an even grid of about 40 points a half cycle.
+
+    Single wild readings go first (a median of three), then dense samples into means; a cell
+    without samples, as between the counts of an encoder, is left out.
+    """
+    step = half_period_s / _PER_HALF_CYCLE
+    if float(np.median(np.diff(time_s))) > 0.5 * step:
+        return time_s, _median3(values)
+    # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
+    cell = np.floor(time_s / step).astype(np.int64)
+    starts = np.flatnonzero(np.diff(cell, prepend=cell[0] - 1))
+    counts = np.diff(np.append(starts, len(values)))
+    smooth = _median3(values)
+    return np.add.reduceat(time_s, starts) / counts, np.add.reduceat(smooth, starts) / counts
+
+
+def _median3(values: FloatArray) -> FloatArray:
+    """Median of each sample and its neighbours."""
+    if len(values) < 3:
+        return values.copy()
+    out = values.copy()
+    a, b, c = values[:-2], values[1:-1], values[2:]
+    out[1:-1] = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
+    return out
+
+
+def half_cycles(
+    time_s: FloatArray, values: FloatArray, least: float, half_period_s: float
+) -> HalfCycles:
+    """Read off the half cycles whose swing exceeds `least`."""
+    time, smooth = thinned(time_s, values, half_period_s)
+    turns = without_ripples(smooth, turning_samples(smooth, least))
+    extremes = smooth[turns]
+    middle = [
+        _passage(time[a : b + 1], smooth[a : b + 1])
+        for a, b in zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True)
+    ]
+    return HalfCycles(
+        turn_time_s=time[turns],
+        turn=extremes,
+        swing=np.abs(np.diff(extremes)),
+        middle_s=np.array(middle, dtype=np.float64),
+        step=least,
+    )
+
+
+def _passage(time: FloatArray, values: FloatArray) -> float:
+    """Find when a swing passes the middle between its ends, for the last time."""
+    above = values > 0.5 * (values[0] + values[-1])
+    at = int(np.flatnonzero(above[1:] != above[:-1])[-1])
+    middle = 0.5 * (values[0] + values[-1])
+    share = (middle - values[at]) / (values[at + 1] - values[at])
+    return float(time[at] + share * (time[at + 1] - time[at]))

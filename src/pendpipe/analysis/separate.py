@@ -1,0 +1,225 @@
+"""The hysteretic and the viscous part of a campaign's losses (Fig. 4, Eq. 17).
+
+In air the loss is hysteretic, ``Q_hys = k f^2``. What a record measures is the rate b, and
+``b = pi f/Q = (pi/f) (1/k)``: a straight line in 1/k, whose weights are those of b. (A line
+through Q against f^2 would weigh the records by errors that grow with Q itself.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord, quality_of_rate
+from pendpipe.analysis.significance import chi_square_p_value
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.estimate import Estimate
+from pendpipe.physics import hysteretic_quality_factor
+
+_ROUNDS = 50
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """The hysteretic loss, from the records in air.
+
+    Parameters
+    ----------
+    coefficient
+        k of ``Q_hys = k f^2`` in s^2.
+    inverse, inverse_sd
+        1/k in 1/s^2, the quantity that was estimated: its error is Gaussian.
+    chi2, degrees_of_freedom, p_value
+        Of the records about the line.
+    free_exponent
+        x of ``Q_hys = K f^x``, fitted freely; 2 for hysteresis, 1 for a constant viscous
+        damping coefficient. NaN where the records have one frequency only.
+    exponent_p_value
+        Probability of so large a gain in chi^2 over x = 2 by chance.
+    records
+        The names of those that were used.
+    """
+
+    coefficient: Estimate
+    inverse: float
+    inverse_sd: float
+    chi2: float
+    degrees_of_freedom: int
+    p_value: float
+    free_exponent: Estimate
+    exponent_p_value: float
+    records: tuple[str, ...]
+
+
+def known_benchmark(coefficient_s2: float, sd_s2: float) -> Benchmark:
+    """Take k from elsewhere, where a campaign has no records in air."""
+    inverse = 1.0 / coefficient_s2
+    nan = float("nan")
+    return Benchmark(
+        coefficient=Estimate(coefficient_s2, sd_s2, "s^2"),
+        inverse=inverse,
+        inverse_sd=sd_s2 * inverse**2,
+        chi2=0.0,
+        degrees_of_freedom=0,
+        p_value=nan,
+        free_exponent=Estimate(nan, nan, ""),
+        exponent_p_value=nan,
+        records=(),
+    )
+
+
+def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
+    """Fit k of ``Q_hys = k f^2`` to the records in air.
+
+    Parameters
+    ----------
+    records
+        Those of the benchmark, one or more; each with a positive error of b.
+
+    Raises
+    ------
+    InputError
+        Without records, or if their losses are not positive.
+    """
+    if not records:
+        raise InputError(
+            "air benchmark", "no record in air can be used", "add records with fluid air"
+        )
+    frequency = np.array([record.frequency.value for record in records])
+    rate = np.array([record.linear.value for record in records])
+    per_inverse = np.pi / frequency
+    rate_sd = np.array([record.linear.sd for record in records])
+    frequency_sd = np.array([record.frequency.sd for record in records])
+    sd = np.hypot(rate_sd, rate / frequency * frequency_sd)
+    if not (np.isfinite(sd).all() and np.all(sd > 0.0)):
+        bad = records[int(np.flatnonzero(~(sd > 0.0) | ~np.isfinite(sd))[0])]
+        raise InputError(f"record {bad.record}", "b has no usable error", "look at its fit")
+    weights = sd**-2
+    information = float(np.sum(weights * per_inverse**2))
+    inverse = float(np.sum(weights * per_inverse * rate)) / information
+    if not inverse > 0.0:
+        raise InputError("air benchmark", "the losses in air are not positive", "check the fits")
+    inverse_sd = information**-0.5
+    chi2 = float(np.sum(weights * (rate - inverse * per_inverse) ** 2))
+    exponent, chi2_free = _free_exponent(frequency, rate, sd, inverse)
+    free = np.isfinite(exponent.value)
+    return Benchmark(
+        coefficient=Estimate(
+            1.0 / inverse,
+            inverse_sd / inverse**2,
+            "s^2",
+            _inverted(inverse, inverse_sd),
+        ),
+        inverse=inverse,
+        inverse_sd=inverse_sd,
+        chi2=chi2,
+        degrees_of_freedom=len(records) - 1,
+        p_value=chi_square_p_value(chi2, len(records) - 1),
+        free_exponent=exponent,
+        exponent_p_value=chi_square_p_value(chi2 - chi2_free, 1) if free else float("nan"),
+        records=tuple(record.record for record in records),
+    )
+
+
+def separate(
+    records: Sequence[MeasuredRecord],
+    benchmark: Benchmark,
+    *,
+    calibration_relative_sd: float = 0.0,
+) -> list[SeparatedRecord]:
+    """Split every record's linear loss into hysteretic and viscous (Eq. 17).
+
+    Parameters
+    ----------
+    records
+        All records, in water and in air.
+    benchmark
+        k, whose error all records share.
+    calibration_relative_sd
+        Relative standard deviation of the sensor's V/rad, common to all records. With an
+        angle that is volts over V/rad, a goes as V/rad and c as its inverse; b, and with it
+        every quality factor, does not change.
+    """
+    return [_separate_one(record, benchmark, calibration_relative_sd) for record in records]
+
+
+def _separate_one(
+    record: MeasuredRecord, benchmark: Benchmark, calibration_sd: float
+) -> SeparatedRecord:
+    """Eq. 17 in rates: ``b_v = b - pi/(k f)``."""
+    frequency, linear = record.frequency.value, record.linear
+    slope = -np.pi / frequency
+    viscous = linear.value + slope * benchmark.inverse
+    own_variance = linear.sd**2 + (slope * benchmark.inverse / frequency * record.frequency.sd) ** 2
+    common_variance = (slope * benchmark.inverse_sd) ** 2
+    if record.record in benchmark.records:
+        # 1/k was made from this record among others: their errors are correlated, and what
+        # is left of b scatters by less than its own error (least squares' residual).
+        total_sd = np.sqrt(max(own_variance - common_variance, 0.0))
+    else:
+        total_sd = np.sqrt(own_variance + common_variance)
+    rate = Estimate(float(viscous), float(total_sd), "1/s")
+    hysteretic = float(hysteretic_quality_factor(frequency, benchmark.coefficient.value))
+    low, high = benchmark.coefficient.interval95 or (np.nan, np.nan)
+    return SeparatedRecord(
+        measured=record,
+        quadratic=_widened(record.quadratic, calibration_sd),
+        coulomb=_widened(record.coulomb, calibration_sd),
+        quality_factor_limit=quality_of_rate(frequency, linear),
+        quality_factor_hysteretic=Estimate(
+            hysteretic,
+            hysteretic * benchmark.coefficient.sd / benchmark.coefficient.value,
+            "",
+            (low * frequency**2, high * frequency**2),
+        ),
+        viscous_rate=rate,
+        viscous_rate_sd_own=float(np.sqrt(own_variance)),
+        viscous_rate_per_inverse_k=float(slope),
+        quality_factor_viscous=quality_of_rate(frequency, rate),
+    )
+
+
+def _free_exponent(
+    frequency: FloatArray, rate: FloatArray, sd: FloatArray, inverse: float
+) -> tuple[Estimate, float]:
+    """Fit ``b = (pi/f0) h (f/f0)^(1-x)`` by Gauss-Newton; x with its error, and chi^2."""
+    if len(frequency) < 2 or np.ptp(frequency) <= 1e-9 * np.max(frequency):
+        return Estimate(float("nan"), float("nan"), ""), float("nan")
+    # About the weighted mean of ln f the two parameters hardly correlate.
+    logarithm = np.log(frequency)
+    logarithm = logarithm - np.average(logarithm, weights=(rate / sd) ** 2)
+    scale, exponent = float(np.pi * inverse * np.mean(1.0 / frequency)), 2.0
+    for _ in range(_ROUNDS):
+        shape = np.exp((1.0 - exponent) * logarithm)
+        design = np.stack([shape, -scale * shape * logarithm], axis=1) / sd[:, np.newaxis]
+        step = np.linalg.lstsq(design, (rate - scale * shape) / sd, rcond=None)[0]
+        scale, exponent = scale + float(step[0]), exponent + float(np.clip(step[1], -0.5, 0.5))
+        if abs(step[1]) < 1e-12 and abs(step[0]) < 1e-12 * abs(scale):
+            break
+    shape = np.exp((1.0 - exponent) * logarithm)
+    covariance = np.linalg.inv(design.T @ design)
+    chi2 = float(np.sum(((rate - scale * shape) / sd) ** 2))
+    return Estimate(exponent, float(np.sqrt(covariance[1, 1])), ""), chi2
+
+
+def _inverted(value: float, sd: float) -> tuple[float, float]:
+    """95 % interval of 1/x for a Gaussian x."""
+    half = 1.959963984540054 * sd
+    return 1.0 / (value + half), 1.0 / (value - half) if value > half else float("inf")
+
+
+def _widened(estimate: Estimate, relative_sd: float) -> Estimate:
+    """Add a relative error to an estimate's own, and to each side of its interval."""
+    added = relative_sd * abs(estimate.value)
+    interval = estimate.interval95
+    if interval is not None:
+        half = 1.959963984540054 * added
+        below, above = estimate.value - interval[0], interval[1] - estimate.value
+        interval = (
+            estimate.value - float(np.hypot(below, half)),
+            estimate.value + float(np.hypot(above, half)),
+        )
+    return replace(estimate, sd=float(np.hypot(estimate.sd, added)), interval95=interval)

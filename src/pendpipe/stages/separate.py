@@ -1,0 +1,116 @@
+"""The campaign's hysteretic coefficient, and every record's losses split by Eq. 17."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord
+from pendpipe.analysis.separate import Benchmark, fit_benchmark, separate
+from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.records import Record
+from pendpipe.estimate import Estimate
+from pendpipe.files import read_json, write_json
+from pendpipe.stages.results import RecordResult, estimate, read_results
+from pendpipe.stages.theory import record_theory
+
+
+@dataclass(frozen=True)
+class Separation:
+    """What the stage leaves: k of Q_hys = k f^2 with its test, and the separated records."""
+
+    benchmark: dict[str, Any] | None
+    records: list[SeparatedRecord]
+
+
+def separate_campaign(campaign: Campaign, out: Path) -> None:
+    """Fit k to the records in air and apply Eq. 17 to all; write ``separation.json``.
+
+    A campaign without records of the branch ``air`` has no k: nothing is separated.
+    """
+    results = [result for result in read_results(campaign) if result.refused is None]
+    measured = [_measured(campaign, result) for result in results]
+    air = [record for record in measured if record.branch == "air"]
+    if not air:
+        write_json(out, {"schema_version": 1, "hysteretic_coefficient": None, "records": []})
+        return
+    benchmark = fit_benchmark(air)
+    separated = separate(measured, benchmark, calibration_relative_sd=common_relative_sd(results))
+    write_json(
+        out,
+        {
+            "schema_version": 1,
+            "hysteretic_coefficient": _benchmark_json(benchmark),
+            "records": [asdict(record) for record in separated],
+        },
+    )
+
+
+def read_separation(path: Path) -> Separation:
+    """Read ``separation.json`` back."""
+    content = read_json(path)
+    return Separation(
+        content["hysteretic_coefficient"], [_separated(entry) for entry in content["records"]]
+    )
+
+
+def common_relative_sd(results: list[RecordResult]) -> float:
+    """Relative sd of the sensor constant that the records share; 0 where they need none."""
+    shared = [
+        result.calibration["volts_per_radian"]
+        for result in results
+        if result.calibration.get("from") == "the caliper run"
+    ]
+    return float(shared[0]["sd"]) / abs(float(shared[0]["value"])) if shared else 0.0
+
+
+def distance_inertia(campaign: Campaign, record: Record) -> Estimate | None:
+    """Moment of inertia from distances and masses; its own error is in the budget."""
+    theory = record_theory(campaign, record)
+    if theory is None:
+        return None
+    return Estimate(theory["moment_of_inertia_kg_m2"], 0.0, "kg m^2")
+
+
+def _measured(campaign: Campaign, result: RecordResult) -> MeasuredRecord:
+    row = result.record
+    return MeasuredRecord(
+        record=row.record,
+        fluid=row.fluid,
+        branch=row.branch,
+        frequency=result.parameter("frequency"),
+        quadratic=result.parameter("a"),
+        linear=result.parameter("b"),
+        coulomb=result.parameter("c"),
+        moment_of_inertia=distance_inertia(campaign, row),
+    )
+
+
+def _benchmark_json(benchmark: Benchmark) -> dict[str, Any]:
+    """The coefficient in the form of campaign.json, with the tests of the line."""
+    content = benchmark.coefficient.as_json()
+    return content | {
+        "inverse": benchmark.inverse,
+        "inverse_sd": benchmark.inverse_sd,
+        "chi2": benchmark.chi2,
+        "dof": benchmark.degrees_of_freedom,
+        "p_value": benchmark.p_value,
+        "free_exponent": benchmark.free_exponent.as_json(),
+        "exponent_p_value": benchmark.exponent_p_value,
+        "records": list(benchmark.records),
+    }
+
+
+def _separated(content: dict[str, Any]) -> SeparatedRecord:
+    """Read a separated record back from its JSON."""
+
+    def fields(entries: dict[str, Any]) -> dict[str, Any]:
+        return {
+            name: estimate(entry) if isinstance(entry, dict) else entry
+            for name, entry in entries.items()
+        }
+
+    measured = MeasuredRecord(**fields(content["measured"]))
+    others = {name: entry for name, entry in content.items() if name != "measured"}
+    return SeparatedRecord(measured=measured, **fields(others))
