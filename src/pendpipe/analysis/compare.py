@@ -1,16 +1,15 @@
-"""A campaign's viscous losses beside Eq. 16: the drag's factor, C_H, the models with and without."""
+"""A campaign's viscous losses beside Eq. 16: the drag's factor, C_H, what theory must have."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from pendpipe.analysis.exponents import Exponent, fit_exponent
 from pendpipe.analysis.losses import SeparatedRecord
-from pendpipe.analysis.significance import chi_square_p_value
+from pendpipe.analysis.shared_fit import Line, SharedEstimate, chi_square, fit_line
 from pendpipe.analysis.viscous import (
     SharedErrors,
     Surroundings,
@@ -20,34 +19,6 @@ from pendpipe.analysis.viscous import (
 )
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate
-
-
-@dataclass(frozen=True)
-class SharedEstimate:
-    """A number made from all records, its error split by where it comes from.
-
-    Parameters
-    ----------
-    estimate
-        Value with the total error.
-    sd_own
-        From the records' own errors.
-    sd_common
-        From all that the records share.
-    shared
-        The parts of `sd_common` by source, with their signs.
-    chi2, degrees_of_freedom, p_value
-        Of the records about it, with the shared errors in the covariance.
-    """
-
-    estimate: Estimate
-    sd_own: float
-    sd_common: float
-    shared: dict[str, float]
-    chi2: float
-    degrees_of_freedom: int
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -176,7 +147,7 @@ def compare(
 
 def theory_factor(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
     """Drag measured over Eq. 2: the inverse-variance mean of Q_v(Eq. 16)/Q_v measured."""
-    return _fit(losses, errors, _drag_over_theory)
+    return fit_line(losses, errors, _drag_over_theory)
 
 
 def history_coefficient(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
@@ -184,7 +155,7 @@ def history_coefficient(losses: ViscousLosses, errors: SharedErrors) -> SharedEs
 
     The measured drag over the steady one, less 1, is C_H a/delta.
     """
-    return _fit(losses, errors, _excess_over_steady)
+    return fit_line(losses, errors, _excess_over_steady)
 
 
 def check_model(
@@ -206,83 +177,25 @@ def check_model(
         hysteresis=hysteresis,
         quality_factor_limit=np.pi * losses.frequency_hz / rate,
         ratio=(losses.rate_per_s + losses.hysteretic_rate_per_s) / rate,
-        chi2=_chi2(excess(losses), losses.rate_sd_per_s, effects),
+        chi2=chi_square(excess(losses), losses.drag_sd_per_s, effects),
         degrees_of_freedom=len(rate),
     )
 
 
-class _Line(NamedTuple):
-    """Points through which a line from the origin is drawn, each of shape (n,)."""
-
-    regressor: FloatArray
-    response: FloatArray
-    sd: FloatArray
-
-    def slope(self) -> float:
-        """The slope of weighted least squares."""
-        x, y = self.regressor / self.sd, self.response / self.sd
-        return float(np.sum(x * y) / np.sum(x * x))
-
-
-def _drag_over_theory(losses: ViscousLosses) -> _Line:
+def _drag_over_theory(losses: ViscousLosses) -> Line:
     per_rate = losses.quality_factor_theory() / (np.pi * losses.frequency_hz)
-    return _Line(
-        np.ones_like(per_rate), per_rate * losses.rate_per_s, per_rate * losses.rate_sd_per_s
+    return Line(
+        np.ones_like(per_rate), per_rate * losses.rate_per_s, per_rate * losses.drag_sd_per_s
     )
 
 
-def _excess_over_steady(losses: ViscousLosses) -> _Line:
+def _excess_over_steady(losses: ViscousLosses) -> Line:
     per_rate = losses.quality_factor_theory(0.0) / (np.pi * losses.frequency_hz)
-    return _Line(
+    return Line(
         losses.radius_over_depth,
         per_rate * losses.rate_per_s - 1.0,
-        per_rate * losses.rate_sd_per_s,
+        per_rate * losses.drag_sd_per_s,
     )
-
-
-def _fit(
-    losses: ViscousLosses, errors: SharedErrors, line_of: Callable[[ViscousLosses], _Line]
-) -> SharedEstimate:
-    """Fit the slope with the records' own weights; follow the shared errors into it."""
-    line = line_of(losses)
-    value = line.slope()
-    effects = shared_effects(lambda moved: line_of(moved).slope(), losses, errors)
-    shared = {source: float(effect) for source, effect in effects.items()}
-    sd_own = float(np.sum((line.regressor / line.sd) ** 2) ** -0.5)
-    sd_common = float(np.sqrt(sum(effect**2 for effect in shared.values())))
-
-    def residual(moved: ViscousLosses) -> FloatArray:
-        return line_of(moved).response - value * line_of(moved).regressor
-
-    spread = shared_effects(residual, losses, errors)
-    # The records are judged about their own best line, found with the same covariance.
-    chi2 = _chi2(residual(losses), line.sd, spread, line.regressor)
-    dof = len(line.sd) - 1
-    return SharedEstimate(
-        estimate=Estimate(value, float(np.hypot(sd_own, sd_common)), ""),
-        sd_own=sd_own,
-        sd_common=sd_common,
-        shared=shared,
-        chi2=chi2,
-        degrees_of_freedom=dof,
-        p_value=chi_square_p_value(chi2, dof),
-    )
-
-
-def _chi2(
-    residual: FloatArray,
-    sd: FloatArray,
-    effects: dict[str, FloatArray],
-    regressor: FloatArray | None = None,
-) -> float:
-    """chi^2 with the shared effects in the covariance, at the best slope if there is one."""
-    covariance = np.diag(sd**2) + sum(np.outer(effect, effect) for effect in effects.values())
-    factor = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(factor, residual)
-    if regressor is not None:
-        direction = np.linalg.solve(factor, regressor)
-        white = white - direction * (direction @ white) / (direction @ direction)
-    return float(white @ white)
 
 
 def _exponents(

@@ -69,8 +69,9 @@ class ViscousLosses:
     frequency_hz, moment_of_inertia_kg_m2
         f and I, with the added mass.
     rate_per_s, rate_sd_per_s
-        The viscous part of b and its own error (with that of I, as far as it is the
-        record's own).
+        The viscous part of b and its own error.
+    relative_inertia_sd
+        Relative error of I, as far as it is the record's own.
     hysteretic_rate_per_s
         The part of b that Eq. 17 took off.
     rate_per_inverse_k
@@ -84,6 +85,7 @@ class ViscousLosses:
     moment_of_inertia_kg_m2: FloatArray
     rate_per_s: FloatArray
     rate_sd_per_s: FloatArray
+    relative_inertia_sd: FloatArray
     hysteretic_rate_per_s: FloatArray
     rate_per_inverse_k: FloatArray
     radius_m: FloatArray
@@ -95,6 +97,11 @@ class ViscousLosses:
     def angular_frequency_per_s(self) -> FloatArray:
         """Return 2 pi f."""
         return 2.0 * np.pi * self.frequency_hz
+
+    @property
+    def drag_sd_per_s(self) -> FloatArray:
+        """Own error of the drag, as one of the rate: the drag is 2 I b_v."""
+        return np.hypot(self.rate_sd_per_s, self.relative_inertia_sd * self.rate_per_s)
 
     @property
     def radius_over_depth(self) -> FloatArray:
@@ -136,17 +143,15 @@ def viscous_losses(
         )
         if around is None or inertia is None:
             continue
-        # The drag is 2 I b_v, so an error of I is one of the rate, as far as theory goes.
-        relative = inertia.sd / inertia.value
-        sd = np.hypot(split.viscous_rate_sd_own, relative * split.viscous_rate.value)
         rows.append((
-            split.measured.frequency.value, inertia.value, split.viscous_rate.value, sd,
+            split.measured.frequency.value, inertia.value, split.viscous_rate.value,
+            split.viscous_rate_sd_own, inertia.sd / inertia.value,
             split.measured.linear.value - split.viscous_rate.value,
             split.viscous_rate_per_inverse_k, around.radius_m, around.distance_m,
             around.viscosity_pa_s, around.density_kg_per_m3, split.measured.record,
         ))  # fmt: skip
     rows.sort(key=lambda row: row[0])
-    columns = np.array([row[:-1] for row in rows], dtype=np.float64).reshape(len(rows), 10).T
+    columns = np.array([row[:-1] for row in rows], dtype=np.float64).reshape(len(rows), 11).T
     return ViscousLosses(tuple(row[-1] for row in rows), *columns)
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pendpipe.configuration.load import Campaign
 
 
-def add_campaign(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+def add_campaign(parser: argparse._ActionsContainer, *, required: bool = False) -> None:
     """Declare ``--campaign``."""
     parser.add_argument(
         "--campaign",
@@ -21,7 +21,7 @@ def add_campaign(parser: argparse.ArgumentParser, *, required: bool = False) -> 
     )
 
 
-def add_record(parser: argparse.ArgumentParser) -> None:
+def add_record(parser: argparse._ActionsContainer) -> None:
     """Declare ``--record`` and ``--refused``."""
     parser.add_argument("--record", metavar="NAME", help="the campaign's name for this record")
     parser.add_argument(

@@ -33,9 +33,10 @@ NODE_COUNT = DEGREE + 1
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
-COS, SIN, LOSS, BEFORE, EARLIER, SLIP, EXCESS, SLOPE, COLUMN, ZETA, SCRATCH = range(0, 220, 20)
-BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(220, 340, 20)  # sensitivities.py
-NODE_SIZE = 340
+COS, SIN, LOSS, BEFORE, EARLIER, SLIP, EXCESS, SLOPE = range(0, 160, 20)
+COLUMN, ZETA, VALUE, SCRATCH = range(160, 240, 20)
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(240, 360, 20)  # sensitivities.py
+NODE_SIZE = 360
 
 # No exceptions, and no reference counts (which forbids to allocate): both cost more than they
 # are worth here. Multiplications and additions may be fused.
@@ -183,37 +184,40 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
     Writes T_k at those places to ``chebyshev[k]`` and returns the panel's duration (radians).
     Newton's iteration on tau(zeta) = half_width (1 + zeta) + excess(zeta), all nodes at once.
     """
-    multiply(ANALYSIS_T, node, EXCESS, node, COLUMN)
     duration = 2.0 * half_width + node[EXCESS + DEGREE]
+    multiply(ANALYSIS_T, node, EXCESS, node, COLUMN)  # the coefficients of tau - psi
+    for j in range(NODE_COUNT):
+        node[VALUE + j] = half_width * (node[SLIP + j] - 1.0)
+    multiply(ANALYSIS_T, node, VALUE, node, SCRATCH)  # those of its derivative
     for i in range(NODE_COUNT):
-        node[ZETA + i] = NODES[i]
+        late = node[EXCESS + i] - 0.5 * node[EXCESS + DEGREE] * (1.0 + NODES[i])
+        node[ZETA + i] = NODES[i] - late / half_width
     for _ in range(20):
+        _tabulate_chebyshev(node, chebyshev)
+        multiply(chebyshev, node, COLUMN, node, VALUE)
+        multiply(chebyshev, node, SCRATCH, node, SLOPE)
         worst = 0.0
         for i in range(NODE_COUNT):
-            z = node[ZETA + i]
-            value, slope = 0.0, 0.0
-            value_before, slope_before = 0.0, 0.0
-            for k in range(DEGREE, 0, -1):
-                slope, slope_before = (
-                    2.0 * value + 2.0 * z * slope - slope_before,
-                    slope,
-                )
-                value, value_before = node[COLUMN + k] + 2.0 * z * value - value_before, value
-            slope = value + z * slope - slope_before
-            value = node[COLUMN] + z * value - value_before
-            target = 0.5 * duration * (1.0 + NODES[i])
-            step = (half_width * (1.0 + z) + value - target) / (half_width + slope)
-            node[ZETA + i] = min(1.0, max(-1.0, z - step))
+            zeta = node[ZETA + i]
+            late = half_width * (1.0 + zeta) - 0.5 * duration * (1.0 + NODES[i]) + node[VALUE + i]
+            step = late / (half_width + node[SLOPE + i])
+            node[ZETA + i] = min(1.0, max(-1.0, zeta - step))
             worst = max(worst, abs(step))
-        if worst < 1e-9:  # quadratic convergence: the next step would be below 1e-16
+        if worst < 1e-8:  # quadratic convergence: the next step would be below 1e-15
             break
+    _tabulate_chebyshev(node, chebyshev)
+    return duration
+
+
+@kernel
+def _tabulate_chebyshev(node: FloatArray, chebyshev: FloatArray) -> None:
+    """Write T_k(zeta) to ``chebyshev[k]``."""
     for i in range(NODE_COUNT):
         chebyshev[0, i] = 1.0
         chebyshev[1, i] = node[ZETA + i]
     for k in range(2, NODE_COUNT):
         for i in range(NODE_COUNT):
             chebyshev[k, i] = 2.0 * node[ZETA + i] * chebyshev[k - 1, i] - chebyshev[k - 2, i]
-    return duration
 
 
 @kernel

@@ -144,12 +144,16 @@ def interval95(
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    deviations = np.sqrt(np.maximum(np.diag(covariance(normal, held)), 0.0))
+    matrix = covariance(normal, held)
+    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     sd = float(deviations[index])
     half = math.sqrt(CHI2_95) * sd
-    fitted = deviations > 0.0
-    if sd == 0.0 or not np.any(bounds.distance(value)[fitted] < _FAR * deviations[fitted]):
-        return value[index] - half, value[index] + half
+    if sd == 0.0:
+        return float(value[index]), float(value[index])
+    low = max(-_FAR * sd, float(bounds.lower[index] - value[index]))
+    high = min(_FAR * sd, float(bounds.upper[index] - value[index]))
+    follow = matrix[:, index] / matrix[index, index]
+    at_rest = bool(np.all(np.abs(gradient) * deviations < 1e-2))
 
     def rise(distance: float) -> float:
         """Rise of chi^2 when the parameter is moved and the others follow."""
@@ -158,9 +162,14 @@ def interval95(
         step[index] = distance
         return float(step @ normal @ step - 2.0 * gradient @ step)
 
-    low = max(-_FAR * sd, float(bounds.lower[index] - value[index]))
-    high = min(_FAR * sd, float(bounds.upper[index] - value[index]))
-    return value[index] + _crossing(rise, low), value[index] + _crossing(rise, high)
+    def end(reach: float) -> float:
+        """Distance to where chi^2 has risen enough."""
+        free = math.copysign(half, reach)
+        if at_rest and bounds.hold(value + free * follow):
+            return free
+        return _crossing(rise, reach)
+
+    return value[index] + end(low), value[index] + end(high)
 
 
 def _crossing(rise: Callable[[float], float], reach: float) -> float:
@@ -168,7 +177,7 @@ def _crossing(rise: Callable[[float], float], reach: float) -> float:
     if rise(reach) <= CHI2_95:
         return reach
     low, high = 0.0, reach
-    for _ in range(50):
+    for _ in range(30):
         middle = 0.5 * (low + high)
         if rise(middle) > CHI2_95:
             high = middle
