@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pendpipe.analysis.losses import MeasuredRecord, quality_of_rate
@@ -47,6 +47,7 @@ def air_records(
 
 
 @given(k=st.floats(1.0, 1e6))
+@settings(deadline=None)
 def test_exact_records_give_k_exactly(k: float) -> None:
     found = fit_benchmark(air_records(None, k=k))
     assert found.coefficient.value == pytest.approx(k, rel=1e-12)

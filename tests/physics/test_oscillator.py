@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -86,6 +86,7 @@ def test_hysteretic_decrement_is_a_fifth_of_a_percent_below_q_at_10() -> None:
 
 
 @given(quality=st.floats(5.0, 1e5))
+@settings(deadline=None)
 def test_shifts_are_the_leading_order_of_the_exact_ratios(quality: float) -> None:
     for ratio, shift in (
         (viscous_frequency_ratio, viscous_frequency_shift),
@@ -97,6 +98,7 @@ def test_shifts_are_the_leading_order_of_the_exact_ratios(quality: float) -> Non
 
 
 @given(quality=st.floats(1.0, 1e6))
+@settings(deadline=None)
 def test_decrement_quality_and_back(quality: float) -> None:
     back = hysteretic_quality_of_decrement(hysteretic_decrement_quality(quality))
     assert float(back) == pytest.approx(quality, rel=1e-13)

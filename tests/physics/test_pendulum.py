@@ -51,6 +51,7 @@ def test_textbook_pendulums() -> None:
 
 
 @given(inertia=st.floats(0.0, 1.0), mass=st.floats(0.1, 10.0), at=st.floats(-1.0, 1.0))
+@settings(deadline=None)
 def test_parallel_axes(inertia: float, mass: float, at: float) -> None:
     assert moment_of_inertia([PointMass(mass, at, inertia)]) == pytest.approx(
         inertia + mass * at**2, rel=1e-14, abs=1e-300
@@ -159,6 +160,7 @@ def test_bearing_friction_of_the_papers_record() -> None:
 
 
 @given(torque=st.floats(1e-8, 1e-3), y=st.floats(1e-3, 0.1))
+@settings(deadline=None)
 def test_bearing_friction_takes_four_torques_times_amplitude_a_cycle(
     torque: float, y: float
 ) -> None:

@@ -31,6 +31,8 @@ class HalfCycles:
         When the middle between the two turning points is passed, shape (m,).
     step
         The least reversal that was counted, in the unit of the values.
+    ending
+        How far the motion went after the last turning point, without turning again.
     """
 
     turn_time_s: FloatArray
@@ -38,6 +40,7 @@ class HalfCycles:
     swing: FloatArray
     middle_s: FloatArray
     step: float
+    ending: float
 
     def __len__(self) -> int:
         return len(self.swing)
@@ -159,6 +162,9 @@ def half_cycles(
     """Read off the half cycles whose swing exceeds `least`."""
     time, smooth = thinned(time_s, values, half_period_s)
     turns = without_ripples(smooth, turning_samples(smooth, least))
+    # The last one found is where the record happens to end, or any point of the final rest.
+    ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())
+    turns = turns[:-1]
     extremes = smooth[turns]
     middle = [
         _passage(time[a : b + 1], smooth[a : b + 1])
@@ -170,6 +176,7 @@ def half_cycles(
         swing=np.abs(np.diff(extremes)),
         middle_s=np.array(middle, dtype=np.float64),
         step=least,
+        ending=ending,
     )
 
 

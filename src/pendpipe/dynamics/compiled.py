@@ -40,14 +40,14 @@ def engine() -> Callable[..., tuple[int, int]]:
     sources = _digest()
 
     def run(
-        shape: FloatArray, directions: FloatArray, rates: FloatArray, motion: FloatArray,
-        signs: FloatArray, amplitude_rad: float, tabulate: bool, most: int, until_s: float,
+        constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float,
+        tabulate: bool, most: int, until_s: float,
         time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
         buffer: FloatArray,
     ) -> tuple[int, int]:  # fmt: skip
         buffer[0] = sources  # a use, so that it is a free variable
         return march(
-            shape, directions, rates, motion, signs, amplitude_rad, tabulate, most, until_s,
+            constants, directions, rates, y, tabulate, most, until_s,
             time_s, angle_rad, jacobian, turning, buffer,
         )  # fmt: skip
 

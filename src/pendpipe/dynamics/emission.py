@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.panel import NODE_COUNT, kernel
+from pendpipe.dynamics.panel import NODE_COUNT, kernel, part
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -76,7 +76,7 @@ def combine(
             )
 
 
-@kernel
+@part
 def emit(
     work: Work, polynomials: FloatArray, start: float, duration: float, y: float,
     signs: FloatArray, time_s: FloatArray, first: int, guess: int, angle_rad: FloatArray,
@@ -101,9 +101,7 @@ def emit(
     end = samples_before(time_s, first, release_s + (start + duration) / omega, guess)
     if end == first:
         return end
-    combine(
-        polynomials, duration, y, signs[0], signs[1], work.amplitude, work.clock, work.total
-    )
+    combine(polynomials, duration, y, signs[0], signs[1], work.amplitude, work.clock, work.total)
     work.total[0, 0] += work.motion[2]
     # Whole blocks keep the loops free of remainders; what is written past the panel's end is
     # written again by the next panel (or as rest).
@@ -121,7 +119,7 @@ def emit(
     return end
 
 
-@kernel
+@part
 def _emit_derivatives(
     work: Work, theta: FloatArray, time_s: FloatArray, jacobian: FloatArray, at: int
 ) -> None:
@@ -142,7 +140,7 @@ def _emit_derivatives(
             by_omega[i] -= rate * column[i]
 
 
-@kernel
+@part
 def rest(
     work: Work, y: float, signs: FloatArray, first: int, angle_rad: FloatArray,
     jacobian: FloatArray,

@@ -47,12 +47,6 @@ class TurningPoints:
     rest_rad: float
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    count: int
-    stopped: bool
-
-
 def _run(
     model: Eq8,
     release: Release,
@@ -66,24 +60,24 @@ def _run(
     angle_rad: FloatArray = _NO_SAMPLES,
     jacobian: FloatArray = _NONE,
     turning: FloatArray = _NONE,
-) -> _Outcome:
-    """Call the engine."""
+) -> tuple[int, bool]:
+    """Call the engine; return the number of turning points and whether the last is the stop."""
     if method not in ("map", "clock"):
         message = f'method must be "map" or "clock", not {method!r}'
         raise ValueError(message)
     sensitivities = directions.shape[0] + 1 if directions.size else 0
     polynomials = sensitivities + 1 if time_s.size else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
+    omega = model.angular_frequency
     count, state = engine()(
-        model.shape(), directions, rates,
-        np.array([model.angular_frequency, release.time_s, release.offset_rad]),
-        np.array([side, side]), abs(release.angle_rad), method == "map", most, until_s,
+        np.array([*model.shape(), omega, release.time_s, release.offset_rad, side, side]),
+        directions, rates, abs(release.angle_rad), method == "map", most, until_s,
         time_s, angle_rad, jacobian, turning, np.zeros(buffer_size(sensitivities, polynomials)),
     )  # fmt: skip
     if state == OVERDAMPED:
         message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
         raise ValueError(message)
-    return _Outcome(count, state == STOPPED)
+    return count, state == STOPPED
 
 
 def turning_points(
@@ -121,25 +115,20 @@ def turning_points(
         raise ValueError(message)
     most = _NO_LIMIT if count is None else count
     end_s = math.inf if until_s is None else until_s
+    if not end_s >= release.time_s:
+        message = f"until_s is {end_s}, before the release at {release.time_s}"
+        raise ValueError(message)
     room = 1024 if math.isinf(end_s) else _half_cycles(model, release, end_s) + 16
     while True:
         turning = np.empty((2, min(most, room)))
-        outcome = _run(
+        found, stopped = _run(
             model, release, method, most=min(most, room), until_s=end_s, turning=turning
         )
-        if outcome.stopped or outcome.count == most or outcome.count < room:
+        if stopped or found == most or found < room:
             break
         room *= 4
-    time_s, angle_rad = turning[:, : outcome.count]
-    if until_s is not None:
-        kept = int(np.searchsorted(time_s, until_s, side="right"))
-        stopped = outcome.stopped and kept == time_s.size
-        time_s, angle_rad = time_s[:kept], angle_rad[:kept]
-    else:
-        stopped = outcome.stopped
-    return TurningPoints(
-        time_s, angle_rad, stopped, float(angle_rad[-1]) if stopped else math.nan
-    )
+    time_s, angle_rad = turning[0, :found], turning[1, :found]
+    return TurningPoints(time_s, angle_rad, stopped, float(angle_rad[-1]) if stopped else math.nan)
 
 
 def _half_cycles(model: Eq8, release: Release, until_s: float) -> int:
@@ -170,12 +159,12 @@ def turning_points_with_jacobian(
     directions, rates = _directions(model, hysteretic_share)
     columns = rates.size + 4
     turning = np.empty((2 + 2 * columns, count))
-    outcome = _run(
+    found, stopped = _run(
         model, release, method, directions=directions, rates=rates, most=count, turning=turning
     )
-    turning = turning[:, : outcome.count]
-    rest = float(turning[1, -1]) if outcome.stopped else math.nan
-    points = TurningPoints(turning[0], turning[1], outcome.stopped, rest)
+    turning = turning[:, :found]
+    rest_rad = float(turning[1, -1]) if stopped else math.nan
+    points = TurningPoints(turning[0], turning[1], stopped, rest_rad)
     return points, turning[2 : 2 + columns].T, turning[2 + columns :].T
 
 

@@ -23,6 +23,7 @@ from pendpipe.dynamics.panel import (
     LOSS,
     NODE_COUNT,
     kernel,
+    part,
     place,
     polynomial,
     solve,
@@ -44,7 +45,7 @@ FINEST = 30
 """The finest panel is a half cycle halved so often; it is accepted as it is."""
 
 
-@kernel
+@part
 def _start(work: Work, radius: float) -> None:
     """Set d ln r/dp and dtau/dp at the turning point y = m + r."""
     for c in range(work.sigma.size):
@@ -52,7 +53,7 @@ def _start(work: Work, radius: float) -> None:
         work.shift[c] = 0.0
 
 
-@kernel
+@part
 def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
     """Write the derivatives of the next turning point, y' = r - m, to the row's head."""
     columns = work.sigma.size
@@ -65,7 +66,7 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
             row[HEAD + columns + c] = work.shift[c]
 
 
-@kernel
+@part
 def _solve_panel(
     work: Work, radius: float, start: float, half_width: float, y: float, finest: bool,
     polynomials: FloatArray,
@@ -85,7 +86,7 @@ def _solve_panel(
     return _in_time(work, radius, half_width, y, polynomials) or finest
 
 
-@kernel
+@part
 def _in_time(
     work: Work, radius: float, half_width: float, y: float, polynomials: FloatArray
 ) -> bool:
@@ -106,7 +107,7 @@ def _in_time(
     return resolved
 
 
-@kernel
+@part
 def even_half_cycle(work: Work, y: float, panels: int, polynomials: int, row: FloatArray) -> bool:
     """Solve a half cycle on `panels` equal panels into `row`; say whether these resolve it."""
     m = work.shape[0]
@@ -133,7 +134,7 @@ def even_half_cycle(work: Work, y: float, panels: int, polynomials: int, row: Fl
     return True
 
 
-@kernel
+@part
 def direct_half_cycle(
     work: Work, y: float, begin: float, signs: FloatArray, level: int, polynomials: int,
     time_s: FloatArray, first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,

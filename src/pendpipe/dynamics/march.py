@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit, rest
 from pendpipe.dynamics.half_cycle import direct_half_cycle
-from pendpipe.dynamics.panel import kernel
+from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.table import (
     DONE,
     HIGH,
@@ -39,7 +39,7 @@ def sticks(shape: FloatArray, y: float) -> bool:
     return y <= m or q * (y + m) >= 1.0 - h
 
 
-@kernel
+@part
 def _advance(work: Work, y: float) -> None:
     """Carry dy/dp and dtau/dp over the half cycle in `work.row`, which started at y."""
     row, columns = work.row, work.amplitude.size
@@ -52,7 +52,7 @@ def _advance(work: Work, y: float) -> None:
             work.clock[c] += row[HEAD + columns + c]
 
 
-@kernel
+@part
 def _lay_out(
     work: Work, log_y: float, half_cycles: float, polynomials: int, wanted: FloatArray
 ) -> bool:
@@ -79,7 +79,7 @@ def _lay_out(
     return False
 
 
-@kernel
+@part
 def _record(
     work: Work, k: int, tau: float, y: float, signs: FloatArray, turning: FloatArray
 ) -> None:
@@ -103,7 +103,7 @@ def _record(
     times[directions + 3], angles[directions + 3] = 0.0, 1.0
 
 
-@kernel
+@part
 def _emit_row(
     work: Work, y: float, tau: float, signs: FloatArray, polynomials: int, time_s: FloatArray,
     first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,
@@ -121,28 +121,28 @@ def _emit_row(
     return first, guess
 
 
-@kernel
+@part
 def march(
-    shape: FloatArray, directions: FloatArray, rates: FloatArray, motion: FloatArray,
-    signs: FloatArray, y: float, tabulate: bool, most: int, until_s: float,
-    time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
+    constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
+    most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
     buffer: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the pendulum from its release.
 
     Parameters
     ----------
-    shape, directions, rates, motion
+    constants
+        m, h, q, g, omega; time and offset of the release, and its side twice (the first is
+        changed: the side of the turning point in hand).
+    directions, rates
         See `workspace.Work`.
-    signs
-        The side of the turning point in hand, and of the release: twice the same at first.
     y
         The amplitude of the release.
     tabulate
         Whether to tabulate the half-cycle map where that pays.
     most, until_s
-        Where to end: at this number of turning points, or with the first not before this time
-        (with samples, the time of the last).
+        Where to end: at this number of turning points, or with the last not after this time
+        (with samples, the time of the last of these).
     time_s, angle_rad, jacobian
         Ascending times, and what receives the samples and their derivatives; may be empty.
         The last column of the Jacobian, by the offset, is left to the caller.
@@ -155,7 +155,8 @@ def march(
     """
     columns = rates.size + 1 if directions.shape[1] > 0 else 0
     polynomials = columns + 1 if time_s.size > 0 else 0
-    work = carve(buffer, shape, directions, rates, motion, columns, polynomials)
+    work = carve(buffer, constants, directions, rates, columns, polynomials)
+    shape, motion, signs = work.shape, work.motion, constants[7:9]
     work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
     for c in range(columns):
         work.amplitude[c], work.clock[c] = (1.0 if c == 0 else 0.0), 0.0
@@ -165,15 +166,16 @@ def march(
     narrow = columns == 0 and polynomials == 0
     while True:
         tau = math.pi * k + excess
+        now_s = motion[1] + tau / motion[0]
+        if now_s > until_s and time_s.size == 0:
+            return k, RUNNING
         if k < turning.shape[1]:
             _record(work, k, tau, y, signs, turning)
         k += 1
         if sticks(shape, y):
             rest(work, y, signs, first, angle_rad, jacobian)
             return k, STOPPED
-        now_s = motion[1] + tau / motion[0]
-        done = first >= time_s.size if time_s.size > 0 else now_s >= until_s
-        if k >= most or done:
+        if k >= most or (time_s.size > 0 and first >= time_s.size):
             return k, RUNNING
         listed = work.segment[LOW] <= log_y <= work.segment[HIGH]
         if tabulate and not listed and log_y < wanted[1] and y > SMOOTH_FROM * shape[0]:

@@ -82,16 +82,14 @@ class Eq8:
             return math.inf
         return 2.0 * delta / (free + math.sqrt(discriminant))
 
-    def shape(self) -> FloatArray:
+    def shape(self) -> tuple[float, float, float, float]:
         """Return m, h, q, g: Eq. 8 with time in radians (see `panel.py`)."""
         half_turn = 0.5 * math.pi / self.angular_frequency
-        return np.array(
-            [
-                self.stop_rad,
-                half_turn * self.hysteretic,
-                half_turn * self.quadratic,
-                self.viscous / self.angular_frequency,
-            ]
+        return (
+            self.stop_rad,
+            half_turn * self.hysteretic,
+            half_turn * self.quadratic,
+            self.viscous / self.angular_frequency,
         )
 
     def shape_derivatives(self) -> FloatArray:

@@ -42,6 +42,8 @@ NODE_SIZE = 360
 # are worth here. Multiplications and additions may be fused.
 kernel = njit(_nrt=False, error_model="numpy", fastmath={"contract"})
 """How every function of the engine is compiled."""
+part = njit(_nrt=False, error_model="numpy", fastmath={"contract"}, forceinline=True)
+"""How those are that take the whole workspace, which is too much to hand over at each call."""
 
 
 @kernel

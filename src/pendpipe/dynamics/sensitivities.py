@@ -108,12 +108,16 @@ def sensitivities(
                 + dq * node[BY_Q + j]
                 + 2.0 * dg * node[SIN + j]
             )
-            node[SCRATCH + j] = -node[SIN + j] * node[SLIP + j] ** 2 * node[FORCING + j] / node[GROWTH + j]
+            node[SCRATCH + j] = (
+                -node[SIN + j] * node[SLIP + j] ** 2 * node[FORCING + j] / node[GROWTH + j]
+            )
         multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
         for j in range(NODE_COUNT):
             column[j] = node[GROWTH + j] * (sigma[c] + half_width * node[COLUMN + j])
             node[SCRATCH + j] = (
-                node[COS + j] * node[SLIP + j] ** 2 * (node[BY_RADIUS + j] * column[j] + node[FORCING + j])
+                node[COS + j]
+                * node[SLIP + j] ** 2
+                * (node[BY_RADIUS + j] * column[j] + node[FORCING + j])
             )
         multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
         sigma_end = column[DEGREE]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.chebyshev import powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
-from pendpipe.dynamics.panel import kernel
+from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.workspace import HEAD, MOST_POINTS, panel_width, row_width
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def half_cycles_and_span(
     return count, room
 
 
-@kernel
+@part
 def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) -> int:
     """Tabulate the half cycles with ln y from log_y - span to log_y.
 

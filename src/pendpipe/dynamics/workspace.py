@@ -1,4 +1,4 @@
-"""The arrays that one march needs, carved out of one buffer so that the engine allocates nothing."""
+"""The arrays that a march needs, carved out of one buffer: the engine allocates nothing."""
 
 from __future__ import annotations
 
@@ -78,22 +78,24 @@ def buffer_size(sensitivities: int, polynomials: int) -> int:
     per_panel = 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
     width = HEAD + 2 * sensitivities + MOST_PANELS * per_panel
     fixed = NODE_SIZE + 2 + NODE_COUNT * NODE_COUNT + 4 * MOST_POINTS + _DESCRIPTION + _THETA + 2
-    return fixed + 6 * sensitivities + (2 * sensitivities + 3) * NODE_COUNT + (
-        2 * MOST_POINTS + 2
-    ) * width
+    return (
+        fixed
+        + 6 * sensitivities
+        + (2 * sensitivities + 3) * NODE_COUNT
+        + (2 * MOST_POINTS + 2) * width
+    )
 
 
 @kernel
 def carve(
     buffer: FloatArray,
-    shape: FloatArray,
+    constants: FloatArray,
     directions: FloatArray,
     rates: FloatArray,
-    motion: FloatArray,
     sensitivities: int,
     polynomials: int,
 ) -> Work:
-    """Cut `buffer` into the arrays of a march."""
+    """Cut `buffer` and `constants` (m, h, q, g, omega, time, offset) into the arrays of a march."""
     s, n = sensitivities, NODE_COUNT
     width = row_width(s, polynomials, MOST_PANELS)
     points = MOST_POINTS
@@ -107,12 +109,16 @@ def carve(
     amplitude, rest = rest[:s], rest[s:]
     clock, rest = rest[:s], rest[s:]
     row, rest = rest[:width], rest[width:]
-    rows, rest = rest[: (points + 1) * width].reshape(points + 1, width), rest[(points + 1) * width :]
+    rows, rest = (
+        rest[: (points + 1) * width].reshape(points + 1, width),
+        rest[(points + 1) * width :],
+    )
     cosines, rest = rest[: 4 * points], rest[4 * points :]
     segment, rest = rest[:_DESCRIPTION], rest[_DESCRIPTION:]
     table, rest = rest[: points * width].reshape(points, width), rest[points * width :]
     total, rest = rest[: (s + 2) * n].reshape(s + 2, n), rest[(s + 2) * n :]
     return Work(
-        shape, directions, rates, motion, node, placed, sigma, shift, kept, columns, chebyshev,
-        amplitude, clock, row, rows, cosines, segment, table, total, rest[:_THETA], rest[_THETA:],
+        constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
+        columns, chebyshev, amplitude, clock, row, rows, cosines, segment, table, total,
+        rest[:_THETA], rest[_THETA:],
     )  # fmt: skip

@@ -52,7 +52,9 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
             if not any(rest.strip().startswith("sc") for rest in lines[number:]):
                 notes.append(f"the last scan (line {number}) is cut short and left out")
                 break
-            raise InputError(f"{place}, line {number}", f"'{text}' is no whole scan", "drop the row")
+            raise InputError(
+                f"{place}, line {number}", f"'{text}' is no whole scan", "drop the row"
+            )
         scans.append(row)
         numbers.append(number)
     if not srate and options.sample_rate is None:

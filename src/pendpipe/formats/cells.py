@@ -66,7 +66,7 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
 
     Times of day that pass midnight go on; dates are counted from 1 January 1970.
     """
-    import datetime
+    import datetime as dt
 
     if not cells or _CLOCK.fullmatch(cells[0].strip()) is None:
         return None
@@ -81,7 +81,7 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
         if year:
             try:
                 date = days.setdefault(
-                    (year, month, day), datetime.date(int(year), int(month), int(day)).toordinal()
+                    (year, month, day), dt.date(int(year), int(month), int(day)).toordinal()
                 )
             except ValueError:
                 return None

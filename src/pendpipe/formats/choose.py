@@ -106,7 +106,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         return Choice(time, counts, picked, channels, ())
     if options.channel is not None:
         return Choice(time, counts, (_channel(table, channels, options.channel),), channels, ())
-    readings, notes = _readings(channels)
+    readings, notes = _readings(_of_one_run(channels, time))
     if not readings and reading:
         names = ", ".join(column.label for column in table.columns) or "none"
         raise InputError(
@@ -119,10 +119,10 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
 
 def find(table: Table, columns: Sequence[Column], key: str) -> Column:
     """Find a column by its name (in any case) or its number in the file."""
-    for same in (lambda a, b: a == b, lambda a, b: a.lower() == b.lower()):
-        for column in columns:
-            if same(column.name, key):
-                return column
+    exact = [column for column in columns if column.name == key]
+    alike = [column for column in columns if column.name.lower() == key.lower()]
+    if exact or alike:
+        return (exact or alike)[0]
     if key.isdigit():
         for column in columns:
             if column.number == int(key):
@@ -156,8 +156,15 @@ def _channel(table: Table, channels: Sequence[Column], key: str) -> Column:
 def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
     """Find the column of times, or else one that counts the samples."""
     if options.time_column is not None:
-        named = find(table, table.columns, options.time_column)
-        return named, meaning(named) == "index"
+        told = find(table, table.columns, options.time_column)
+        return told, meaning(told) == "index"
+    runs = [column for column in table.columns if meaning(column) == "time"]
+    if options.reading_column is not None and len(runs) > 1:
+        # Runs side by side, each with its own time: the one before the reading is meant.
+        reading = find(table, table.columns, _parts(table, options)[0])
+        before = [column for column in runs if column.number < reading.number]
+        if before:
+            return before[-1], False
     taken = (options.reading_column or "").lower()
     best: tuple[float, Column | None] = (0.0, None)
     for place, column in enumerate(table.columns):
@@ -180,6 +187,16 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
             best = (score, column)
     found = best[1]
     return found, found is not None and _counts_samples(found)
+
+
+def _of_one_run(channels: Sequence[Column], time: Column | None) -> Sequence[Column]:
+    """Of runs side by side, each with its own time column, keep the columns of one."""
+    if time is None:
+        return channels
+    others = [column.number for column in channels if meaning(column) == "time"]
+    end = min((number for number in others if number > time.number), default=None)
+    mine = [c for c in channels if end is None or time.number < c.number < end]
+    return mine or channels
 
 
 def _evenness(values: FloatArray) -> float:
@@ -231,7 +248,9 @@ def _moves(column: Column) -> bool:
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     """Find x, y of something that moves on a circle about the origin, below or above it."""
     named = {column.name.lower(): column for column in columns}
-    pairs = [(named[a], named[b]) for a, b in (("x", "y"), ("px", "py")) if a in named and b in named]
+    pairs = [
+        (named[a], named[b]) for a, b in (("x", "y"), ("px", "py")) if a in named and b in named
+    ]
     silent = [column for column in columns if not column.name]
     if not pairs and len(silent) >= 2:
         pairs = [(silent[0], silent[1])]

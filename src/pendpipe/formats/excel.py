@@ -51,7 +51,9 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     try:
         table = table_of_text(place, text, plain, "excel")
     except NotThisFormatError as reason:
-        raise InputError(place, f"sheet '{best}': {reason}", "give time and angle as columns") from None
+        raise InputError(
+            place, f"sheet '{best}': {reason}", "give time and angle as columns"
+        ) from None
     others = [title for title, count in numbers.items() if title != best and count]
     note = f"sheet '{best}'" + (f" (not {', '.join(others)})" if others else "")
     from dataclasses import replace

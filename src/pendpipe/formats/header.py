@@ -95,9 +95,9 @@ def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     """Read a row under the names that holds units only."""
     for line in below:
         cells = layout.split(line.strip().lstrip("#%"))
-        if len(cells) == layout.width and any(map(unit_of, cells)):
-            if all(not cell or unit_of(cell) for cell in cells):
-                return [cell.strip("[](){} ") for cell in cells]
+        only_units = any(map(unit_of, cells)) and all(not cell or unit_of(cell) for cell in cells)
+        if len(cells) == layout.width and only_units:
+            return [cell.strip("[](){} ") for cell in cells]
     return None
 
 
@@ -136,7 +136,9 @@ def _interval(lines: Sequence[str]) -> float | None:
                 continue
             if inverse:
                 return 1.0 / (number * (1e3 if "khz" in told else 1.0))
-            return number * (1e-3 if "ms" in told else 1e-6 if "us" in told or "µs" in told else 1.0)
+            return number * (
+                1e-3 if "ms" in told else 1e-6 if "us" in told or "µs" in told else 1.0
+            )
     return None
 
 

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 from pendpipe.errors import InputError
@@ -26,7 +27,7 @@ _SPOKEN: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks",
 _DELIMITERS: Final = ("\t", ";", "|", ",", " ")
 COMMENT: Final = ("#", "%", "//", "!")
 BLANK_CELLS: Final = frozenset(
-    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "#value!", "\"\"", "?", "*")
+    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "#value!", '""', "?", "*")
 )
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
 
@@ -128,7 +129,7 @@ def _is_one_column(sample: Sequence[str]) -> bool:
     if not all(re.fullmatch(r"[+-]?\d+", a) and re.fullmatch(r"\d+", b) for a, b in pairs):
         return False
     first = [int(a) for a, _ in pairs]
-    return any(b < a for a, b in zip(first, first[1:], strict=False))
+    return any(b < a for a, b in pairwise(first))
 
 
 def _wanted_delimiters(options: ReadOptions) -> tuple[str, ...]:

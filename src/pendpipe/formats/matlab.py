@@ -62,7 +62,8 @@ def _load(place: Path, data: bytes) -> dict[str, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            loaded = loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=True)
+            stream: Any = io.BytesIO(data)
+            loaded = loadmat(stream, squeeze_me=True, struct_as_record=True)
     except Exception as fault:  # scipy raises whatever its parser stumbles on
         raise InputError(
             place, f"the MATLAB file can't be read ({fault})", "save it again with '-v7'"

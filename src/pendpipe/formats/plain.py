@@ -103,11 +103,11 @@ def _markers(recording: Recording) -> list[Marker]:
     for key, value in recording.metadata.items():
         if not key.startswith("marker_"):
             continue
-        sample, time, comment = (value.split(";", 2) + ["", ""])[:3]
+        sample, time, comment = [*value.split(";", 2), "", ""][:3]
         try:
-            found.append(Marker(int(sample), float(time.strip().removesuffix("s")), comment.strip()))
+            found.append(
+                Marker(int(sample), float(time.strip().removesuffix("s")), comment.strip())
+            )
         except ValueError:
             continue
     return found
-
-

@@ -183,7 +183,10 @@ def _refuse_text(table: Table, choice: Choice) -> None:
 
 
 def _quality(
-    table: Table, choice: Choice, values: np.ndarray[tuple[int], np.dtype[np.float64]], keep: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    table: Table,
+    choice: Choice,
+    values: np.ndarray[tuple[int], np.dtype[np.float64]],
+    keep: np.ndarray[tuple[int], np.dtype[np.bool_]],
 ) -> ByteArray | None:
     """Mark rows with an empty cell as missing; a written NaN is a fault."""
     blank = np.zeros(len(keep), dtype=bool)

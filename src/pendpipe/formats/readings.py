@@ -62,7 +62,9 @@ def _unit(table: Table, column: Column, options: ReadOptions) -> tuple[Unit, lis
         told = unit_of(options.reading_unit)
         if told is None or told.kind not in ("angle", "volts", "length", "angular velocity"):
             raise InputError(
-                "--unit", f"'{options.reading_unit}' is not known", "give rad, deg, V, mV, m, mm, ..."
+                "--unit",
+                f"'{options.reading_unit}' is not known",
+                "give rad, deg, V, mV, m, mm, ...",
             )
         return told, []
     written = unit_of(column.unit) if column.unit else None
@@ -93,8 +95,10 @@ def _angle_unit(table: Table, column: Column) -> tuple[Unit, list[str]]:
         return Unit("angle", 1.0), []
     low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
     reach = max(float(high - middle), float(middle - low))
+    # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
+    turns = _jumps_of_a_turn(finite) and float(np.ptp(finite)) < 2.02 * np.pi
     said = ("deg" in words or "°" in words or "grad" in words) and "rad" not in words
-    if not said and reach <= 1.1 * np.pi:
+    if not said and (reach <= 1.1 * np.pi or turns):
         return Unit("angle", 1.0), [f"'{column.label}' has no unit: taken to be radians"]
     if reach > 1000:
         raise InputError(
@@ -106,6 +110,12 @@ def _angle_unit(table: Table, column: Column) -> tuple[Unit, list[str]]:
     return Unit("angle", np.pi / 180), [f"'{column.label}' is taken to be in degrees ({why})"]
 
 
+def _jumps_of_a_turn(values: FloatArray) -> bool:
+    """Say whether neighbouring readings (radians) lie a turn apart."""
+    jumps = np.abs(np.diff(values))
+    return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
+
+
 def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
     """Count the angle from where the pendulum hangs: undo wraps, then whole half turns.
 
@@ -114,8 +124,7 @@ def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
     """
     notes = []
     finite = np.isfinite(values)
-    jumps = np.abs(np.diff(values[finite]))
-    if np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)):
+    if _jumps_of_a_turn(values[finite]):
         values = values.copy()
         values[finite] = np.unwrap(values[finite])
         notes.append("the angle jumps by a turn: unwrapped")

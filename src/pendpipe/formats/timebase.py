@@ -43,23 +43,30 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.ones(len(reading.values), dtype=bool)
     if options.sample_rate is not None:
-        time = np.arange(len(every)) / options.sample_rate
+        time: FloatArray = np.arange(len(every), dtype=np.float64) / options.sample_rate
         note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
         return TimeBase(time, every, (note,), {})
     if reading.time_s is not None:
         return TimeBase(reading.time_s, every, (), {})
     column = choice.time
     if column is not None and not choice.counts:
-        _refuse_holes(table, column)
+        every = _filled(column, reading)
+        _refuse_holes(table, column, every)
         factor, note = _unit(column, reading, options)
-        return _in_order(table, choice, column.values * factor, factor, [note] if note else [])
+        notes = [note] if note else []
+        if not every.all():
+            notes.append(f"{np.sum(~every)} row(s) with neither time nor reading left out")
+        return _in_order(table, choice, column.values * factor, factor, notes, every)
     if table.interval_s is not None:
         note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
         if column is None:
-            return TimeBase(np.arange(len(every)) * table.interval_s, every, (note,), {})
-        _refuse_holes(table, column)
+            return TimeBase(
+                np.arange(len(every), dtype=np.float64) * table.interval_s, every, (note,), {}
+            )
+        _refuse_holes(table, column, every)
         time = (column.values - column.values[0]) * table.interval_s
-        return _in_order(table, choice, time, table.interval_s, [f"{note} and '{column.label}'"])
+        notes = [f"{note} and '{column.label}'"]
+        return _in_order(table, choice, time, table.interval_s, notes, every)
     counted = f" ('{column.label}' only counts)" if column is not None else ""
     raise InputError(
         table.place,
@@ -68,11 +75,19 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     )
 
 
-def _refuse_holes(table: Table, column: Column) -> None:
+def _filled(column: Column, reading: Column) -> BoolArray:
+    """Find the rows that have a time or a reading: of runs side by side one is shorter."""
+    every = np.ones(len(column.values), dtype=bool)
+    if column.blank is not None and reading.blank is not None:
+        every &= ~(column.blank & reading.blank)
+    return every
+
+
+def _refuse_holes(table: Table, column: Column, rows: BoolArray) -> None:
     if column.fault is not None:
         row, text = column.fault
         raise InputError(table.where(row), f"'{text}' is no number", "mend or drop the row")
-    bad = np.flatnonzero(~np.isfinite(column.values))
+    bad = np.flatnonzero(~np.isfinite(column.values) & rows)
     if bad.size:
         raise InputError(
             table.where(int(bad[0])), "the time is missing or NaN", "mend or drop the row"
@@ -84,7 +99,9 @@ def _unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float,
     if options.time_unit is not None:
         told = unit_of(options.time_unit)
         if told is None or told.kind != "time":
-            raise InputError("--unit", f"'{options.time_unit}' is no unit of time", "give s, ms, us")
+            raise InputError(
+                "--unit", f"'{options.time_unit}' is no unit of time", "give s, ms, us"
+            )
         return told.factor, ""
     for word in (column.unit, column.name):
         unit = unit_of(word) if word else None
@@ -92,7 +109,7 @@ def _unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float,
             return unit.factor, ""
         if unit is not None and unit.kind == "time" and word == column.unit:
             return unit.factor, ""
-    values = column.values
+    values = column.values[np.isfinite(column.values)]
     step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
     if not np.all(values[:1000] == np.rint(values[:1000])):
         return 1.0, f"'{column.label}' is taken to be in seconds"
@@ -110,12 +127,17 @@ def _samples_per_swing(values: FloatArray) -> float:
     finite = values[np.isfinite(values)]
     if oscillation(finite) == 0:
         return 0.0
-    crossings = np.count_nonzero(np.diff(np.signbit(finite - finite.mean())))
-    return len(finite) / max(crossings, 1)
+    crossings = int(np.count_nonzero(np.diff(np.signbit(finite - finite.mean()))))
+    return len(finite) / (crossings or 1)
 
 
 def _in_order(
-    table: Table, choice: Choice, time: FloatArray, tick: float, notes: list[str]
+    table: Table,
+    choice: Choice,
+    time: FloatArray,
+    tick: float,
+    notes: list[str],
+    rows: BoolArray,
 ) -> TimeBase:
     """Refuse a time that falls or repeats, unless a repeat is harmless and can be told."""
     metadata: dict[str, str] = {}
@@ -123,10 +145,10 @@ def _in_order(
         metadata["recorded_at"] = f"{time[0]:.6f} s since 1970"
         notes.append(f"times are counted from the first row ({time[0]:.6f} s on the file's clock)")
         time = time - time[0]
-    keep = np.ones(len(time), dtype=bool)
+    keep = rows.copy()
     repeated = _repeated_rows(choice, time)
     if repeated.any():
-        keep = ~repeated
+        keep &= ~repeated
         notes.append(f"{repeated.sum()} row(s) that repeat the row above left out")
     steps = np.diff(time[keep])
     if len(steps) and steps.min() <= 0:
@@ -141,12 +163,12 @@ def _in_order(
                 " the next"
             )
             return TimeBase(time[counted], counted, tuple(notes), metadata)
-        rows = np.flatnonzero(keep)
+        kept = np.flatnonzero(keep)
         at = int(np.argmax(steps <= 0))
         verb = "repeats" if steps[at] == 0 else "falls"
-        before, after = time[rows[at]] / tick, time[rows[at + 1]] / tick
+        before, after = time[kept[at]] / tick, time[kept[at + 1]] / tick
         raise InputError(
-            table.where(int(rows[at + 1])),
+            table.where(int(kept[at + 1])),
             f"the time {verb} ({before:.10g} is followed by {after:.10g})",
             "mend the rows, or give --sample-rate if they are evenly spaced",
         )

@@ -51,7 +51,11 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str], ...]] = (
     ("angular velocity", 1.0, "rad/s rad/sec rads/s radian/s radians/s s-1 1/s rad.s-1"),
     ("angular velocity", _DEGREE, "deg/s °/s degrees/s deg/sec degree/s grad/s dps º/s"),
     ("other", 1.0, "m/s cm/s mm/s m/s2 m/s^2 rad/s2 rad/s^2 deg/s2 deg/s^2 °/s2 °/s^2 px/s"),
-    ("other", 1.0, "hz khz mhz 1/min rpm a ma n nm n·m j w pa kpa hpa bar k c °c degc °f db g t mt"),
+    (
+        "other",
+        1.0,
+        "hz khz mhz 1/min rpm a ma n nm n·m j w pa kpa hpa bar k c °c degc °f db g t mt",
+    ),
     ("other", 1.0, "px pix pixel pixels % kg ms-2 ms-1 count counts tick ticks steps lsb a.u. au"),
 )
 _UNITS: Final = {
@@ -75,7 +79,9 @@ _BRACKETED: Final = re.compile(r"^(.*?)\s*[\[({<]\s*([^\])}>]*)\s*[\])}>]\s*(.*)
 _SLASHED: Final = re.compile(r"^(.+?)(?:\s+/\s*|\s*/\s+)(\S+)$")
 _SPACED: Final = re.compile(r"^(.+?)(?:\s+in\s+|,\s*|\s+(?=\S\S))(\S+)$")
 _SUFFIX: Final = re.compile(r"^(.+?)[_\-.]([A-Za-zµ°]+)$")
-_CAMEL: Final = re.compile(r"^(.*[a-z])(Rad|Deg|Mrad|Sec|Ms|Us|Mm|Cm|Volts?|Seconds|Millis|Micros)$")
+_CAMEL: Final = re.compile(
+    r"^(.*[a-z])(Rad|Deg|Mrad|Sec|Ms|Us|Mm|Cm|Volts?|Seconds|Millis|Micros)$"
+)
 
 
 def split_header(text: str) -> tuple[str, str]:
@@ -90,7 +96,9 @@ def split_header(text: str) -> tuple[str, str]:
     """
     text = text.strip().strip("\"'").strip()
     text = re.sub(r"(?i)^(latest|run\s*\d+|data ?set\s*\d*|set\s*\d+)\s*:\s*", "", text)
-    text = re.sub(r"(?i)[\s,]*(?:\brun|\bch(?:annel)?s?)\s*#?\s*[\d&]+\s*$", "", text).strip() or text
+    text = (
+        re.sub(r"(?i)[\s,]*(?:\brun|\bch(?:annel)?s?)\s*#?\s*[\d&]+\s*$", "", text).strip() or text
+    )
     bracketed = _BRACKETED.match(text)
     # "angle (0 up, pi down)" is a remark, "[foo]" a unit that nobody knows.
     remark = bracketed is not None and unit_of(bracketed[2]) is None and " " in bracketed[2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +50,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         notes.append("packed: channels have rates of their own")
     metadata = {}
     if header.opened > 0:
-        opened = datetime.datetime.fromtimestamp(header.opened, datetime.UTC)
+        opened = dt.datetime.fromtimestamp(header.opened, dt.UTC)
         metadata["recorded_at"] = opened.isoformat()
     return Table(
         place=place,
@@ -126,7 +126,7 @@ def _column(
 ) -> Column:
     """Scale one channel."""
     slope = channel.slope * (0.25 if header.hires else 1.0)
-    counts = raw.astype(np.int64) if header.hires else raw.astype(np.int64) >> 2
+    counts = (raw if header.hires else raw >> 2).astype(np.float64)
     ends = (-32768, 32767) if header.hires else (-8192, 8191)
     limits = sorted(slope * end + channel.intercept for end in ends)
     return Column(

@@ -31,7 +31,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         raise NotThisFormatError("there is no line that begins with 'Relative Time'")
     text = decode(data)
     lines = text.split("\n")
-    starts = (n for n, line in enumerate(lines) if re.match(r'\W*relative time', line, re.I))
+    starts = (n for n, line in enumerate(lines) if re.match(r"\W*relative time", line, re.I))
     top = next(starts, None)
     if top is None:
         raise NotThisFormatError("there is no line that begins with 'Relative Time'")
@@ -39,13 +39,15 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     sign = ";" if ";" in lines[top] else "\t" if "\t" in lines[top] else ","
     layout = Layout(sign, ",", 0) if sign == ";" else Layout(sign, ".", 0)
     names = [name.strip() for name in layout.split(lines[top])]
-    rows = [layout.split(lines[line - 1]) for line in (table.lines if table.lines is not None else ())]
+    rows = [
+        layout.split(lines[line - 1]) for line in (table.lines if table.lines is not None else ())
+    ]
     time = next((column for column in table.columns if column.number == 1), None)
     if time is None or time.fault is not None or not np.isfinite(time.values).all():
         return table
     seconds, pauses = _with_pauses(_evened(time.values), names, rows)
     events = _events(names, rows, seconds)
-    columns = []
+    columns: list[Column] = []
     for column in table.columns:
         label = names[column.number - 1] if column.number <= len(names) else ""
         if column is time or label.lower().startswith(_CLOCK_NAMES) or "event" in label.lower():
@@ -76,7 +78,7 @@ def _evened(time: FloatArray) -> FloatArray:
     for candidate in (float(round(rate)), rate):
         if candidate <= 0:
             continue
-        even = time[0] + np.arange(len(time)) / candidate
+        even: FloatArray = time[0] + np.arange(len(time), dtype=np.float64) / candidate
         if np.abs(even - time).max() <= 1.5e-6:
             return even
     return time

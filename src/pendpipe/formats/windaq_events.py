@@ -79,7 +79,9 @@ def parse_trailers(
 
 def _is_text(data: bytes) -> bool:
     high = sum(byte >= 0x80 for byte in data)
-    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data) and 8 * high <= len(data)
+    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data) and 8 * high <= len(
+        data
+    )
 
 
 def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers | None] | None:
@@ -145,7 +147,7 @@ def scan_times(
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
     known to a second.
     """
-    time = np.arange(scans) * header.interval_s
+    time = np.arange(scans, dtype=np.float64) * header.interval_s
     notes = []
     lag, since = 0.0, 0.0
     for event in events:

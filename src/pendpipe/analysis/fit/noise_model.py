@@ -15,7 +15,7 @@ from pendpipe.arrays import FloatArray
 
 _CHANCE: Final = 5.0
 _COARSE: Final = 12.0
-"""Readings in a half cycle below which differences see the motion's own misfit."""
+"""Readings in a half cycle below which differences would see the motion's own misfit."""
 
 
 class Noise(NamedTuple):
@@ -40,7 +40,7 @@ def judge_noise(
     floor = quantisation_rms(samples.step)
     per_half_cycle = len(residual) / max(len(points), 1)
     if samples.counts or per_half_cycle < _COARSE:
-        rms = math.sqrt(float(np.mean(residual**2)))
+        rms = points.noise_rms_rad
     else:
         rms = white_rms(residual)
     rms = max(rms, floor, 1e-15 * float(np.max(np.abs(problem.values))))

@@ -76,7 +76,10 @@ def fit_period(
     trials = [_line(points, amplitude, a, b, c, each, omega, held) for each in shares]
     middle = trials[1]
     spread = (trials[2][0] - trials[0][0]) / math.sqrt(12.0)
-    matrix = middle[1] * max(middle[2], 1.0) if middle[2] > _LOUD else middle[1]
+    matrix = middle[1] * (middle[2] if middle[2] > _LOUD else 1.0)
+    if share is None:
+        # All times share what the unknown division of b does to the half cycles' shape.
+        matrix[1, 1] += (b / (4.0 * float(middle[0][0]) ** 2)) ** 2 / 3.0
     return Period(
         float(middle[0][0]), float(middle[0][1]), matrix + np.outer(spread, spread), middle[2]
     )

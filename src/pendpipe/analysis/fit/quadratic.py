@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
 
 CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
@@ -37,10 +37,10 @@ class Bounds(NamedTuple):
         """Put each entry within its bounds."""
         return np.clip(value, self.lower, self.upper)
 
-    def walls(self, free: IntArray) -> list[tuple[int, float]]:
+    def walls(self, free: Sequence[int]) -> list[tuple[int, float]]:
         """The finite bounds of the free entries: index and value."""
         return [
-            (int(j), float(side[j])) for j in free for side in self if np.isfinite(side[j])
+            (j, float(side[j])) for j in free for side in self if math.isfinite(side[j])
         ]
 
     def distance(self, value: FloatArray) -> FloatArray:
@@ -56,8 +56,8 @@ def bounded_step(
 ) -> FloatArray:
     """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
 
-    Every set of active bounds is tried: there are three or four, hence some 20 small
-    systems, and in the usual case, where no bound is met, one.
+    Sets of active bounds are tried, the smallest first, until one is optimal: there are
+    three or four bounds, hence some 20 small systems at most, and usually one.
 
     Parameters
     ----------
@@ -68,27 +68,30 @@ def bounded_step(
     held
         Entries that stay zero.
     """
-    free = np.array([j for j in range(len(gradient)) if j not in held], dtype=np.int64)
+    free = [j for j in range(len(gradient)) if j not in held]
+    walls = bounds.walls(free)
+    for size in range(len(walls) + 1):
+        for active in combinations(walls, size):
+            on = [index for index, _ in active]
+            if len(set(on)) < size:
+                continue
+            step = np.zeros(len(gradient))
+            step[on] = [wall for _, wall in active]
+            rest = [index for index in free if index not in on]
+            block = normal[rest]
+            step[rest] = _solve(block[:, rest], gradient[rest] - block[:, on] @ step[on])
+            if bounds.hold(step) and _best(normal[on] @ step - gradient[on], step[on], bounds, on):
+                return bounds.clip(step)
+    # Rounding has hidden the answer: the free step, put within the bounds, will do.
     step = np.zeros(len(gradient))
     step[free] = _solve(normal[np.ix_(free, free)], gradient[free])
-    if bounds.hold(step):
-        return step
-    walls = bounds.walls(free)
-    best, least = step, math.inf
-    for size in range(1, len(walls) + 1):
-        for active in combinations(walls, size):
-            on = np.array([index for index, _ in active])
-            if len(set(on.tolist())) < size:
-                continue
-            trial = np.zeros(len(gradient))
-            trial[on] = [wall for _, wall in active]
-            rest = np.setdiff1d(free, on)
-            right = gradient[rest] - normal[np.ix_(rest, on)] @ trial[on]
-            trial[rest] = _solve(normal[np.ix_(rest, rest)], right)
-            value = 0.5 * trial @ normal @ trial - gradient @ trial
-            if value < least and bounds.hold(trial):
-                best, least = trial, value
-    return bounds.clip(best)
+    return bounds.clip(step)
+
+
+def _best(slope: FloatArray, wall: FloatArray, bounds: Bounds, on: list[int]) -> bool:
+    """Whether at every active bound the slope points outwards: then no other set is better."""
+    upper = wall == bounds.upper[on]
+    return bool(np.all(np.where(upper, slope <= 0.0, slope >= 0.0)))
 
 
 def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
@@ -144,9 +147,12 @@ def interval95(
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    matrix = covariance(normal, held)
+    normal, gradient, bounds, value, index = _bounded_part(
+        normal, gradient, bounds, value, index, held
+    )
+    matrix = covariance(normal)
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    sd = float(deviations[index])
+    sd = float(deviations[index]) if np.isfinite(normal[index, index]) else 0.0
     half = math.sqrt(CHI2_95) * sd
     if sd == 0.0:
         return float(value[index]), float(value[index])
@@ -158,7 +164,7 @@ def interval95(
     def rise(distance: float) -> float:
         """Rise of chi^2 when the parameter is moved and the others follow."""
         pulled = gradient - normal[:, index] * distance
-        step = bounded_step(normal, pulled, bounds.about(value), (*held, index))
+        step = bounded_step(normal, pulled, bounds.about(value), (index,))
         step[index] = distance
         return float(step @ normal @ step - 2.0 * gradient @ step)
 
@@ -172,15 +178,52 @@ def interval95(
     return value[index] + end(low), value[index] + end(high)
 
 
+def _bounded_part(
+    normal: FloatArray, gradient: FloatArray, bounds: Bounds, value: FloatArray, index: int,
+    held: Sequence[int],
+) -> tuple[FloatArray, FloatArray, Bounds, FloatArray, int]:  # fmt: skip
+    """Eliminate what has no bounds (it follows freely), and drop what is held."""
+    free = [j for j in range(len(value)) if j not in held]
+    walled = [j for j, _ in bounds.walls(free)]
+    kept = [j for j in free if j == index or j in walled]
+    gone = [j for j in free if j not in kept]
+    if index in held:
+        kept = [index]
+        return np.full((1, 1), np.inf), np.zeros(1), bounds, value[kept], 0
+    block, cross = normal[np.ix_(kept, kept)], normal[np.ix_(gone, kept)]
+    if gone:
+        both = np.concatenate([cross, gradient[gone][:, None]], axis=1)
+        carried = np.stack([_solve(normal[np.ix_(gone, gone)], each) for each in both.T], axis=1)
+        block = block - cross.T @ carried[:, :-1]
+        gradient = gradient[kept] - cross.T @ carried[:, -1]
+    else:
+        gradient = gradient[kept]
+    part = Bounds(bounds.lower[kept], bounds.upper[kept])
+    return block, gradient, part, value[kept], kept.index(index)
+
+
 def _crossing(rise: Callable[[float], float], reach: float) -> float:
-    """Where the rise comes to the 95 % point between 0 and `reach`; `reach` if it does not."""
-    if rise(reach) <= CHI2_95:
+    """Where the rise comes to the 95 % point between 0 and `reach`; `reach` if it does not.
+
+    By the rule of false position on its root, which is nearly a straight line.
+    """
+    goal = math.sqrt(CHI2_95)
+    low, below = 0.0, -goal
+    high, above = reach, math.sqrt(max(rise(reach), 0.0)) - goal
+    if above <= 0.0:
         return reach
-    low, high = 0.0, reach
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        if rise(middle) > CHI2_95:
-            high = middle
+    side = 0
+    for _ in range(40):
+        middle = low - below * (high - low) / (above - below)
+        now = math.sqrt(max(rise(middle), 0.0)) - goal
+        if abs(now) < 1e-4:
+            return middle
+        if now > 0.0:
+            high, above = middle, now
+            below *= 0.5 if side > 0 else 1.0
+            side = 1
         else:
-            low = middle
+            low, below = middle, now
+            above *= 0.5 if side < 0 else 1.0
+            side = -1
     return 0.5 * (low + high)

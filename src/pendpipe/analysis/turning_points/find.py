@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.follow import first_places, follow_tail, resmoothed
 from pendpipe.analysis.turning_points.harmonics import odd_harmonics
 from pendpipe.analysis.turning_points.level import Level, estimate_level
-from pendpipe.analysis.turning_points.measure import Measured, Places, measure
+from pendpipe.analysis.turning_points.measure import Measured, Places, measure, smoothed
 from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
 from pendpipe.analysis.turning_points.samples import Samples, prepare
-from pendpipe.analysis.turning_points.shape import LossRates, half_cycle_shape, loss_rates
+from pendpipe.analysis.turning_points.shape import LossRates, half_cycle_shape, loss_rates, shape_error
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError
@@ -24,6 +24,8 @@ from pendpipe.recording import Recording
 
 _LEAST_SHARE: Final = 0.3
 """Of the information that a whole half cycle holds; less is not kept."""
+_SEEN: Final = 3.0
+"""Standard deviations by which the last half cycle must stand out, with its neighbours."""
 
 
 def find_turning_points(recording: Recording, place: str | Path = "recording") -> TurningPoints:
@@ -62,7 +64,23 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level)
     samples = replace(samples, noise_rms=_noise(samples, measured))
-    return _finish(samples, places, measured, shape, level, recording, place)
+    state = _State(samples, places, measured, shape, rates, level)
+    keep = _kept(state)
+    if keep.sum() < 3:
+        raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
+    return _finish(state, keep, "m" if recording.quantity == "displacement_m" else "rad")
+
+
+class _State(NamedTuple):
+    """All that is known before the table is made."""
+
+    samples: Samples
+    places: Places
+    measured: Measured
+    shape: FloatArray
+    rates: LossRates
+    start: float
+    """The level that the half cycles were measured at."""
 
 
 def _too_few(samples: Samples, found: int) -> tuple[str, str]:
@@ -131,48 +149,37 @@ def _noise(samples: Samples, measured: Measured) -> float:
     return max(pooled, quantisation_rms(samples.step))
 
 
-def _finish(
-    samples: Samples,
-    places: Places,
-    measured: Measured,
-    shape: FloatArray,
-    start: float,
-    recording: Recording,
-    place: str | Path,
-) -> TurningPoints:
-    """Put level, amplitude and time together, and leave out what is too little known."""
+def _finish(state: _State, keep: BoolArray, unit: str) -> TurningPoints:
+    """Put level, amplitude and time together."""
+    samples, places, measured = state.samples, state.places, state.measured
     noise = samples.noise_rms
-    keep = _kept(samples, places, measured)
-    if keep.sum() < 3:
-        raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
-    level = estimate_level(measured.information[keep], measured.score[keep], noise, start)
-    column = {name: getattr(measured, name)[keep] for name in ("amplitude", "sine", "coupling")}
+    level = estimate_level(measured.information[keep], measured.score[keep], noise, state.start)
     side, rate = places.side[keep], places.angular_frequency[keep]
-    amplitude = column["amplitude"] - side * column["coupling"] * (level.value - start)
+    coupling, sine = measured.coupling[keep], measured.sine[keep]
+    amplitude = measured.amplitude[keep] - side * coupling * (level.value - state.start)
     sd = noise * np.sqrt(measured.variance[keep])
     sine_sd = noise * np.sqrt(measured.sine_variance[keep])
-    phase = measured.phase(noise)[keep]
-    height = 1.0 + shape[keep, 4:].sum(axis=1)
-    height_free = measured.harmonics[keep].sum(axis=1)
-    turned = amplitude * height + height_free + _late(amplitude, column["sine"], sd, sine_sd)
+    height = 1.0 + state.shape[keep, 4:].sum(axis=1)
+    turned = (amplitude + _late(amplitude, sine, sd, sine_sd)) * height
     clear = np.maximum(np.abs(amplitude), sd)
+    relative, phase = shape_error(clear, rate, state.rates)
     return TurningPoints(
         half_cycle=places.number[keep] - places.number[keep][0],
-        time_s=places.centre_s[keep] + phase / rate,
-        time_sd_s=np.minimum(sine_sd / clear, 1.0) / rate,
+        time_s=places.centre_s[keep] + measured.phase(noise)[keep] / rate,
+        time_sd_s=np.hypot(np.minimum(sine_sd / clear, 1.0), phase) / rate,
         angle_rad=side * turned,
-        angle_sd_rad=sd * height,
+        angle_sd_rad=np.hypot(sd * height, relative * clear),
         level_rad=level.value,
         level_sd_rad=float(np.mean(level.sd)),
-        level_coupling=float(np.mean(column["coupling"] * height)),
+        level_coupling=float(np.mean(coupling * height)),
         noise_rms_rad=noise,
         step_rad=samples.step or 0.0,
         start_s=float(samples.time_s[0]),
         stop_s=float(samples.time_s[-1]),
         samples=len(samples),
-        unit="m" if recording.quantity == "displacement_m" else "rad",
+        unit=unit,
         wanders=level.wanders,
-        notes=_notes(samples, places, keep, level),
+        notes=_notes(samples, keep, level),
     )
 
 
@@ -183,17 +190,25 @@ def _late(amplitude: FloatArray, sine: FloatArray, sd: FloatArray, sine_sd: Floa
     return np.where(strong, lost, 0.0)
 
 
-def _kept(samples: Samples, places: Places, measured: Measured) -> BoolArray:
-    """Half cycles that hold enough readings, and whose turning lies among the readings."""
+def _kept(state: _State) -> BoolArray:
+    """Half cycles that hold enough readings, and whose turning lies among the readings.
+
+    A record that ends at rest ends here with the last half cycle that is seen.
+    """
+    samples, places, measured = state.samples, state.places, state.measured
     information = 1.0 / measured.variance
     usual = float(np.nanmedian(information))
     turning = places.centre_s
     slack = 0.02 * places.half_period_s
     inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
-    return inside & (np.nan_to_num(information) > _LEAST_SHARE * usual)
+    keep = inside & (np.nan_to_num(information) > _LEAST_SHARE * usual)
+    sd = samples.noise_rms * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
+    seen = keep & (smoothed(measured.amplitude, 1) > _SEEN * sd)
+    keep[int(np.max(np.flatnonzero(seen), initial=-1)) + 1 :] = False
+    return keep
 
 
-def _notes(samples: Samples, places: Places, keep: BoolArray, level: Level) -> tuple[str, ...]:
+def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
     notes = []
     inner = keep[int(np.argmax(keep)) : len(keep) - int(np.argmax(keep[::-1]))]
     lost = int(np.count_nonzero(~inner))

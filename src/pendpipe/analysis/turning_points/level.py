@@ -51,6 +51,11 @@ def estimate_level(
         return constant
     # Neighbours average out the even errors of opposite half cycles (harmonics, decay).
     pairs = _paired(information, score)
+    # The wander must be smooth against the scatter of neighbours, noise or not.
+    narrow, used = _local_lines(*pairs, 4)
+    freedom = max(len(pairs[0]) - used, 1.0)
+    excess = _criterion(*pairs, narrow, 0.0, noise) / freedom
+    noise *= math.sqrt(max(excess, 1.0))
     best, chosen = _criterion(*pairs, np.full(len(pairs[0]), mean), 1.0, noise), None
     for window in _WINDOWS:
         if 3 * window > len(own):

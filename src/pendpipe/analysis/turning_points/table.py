@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,14 @@ COLUMNS: Final = (
 _NUMBERS: Final = (
     "level_sd_rad", "level_coupling", "noise_rms_rad", "step_rad", "start_s", "stop_s",
 )  # fmt: skip
+
+
+class Cut(NamedTuple):
+    """A span of the recording that was left out."""
+
+    start_s: float
+    stop_s: float
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,8 @@ class TurningPoints:
         ``"rad"`` or ``"m"``.
     wanders
         Whether the level is a slow function of time.
+    cuts
+        Spans of the recording that were left out before.
     metadata, notes
         Provenance for the file's head; and what the user should know, a clause each.
     """
@@ -71,6 +81,7 @@ class TurningPoints:
     samples: int = 0
     unit: str = "rad"
     wanders: bool = False
+    cuts: tuple[Cut, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
@@ -119,6 +130,9 @@ def write_turning_points(path: str | Path, points: TurningPoints) -> None:
     with replaced(path) as stream:
         for key, value in head.items():
             stream.write(f"# {key}: {' '.join(str(value).split())}\n")
+        for cut in points.cuts:
+            reason = " ".join(cut.reason.split())
+            stream.write(f"# cut: {float(cut.start_s)!r} {float(cut.stop_s)!r} {reason}\n")
         for note in points.notes:
             stream.write(f"# note: {' '.join(note.split())}\n")
         stream.write(",".join(COLUMNS) + "\n")
@@ -138,19 +152,17 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         lines = place.read_text(encoding="utf-8").splitlines()
     except FileNotFoundError:
         raise InputError(place, "there is no such file", "run pendpipe turning-points") from None
-    metadata: dict[str, str] = {}
-    notes: list[str] = []
-    start = 0
-    for start, line in enumerate(lines):  # noqa: B007 - the first row after the head
-        if not line.startswith("#"):
-            break
-        key, _, value = line.lstrip("# ").partition(":")
-        notes.append(value.strip()) if key == "note" else metadata.update({key: value.strip()})
-    if not lines or lines[start].strip() != ",".join(COLUMNS):
+    start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
+    metadata = {key: value for key, value in head if key not in ("cut", "note")}
+    if "refused" in metadata:
+        raise InputError(place, f"the record was refused ({metadata['refused']})", "mend it first")
+    if start == len(lines) or lines[start].strip() != ",".join(COLUMNS):
         raise InputError(place, "this is no table of turning points", "run pendpipe turning-points")
     try:
         table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
         numbers = {key: float(metadata.pop(key)) for key in _NUMBERS}
+        cuts = tuple(_cut(value) for key, value in head if key == "cut")
     except (KeyError, ValueError) as fault:
         raise InputError(place, f"it can't be read ({fault})", "make it again") from None
     metadata.pop("frequency_hz", None)
@@ -161,6 +173,13 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         samples=int(metadata.pop("samples", "0")),
         unit=metadata.pop("unit", "rad"),
         wanders=metadata.pop("level", "constant") == "wanders",
+        cuts=cuts,
         metadata=metadata,
-        notes=tuple(notes),
+        notes=tuple(value for key, value in head if key == "note"),
     )
+
+
+def _cut(text: str) -> Cut:
+    """Read one cut back."""
+    start, stop, reason = text.split(" ", 2)
+    return Cut(float(start), float(stop), reason)

@@ -1,0 +1,42 @@
+"""The turning points of a whole recording: its free decay is found first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pendpipe.analysis.free_decay import find_free_decay
+from pendpipe.analysis.turning_points.find import find_turning_points
+from pendpipe.analysis.turning_points.table import Cut, TurningPoints
+from pendpipe.recording import Recording
+
+
+def measure_recording(
+    recording: Recording, place: str | Path, provenance: Mapping[str, Any] | None = None
+) -> tuple[TurningPoints, Recording]:
+    """Find the free decay of a recording and measure its turning points.
+
+    Parameters
+    ----------
+    recording
+        In rad or m.
+    place
+        Named in messages.
+    provenance
+        Goes into the table's head.
+
+    Returns
+    -------
+    points, part
+        The turning points, with the cuts; and the part of the recording they are from.
+    """
+    decay = find_free_decay(recording)
+    part = recording.between(decay.start_s, decay.stop_s)
+    points = find_turning_points(part, place)
+    cuts = tuple(Cut(cut.start_s, cut.stop_s, cut.reason) for cut in decay.cuts)
+    metadata = {
+        key: str(value) for key, value in (provenance or {}).items() if value is not None
+    }
+    return replace(points, cuts=cuts, metadata={**points.metadata, **metadata}), part

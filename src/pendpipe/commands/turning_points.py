@@ -1,0 +1,54 @@
+"""Measure the turning points of a free decay, each from all readings of its half cycle.
+
+The table has a row a turning point: its half cycle's number, time and signed angle about
+the level, with standard deviations (independent of each other), and the level. The head
+holds what they share: noise, the level's standard deviation, the spans that were cut.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from pendpipe.commands import _reading
+from pendpipe.commands._campaign import add_record
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe turning-points``."""
+    _reading.add_arguments(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="the table")
+    parser.add_argument(
+        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
+    )
+    add_record(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and write."""
+    from pendpipe.stages.refusal import run_stage
+
+    return run_stage(
+        "turning-points",
+        arguments.record or arguments.file,
+        lambda: _measure(arguments),
+        outputs=[arguments.out],
+        refused=arguments.refused,
+    )
+
+
+def _measure(arguments: argparse.Namespace) -> None:
+    from pendpipe.analysis.turning_points import write_turning_points
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.commands._motion import read_motion
+
+    recording, provenance = read_motion(arguments)
+    points, _ = measure_recording(recording, arguments.file, provenance)
+    write_turning_points(arguments.out, points)
+    for note in points.notes:
+        print(f"{arguments.file}: {note}", file=sys.stderr)
+    print(
+        f"{arguments.out}: {len(points)} turning points, {points.apparent_frequency_hz:.6g} Hz,"
+        f" {abs(points.angle_rad[0]):.4g} {points.unit} at first"
+    )

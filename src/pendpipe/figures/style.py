@@ -1,0 +1,152 @@
+"""How every figure looks: colours that colour-blind readers tell apart, sizes, saving.
+
+Colour never carries a meaning alone: branches differ in their symbols too, curves in their
+dashes. Vermilion is kept for what goes wrong when something is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any, Final, NamedTuple, ParamSpec
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pendpipe.files import replaced
+
+Arguments = ParamSpec("Arguments")
+
+BLUE, VERMILION, GREEN = "#0072B2", "#C7450B", "#007A5A"
+INK, GREY, PALE = "#1A1A1A", "#5F6670", "#9CC4E0"
+WIDTH_IN: Final = 5.2
+"""One size for all: letters stay legible at a column's width and on a phone."""
+
+_FONTS: Final = ["DejaVu Sans", "Verdana", "Arial", "sans-serif"]
+_LOOK: Final[dict[str, Any]] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-4, 6),
+    "axes.unicode_minus": True,
+    "grid.color": "#E3E6EA",
+    "grid.linewidth": 0.6,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "legend.columnspacing": 1.4,
+    "legend.borderaxespad": 0.2,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 5.0,
+    "errorbar.capsize": 2.0,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "figure.constrained_layout.use": False,
+    "mathtext.fontset": "dejavusans",
+    # Letters stay letters: they can be searched, selected and read aloud.
+    "svg.fonttype": "none",
+    "path.simplify": True,
+}
+
+
+class Branch(NamedTuple):
+    """How a branch is drawn, and its name for people."""
+
+    name: str
+    colour: str
+    marker: str
+    dashes: str
+
+
+BRANCHES: Final = {
+    "high": Branch("high branch (lower weight alone)", BLUE, "o", "-"),
+    "low": Branch("low branch (pair of weights)", GREEN, "s", "-"),
+}
+
+
+def branch(name: str) -> Branch:
+    """The look of a branch; one that the paper does not have is drawn in grey."""
+    return BRANCHES.get(name, Branch(name or "no branch", GREY, "^", "-"))
+
+
+def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
+    """Give a drawing function the common look, and leave matplotlib's settings as they were."""
+
+    @wraps(draw)
+    def inside(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
+        with mpl.rc_context(_LOOK):
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def new_figure(height_in: float = 3.5) -> tuple[Figure, Axes]:
+    """A figure with one set of axes, laid out so that nothing is cut off."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    return figure, figure.subplots()
+
+
+def figure_with_residuals(
+    height_in: float = 4.4, *, constrained: bool = True, residual_share: float = 0.4
+) -> tuple[Figure, Axes, Axes]:
+    """A figure with a panel for data and fit, and one below for data minus fit."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained" if constrained else None)
+    upper, lower = figure.subplots(
+        2, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, residual_share]}
+    )
+    if not constrained:
+        # Fixed margins: four times faster, for the figure that every record has.
+        figure.subplots_adjust(left=0.135, right=0.975, top=0.915, bottom=0.105, hspace=0.09)
+    figure.align_ylabels([upper, lower])
+    lower.axhline(0.0, color=INK, linewidth=0.9)
+    return figure, upper, lower
+
+
+def key_above(axes: Axes, columns: int = 2, **options: Any) -> None:
+    """Put the legend above the axes, where it can't hide data."""
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns,
+        borderaxespad=0.3, **options,
+    )  # fmt: skip
+
+
+def plain_text(text: str) -> str:
+    """Free text for a title: a dollar sign is no formula."""
+    return text.replace("$", r"\$")
+
+
+def save(figure: Figure, stem: Path, *, dpi: int = 200) -> list[Path]:
+    """Write a figure as SVG and PNG, the same bytes whenever the same data are drawn."""
+    written = [stem.with_name(f"{stem.name}.{form}") for form in ("svg", "png")]
+    # A salt for each figure, so that two of them in one page do not share identifiers.
+    saving = {**_LOOK, "svg.hashsalt": f"pendpipe {stem.name}", "font.family": _FONTS}
+    metadata: dict[str, dict[str, Any]] = {
+        "svg": {"Date": None, "Creator": "pendpipe"},
+        "png": {"Software": "pendpipe"},
+    }
+    with mpl.rc_context(saving):
+        for path in written:
+            form = path.suffix[1:]
+            with replaced(path, "wb") as stream:
+                figure.savefig(stream, format=form, dpi=dpi, metadata=metadata[form])
+    return written

@@ -1,0 +1,266 @@
+"""A campaign beside its theory: ``comparison.json`` with everything that is drawn and told,
+and ``campaign.json`` with the numbers alone.
+"""  # noqa: D205
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pendpipe.analysis.compare import Comparison, compare
+from pendpipe.analysis.losses import SeparatedRecord
+from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
+from pendpipe.analysis.shared_fit import SharedEstimate
+from pendpipe.analysis.turning_points import read_turning_points
+from pendpipe.analysis.viscous import SharedErrors, Surroundings
+from pendpipe.configuration.apparatus import pendulum
+from pendpipe.configuration.load import Campaign
+from pendpipe.estimate import Estimate
+from pendpipe.files import read_json, write_json
+from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
+from pendpipe.stages.provenance import stamp
+from pendpipe.stages.results import RecordResult, read_results
+from pendpipe.stages.separate import Separation, read_separation
+from pendpipe.stages.summary import campaign_summary
+from pendpipe.stages.theory import branch_curves, record_theory
+
+
+def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:
+    """Compare the losses with Eq. 16 and write both files."""
+    results = read_results(campaign)
+    separated = read_separation(separation)
+    found = _comparison(campaign, separated)
+    content = {
+        "schema_version": 1,
+        "title": campaign.configuration.title,
+        "typical_record": campaign.configuration.typical_record,
+        "has_theory": found is not None,
+        "records": [_record(campaign, result, separated, found) for result in results],
+        "curves": _curves(campaign, separated),
+        "hysteretic_coefficient": separated.benchmark,
+        **_campaign_numbers(found),
+        "tail": _tail(campaign, results),
+        "calibration": _calibration(campaign),
+        "provenance": stamp(campaign),
+    }
+    write_json(out, content)
+    write_json(summary, campaign_summary(content))
+
+
+def _comparison(campaign: Campaign, separated: Separation) -> Comparison | None:
+    """Eq. 16 beside what Eq. 17 has left; ``None`` where no record has a theory."""
+    apparatus = campaign.configuration.apparatus
+    if apparatus is None or apparatus.sphere is None or separated.benchmark is None:
+        return None
+    around = {}
+    for split in separated.records:
+        row = campaign.record(split.measured.record)
+        geometry = campaign.geometry(row)
+        if geometry is None or not geometry.sphere or not row.fluid:
+            continue
+        density, viscosity = pendulum(campaign, row).fluid
+        around[row.record] = Surroundings(
+            apparatus.sphere.diameter_m / 2,
+            apparatus.sphere.distance_m,
+            float(np.asarray(viscosity)),
+            float(np.asarray(density)),
+        )
+    if not around:
+        return None
+    errors = SharedErrors(
+        inverse_k=float(separated.benchmark["inverse_sd"]),
+        radius_m=apparatus.sphere.diameter_sd_m / 2,
+        distance_m=apparatus.sphere.distance_sd_m,
+    )
+    return compare(separated.records, around, errors)
+
+
+def _record(
+    campaign: Campaign, result: RecordResult, separated: Separation, found: Comparison | None
+) -> dict[str, Any]:
+    """Everything that is known of one record."""
+    row = result.record
+    content: dict[str, Any] = {
+        "record": row.record,
+        "source": row.file.name if row.file else row.source.partition(":")[0],
+        "fluid": row.fluid,
+        "branch": row.branch,
+        "geometry": row.geometry,
+        "temperature_c": row.temperature_c,
+        "refused": result.refused,
+    }
+    if result.refused is not None:
+        return content
+    fit = result.fit
+    split = next((s for s in separated.records if s.measured.record == row.record), None)
+    content |= {name: fit["parameters"][name] for name in fit["parameters"]}
+    content |= {
+        name: fit[name]
+        for name in (
+            "quality_factor_limit",
+            "method",
+            "noise_rms_rad",
+            "residual_rms_rad",
+            "chi2_per_dof",
+            "samples",
+            "turning_points",
+            "cuts",
+        )
+    }
+    content["warnings"] = [*fit["warnings"], *result.calibration["warnings"]]
+    content["volts_per_radian"] = result.calibration["volts_per_radian"]
+    points = read_turning_points(
+        Path(campaign.configuration.results) / row.record / "turning_points.csv"
+    )
+    content["start_s"], content["stop_s"] = float(points.time_s[0]), float(points.time_s[-1])
+    content["misfit"] = asdict(amplitude_misfit(points))
+    if split is not None:
+        content |= _separated(split)
+    return content | _theory(campaign, result, split, found)
+
+
+def _separated(split: SeparatedRecord) -> dict[str, Any]:
+    """The losses after Eq. 17, the errors of the calibration and of k in them."""
+    return {
+        "a": split.quadratic.as_json(),
+        "c": split.coulomb.as_json(),
+        "quality_factor_limit": split.quality_factor_limit.as_json(),
+        "quality_factor_hysteretic": split.quality_factor_hysteretic.as_json(),
+        "quality_factor_viscous": split.quality_factor_viscous.as_json(),
+    }
+
+
+def _theory(
+    campaign: Campaign,
+    result: RecordResult,
+    split: SeparatedRecord | None,
+    found: Comparison | None,
+) -> dict[str, Any]:
+    """Inertia in two ways, Eq. 16 and its neighbours."""
+    theory = record_theory(campaign, result.record)
+    if theory is None:
+        return {}
+    torque = theory["restoring_torque_n_m_per_rad"]
+    frequency = result.parameter("frequency")
+    inertia = float(inertia_from_frequency(frequency.value, torque))
+    content: dict[str, Any] = {
+        "moment_of_inertia": Estimate(theory["moment_of_inertia_kg_m2"], 0.0, "kg m^2").as_json(),
+        "moment_of_inertia_from_frequency": Estimate(
+            inertia, 2.0 * inertia * frequency.sd / frequency.value, "kg m^2"
+        ).as_json(),
+        "frequency_theory_hz": theory["frequency_hz"],
+    }
+    if "a_over_delta" not in theory:
+        return content
+    content |= {name: theory[name] for name in ("a_over_delta", "lengthening")}
+    if found is None or split is None or result.record.record not in found.losses.records:
+        return content
+    index = found.losses.records.index(result.record.record)
+    together = next(check for check in found.checks if check.history and check.hysteresis)
+    return content | {
+        "quality_factor_viscous_theory": Estimate(
+            float(found.quality_factor_theory[index]),
+            float(found.quality_factor_theory_sd[index]),
+            "",
+        ).as_json(),
+        "quality_factor_viscous_steady": float(found.quality_factor_steady[index]),
+        "quality_factor_limit_theory": float(together.quality_factor_limit[index]),
+        "drag_over_theory": float(found.drag_over_theory[index]),
+    }
+
+
+def _curves(campaign: Campaign, separated: Separation) -> dict[str, Any]:
+    """Theory along each branch, with the hysteresis where k is known."""
+    curves: dict[str, Any] = {}
+    for branch in dict.fromkeys(record.branch for record in campaign.records if record.branch):
+        curve = branch_curves(campaign, branch)
+        if curve is None:
+            continue
+        if separated.benchmark is not None:
+            viscous = np.array(curve["quality_factor_viscous_theory"])
+            hysteretic = hysteretic_quality_factor(
+                np.array(curve["frequency_hz"]), separated.benchmark["value"]
+            )
+            curve["quality_factor_limit_theory"] = (1 / (1 / viscous + 1 / hysteretic)).tolist()
+        curves[branch] = curve
+    return curves
+
+
+def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
+    """What is one number for the whole campaign."""
+    names = ("viscous_exponents", "theory_factor", "history_coefficient", "checks", "budget")
+    if found is None:
+        return dict.fromkeys((*names, "steady_stokes_percent"))
+    exponents = {
+        branch: {
+            **fitted.exponent.as_json(),
+            "sd_own": fitted.sd_own,
+            "sd_common": fitted.sd_common,
+            "curvature": fitted.curvature.as_json(),
+            "local_slopes": list(fitted.local_slopes),
+            "ranges": [asdict(part) for part in fitted.ranges],
+            "records": list(fitted.records),
+        }
+        for branch, fitted in found.exponents.items()
+    }
+    checks = [
+        {
+            "history": check.history,
+            "hysteresis": check.hysteresis,
+            "chi2": check.chi2,
+            "dof": check.degrees_of_freedom,
+            "ratio": check.ratio,
+        }
+        for check in found.checks
+    ]
+    budget = [{"source": name, "relative_sd": sd} for name, sd in found.budget.items()]
+    return {
+        "viscous_exponents": exponents,
+        "theory_factor": _shared(found.theory_factor),
+        "history_coefficient": _shared(found.history_coefficient),
+        "checks": checks,
+        "budget": budget,
+        "steady_stokes_percent": list(found.steady_stokes_percent),
+    }
+
+
+def _shared(number: SharedEstimate) -> dict[str, Any]:
+    return {
+        **number.estimate.as_json(),
+        "sd_own": number.sd_own,
+        "sd_common": number.sd_common,
+        "shared": number.shared,
+        "chi2": number.chi2,
+        "dof": number.degrees_of_freedom,
+        "p_value": number.p_value,
+    }
+
+
+def _tail(campaign: Campaign, results: list[RecordResult]) -> list[dict[str, Any]]:
+    """The tail-fit trap on the typical record."""
+    name = campaign.configuration.typical_record
+    usable = [result.record.record for result in results if result.refused is None]
+    if name is None or name not in usable:
+        return []
+    path = Path(campaign.configuration.results) / name / "turning_points.csv"
+    return [
+        {
+            "start_s": tail.start_s,
+            "amplitude_rad": tail.amplitude_rad,
+            **{letter: getattr(tail, letter).as_json() for letter in "abc"},
+        }
+        for tail in tail_fits(read_turning_points(path))
+    ]
+
+
+def _calibration(campaign: Campaign) -> dict[str, Any] | None:
+    """The caliper run with its line and its test."""
+    if campaign.configuration.calibration is None:
+        return None
+    content: dict[str, Any] = read_json(
+        Path(campaign.configuration.results) / "calibration" / "sensor.json"
+    )
+    return content

@@ -1,0 +1,100 @@
+"""MATLAB and Excel files hold the same swing as the text beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from scipy.io import savemat
+
+from pendpipe.errors import InputError
+from pendpipe.formats import ReadOptions, inspect, read
+
+from .decays import swing
+
+TIME, ANGLE = swing()
+
+
+def test_matlab_arrays_go_by_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"t": TIME, "theta2": ANGLE[:, None], "u": np.zeros(5), "note": "free"})
+    recording = read(path)
+    np.testing.assert_allclose(recording.time_s, TIME)
+    np.testing.assert_allclose(recording.values, ANGLE)
+    assert any("another length" in note for note in recording.notes)
+
+
+def test_simulink_logs_with_pi_below_are_counted_from_below(tmp_path: Path) -> None:
+    def log(values: object) -> dict[str, object]:
+        return {"time": TIME[:, None], "signals": {"values": values, "dimensions": 1}}
+
+    path = tmp_path / "a.mat"
+    savemat(
+        path, {"Distance": log(np.zeros((800, 1))), "Theta1": log((ANGLE + np.pi)[:, None])}
+    )
+    recording = read(path)
+    np.testing.assert_allclose(recording.values, ANGLE, atol=1e-12)
+    assert any("less pi" in note for note in recording.notes)
+    assert inspect(path).format == "matlab-v5"
+
+
+def test_a_matrix_with_time_in_front_and_a_rate_beside_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"data": np.column_stack([TIME, ANGLE])})
+    np.testing.assert_allclose(read(path).values, ANGLE)
+    savemat(path, {"angle": ANGLE, "fs": 50.0})
+    np.testing.assert_allclose(read(path).time_s, TIME)
+
+
+def test_matlab_73_and_junk_are_refused_clearly(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform" + b" " * 200)
+    with pytest.raises(InputError, match="-v7"):
+        read(path)
+    savemat(path, {"t": TIME, "theta": ANGLE})
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(InputError, match="can't be read"):
+        read(path)
+
+
+@pytest.mark.parametrize("header", [None, ["Zeit [s]", "Winkel [°]"], ["t", "theta (deg)"]])
+def test_excel_with_or_without_a_header(tmp_path: Path, header: list[str] | None) -> None:
+    book = openpyxl.Workbook()
+    notes, sheet = book.active, book.create_sheet("swing")
+    assert notes is not None
+    notes.append(["measured on a Monday"])
+    if header:
+        sheet.append(["Experiment 3"])
+        sheet.append(header)
+    for t, x in zip(TIME.tolist(), (10 * np.degrees(ANGLE)).tolist(), strict=True):
+        sheet.append([t, x])
+    path = tmp_path / "a.xlsx"
+    book.save(path)
+    recording = read(path)
+    np.testing.assert_allclose(recording.values, 10 * ANGLE)
+    assert recording.notes[0] == "sheet 'swing'"
+    assert inspect(path).format == "excel"
+
+
+def test_a_cell_of_text_is_named_by_its_row(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    for row, (t, x) in enumerate(zip(TIME.tolist(), ANGLE.tolist(), strict=True), start=1):
+        sheet.append([t, "lost" if row == 42 else x])
+    path = tmp_path / "a.xlsx"
+    book.save(path)
+    with pytest.raises(InputError, match="line 42: 'lost' is no number"):
+        read(path)
+
+
+def test_a_broken_archive_and_an_old_workbook_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.xlsx"
+    path.write_bytes(b"PK\x03\x04 nothing of use")
+    with pytest.raises(InputError, match="workbook can't be read"):
+        read(path)
+    path.write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600)
+    with pytest.raises(InputError, match="old Excel file"):
+        read(path, ReadOptions())
