@@ -31,9 +31,7 @@ def test_simulink_logs_with_pi_below_are_counted_from_below(tmp_path: Path) -> N
         return {"time": TIME[:, None], "signals": {"values": values, "dimensions": 1}}
 
     path = tmp_path / "a.mat"
-    savemat(
-        path, {"Distance": log(np.zeros((800, 1))), "Theta1": log((ANGLE + np.pi)[:, None])}
-    )
+    savemat(path, {"Distance": log(np.zeros((800, 1))), "Theta1": log((ANGLE + np.pi)[:, None])})
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE, atol=1e-12)
     assert any("less pi" in note for note in recording.notes)

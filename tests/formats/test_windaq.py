@@ -161,7 +161,7 @@ def test_a_spreadsheet_export_goes_by_place_and_index(tmp_path: Path) -> None:
         clock = 34 + row // 360 + (20 if row >= 700 else 0)
         event = "Resume" if row == 700 else ""
         rows.append(
-            f"{round(row / 360, 6):g},7/27/2026,2:{45 + clock // 60}:{clock % 60:02d} PM,"
+            f"{round(row / 360, 6)},7/27/2026,2:{45 + clock // 60}:{clock % 60:02d} PM,"
             f"{volts[row, 0]:.9f},{volts[row, 1]:.9f},{event}\n"
         )
     path.write_text(head + "".join(rows))

@@ -119,7 +119,9 @@ def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) ->
 
 def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     """Estimate the half period from the large swings; ``None`` if there are not two."""
-    span = float(np.ptp(values))
+    # Not the whole range: a wild reading would hide every swing.
+    low, high = np.percentile(values, (0.5, 99.5))
+    span = float(high - low) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
         turns = without_ripples(values, turning_samples(values, share * span))
         if len(turns) >= 4:

@@ -11,8 +11,8 @@ from pendpipe.arrays import FloatArray
 
 _ORDER: Final = 4
 _BLOCK: Final = 64
-_BLOCKS: Final = 2048
-_LATTICE: Final = 8192
+_BLOCKS: Final = 256
+_LATTICE: Final = 2048
 
 
 def quantisation_rms(step: float | None) -> float:

@@ -107,9 +107,13 @@ def new_figure(height_in: float = 3.5) -> tuple[Figure, Axes]:
 
 
 def figure_with_residuals(
-    height_in: float = 4.4, *, constrained: bool = True, residual_share: float = 0.4
+    height_in: float = 4.4,
+    *,
+    constrained: bool = True,
+    residual_share: float = 0.4,
+    baseline: float = 0.0,
 ) -> tuple[Figure, Axes, Axes]:
-    """A figure with a panel for data and fit, and one below for data minus fit."""
+    """A figure with a panel for data and fit, and one below for how they differ."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained" if constrained else None)
     upper, lower = figure.subplots(
         2, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, residual_share]}
@@ -118,16 +122,15 @@ def figure_with_residuals(
         # Fixed margins: four times faster, for the figure that every record has.
         figure.subplots_adjust(left=0.135, right=0.975, top=0.915, bottom=0.105, hspace=0.09)
     figure.align_ylabels([upper, lower])
-    lower.axhline(0.0, color=INK, linewidth=0.9)
+    lower.axhline(baseline, color=INK, linewidth=0.9)
     return figure, upper, lower
 
 
-def key_above(axes: Axes, columns: int = 2, **options: Any) -> None:
+def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0) -> None:
     """Put the legend above the axes, where it can't hide data."""
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns,
-        borderaxespad=0.3, **options,
-    )  # fmt: skip
+        loc="lower left", bbox_to_anchor=(0.0, lift), ncols=columns, borderaxespad=0.3
+    )
 
 
 def plain_text(text: str) -> str:

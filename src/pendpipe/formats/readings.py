@@ -119,8 +119,8 @@ def _jumps_of_a_turn(values: FloatArray) -> bool:
 def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
     """Count the angle from where the pendulum hangs: undo wraps, then whole half turns.
 
-    The centre is the mean of neighbouring extremes' median, which a decay shares with its
-    end; within 0.35 rad of an odd multiple of pi the file counts from the top.
+    A centre within 0.35 rad of a multiple of pi is taken to be where the pendulum hangs:
+    at an odd one the file counts from the top, at an even one from some turns ago.
     """
     notes = []
     finite = np.isfinite(values)

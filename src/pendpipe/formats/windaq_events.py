@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,8 @@ from pendpipe.formats.windaq_header import WindaqHeader
 _COMMENT_FLAG: Final = -0x80000000
 _PAUSE: Final = 2.0
 """Stamps are whole seconds: less than this is no pause."""
+_LONGEST_TAIL: Final = 4096
+"""Bytes behind the samples of a recording with a damaged header; more is not sought."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +80,14 @@ def parse_trailers(
     return Trailers(tuple(events), names[: len(header.channels)])
 
 
-def _is_text(data: bytes) -> bool:
-    high = sum(byte >= 0x80 for byte in data)
-    return all(byte == 0 or 9 <= byte <= 13 or byte >= 32 for byte in data) and 8 * high <= len(
-        data
-    )
+def _texts_from(data: bytes) -> int:
+    """Find the byte from which on there is nothing but printable signs and NULs."""
+    tail = np.frombuffer(data[-_LONGEST_TAIL:], dtype=np.uint8)
+    odd = np.flatnonzero((tail != 0) & (tail < 32) & ((tail < 9) | (tail > 13)) | (tail == 255))
+    return len(data) - len(tail) + (int(odd[-1]) + 1 if len(odd) else 0)
 
 
-def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers | None] | None:
+def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers] | None:
     """Find sizes under which a file with damaged ones makes sense from end to end.
 
     The data size is sought among the header's with bits taken away (a bit that was set by
@@ -94,17 +97,24 @@ def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers | 
     unit = 2 * len(header.channels)
     available = len(data) - header.size
     tail = available // unit * unit
+    texts_from = _texts_from(data)
     sizes = [size for size in _submasks(header.data_bytes) if 0 < size <= available]
     for size in (size for size in sizes if size % unit == 0):
-        found = _consistent(data, header, size)
+        found = _consistent(data, header, size, texts_from)
         if found is not None:
             return found
-    # A recording without comments ends a few hundred bytes after its samples.
-    for size in range(tail, max(tail - 4096, 0), -unit):
-        found = _consistent(data, header, size)
-        if found is not None and found[1] is not None and found[1].events:
-            return found
-    return None
+    # A recording without comments ends a few hundred bytes after its samples. Part of an
+    # event list reads as a list too: the one that begins with the start, else the longest.
+    tries = [
+        _consistent(data, header, size, texts_from)
+        for size in range(tail, max(tail - _LONGEST_TAIL, 0), -unit)
+    ]
+    found_all = [found for found in tries if found is not None]
+    return max(
+        found_all,
+        key=lambda found: (found[1].events[0].stamp_s is not None, len(found[1].events)),
+        default=None,
+    )
 
 
 def _submasks(value: int) -> list[int]:
@@ -119,20 +129,22 @@ def _submasks(value: int) -> list[int]:
 
 
 def _consistent(
-    data: bytes, header: WindaqHeader, size: int
+    data: bytes, header: WindaqHeader, size: int, texts_from: int
 ) -> tuple[WindaqHeader, Trailers] | None:
     """Try one data size: some length of the event list must leave texts to the end."""
     at = header.size + size
     rest = len(data) - at
-    # Texts can't be read as events, but events now and then as texts: the longest list first.
-    for event_bytes in range(min(rest, 4096) // 4 * 4, 7, -4):
+    # The last number of the list may end in NULs, which read as empty texts.
+    least = max(8, -(-(texts_from - at) // 4) * 4)
+    for event_bytes in sorted({8, least, least + 4, least + 8}, reverse=True):
         texts = data[at + event_bytes :]
-        enough = texts.count(0) >= len(header.channels)
-        if not enough or not _is_text(texts) or struct.unpack_from("<i", data, at)[0] > 0:
+        enough = event_bytes <= rest and texts.count(0) >= len(header.channels)
+        if not enough or at + event_bytes < texts_from:
             continue
         changed = replace(header, data_bytes=size, event_bytes=event_bytes)
         trailers = parse_trailers(data, at, event_bytes, header, size // (2 * len(header.channels)))
-        if trailers is not None and trailers.events:
+        scans = [event.scan for event in trailers.events] if trailers else []
+        if trailers is not None and scans and all(a < b for a, b in pairwise(scans)):
             return changed, trailers
     return None
 

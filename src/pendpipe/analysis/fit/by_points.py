@@ -13,7 +13,7 @@ from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
 from pendpipe.analysis.fit.period import Period, fit_period
-from pendpipe.analysis.fit.quadratic import covariance, interval95
+from pendpipe.analysis.fit.quadratic import covariance, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -138,10 +138,9 @@ def _numbers(
     value: FloatArray = np.array(
         [a, b, c, 0.5 * period.angular_frequency / math.pi, amplitude, phase, level]
     )
-    intervals = {
-        name: interval95(envelope.value, normal, gradient, BOUNDS, index, envelope.held)
-        for index, name in enumerate("abc")
-    }
+    intervals = dict(
+        zip("abc", intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held), strict=True)
+    )
     at_bound = [
         name for index, name in enumerate("abc")
         if index not in envelope.held and envelope.value[index] <= 0.0

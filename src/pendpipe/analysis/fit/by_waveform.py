@@ -22,7 +22,7 @@ from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.by_points import held_values
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
-from pendpipe.analysis.fit.quadratic import covariance, interval95
+from pendpipe.analysis.fit.quadratic import covariance, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
@@ -129,7 +129,9 @@ def _fit(
         problem = Waveform(
             samples.time_s[part], samples.values[part], points.noise_rms_rad, parts
         )
-        minimum = minimise(problem.evaluate, value, waveform.BOUNDS, held=held)
+        minimum = minimise(
+            problem.evaluate, value, waveform.BOUNDS, held=held, chi2_only=problem.chi2
+        )
         if used >= len(points):
             return _Fitted(problem, minimum, held, start)
         value = minimum.value
@@ -170,10 +172,9 @@ def _numbers(
         [*value[:3], 0.5 * value[waveform.OMEGA] / math.pi, first[0], first[1],
          value[waveform.OFFSET]]
     )  # fmt: skip
-    intervals = {
-        name: interval95(value, normal, gradient, waveform.BOUNDS, index, held)
-        for index, name in enumerate("abc")
-    }
+    intervals = dict(
+        zip("abc", intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held), strict=True)
+    )
     at_bound = [
         name for index, name in enumerate("abc") if index not in held and value[index] <= 0.0
     ]

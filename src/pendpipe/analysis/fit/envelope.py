@@ -38,7 +38,9 @@ class EnvelopeFit:
         return self.quadratic.chi2 / max(freedom, 1)
 
 
-def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None) -> EnvelopeFit:
+def fit_envelope(
+    points: TurningPoints, fixed: Mapping[str, float] | None = None, *, tolerance: float = 1e-5
+) -> EnvelopeFit:
     """Fit a, b, c >= 0 and y0 of Eq. 14 to turning points.
 
     The shared error of the level is a parameter with a prior: it has the alternating
@@ -50,6 +52,8 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
         Turning points with their errors.
     fixed
         Values of a, b, c, amplitude or offset that are held.
+    tolerance
+        Of chi^2, see `minimise`.
     """
     time = points.time_s - points.time_s[0]
     side, weight = points.side, 1.0 / points.angle_sd_rad**2
@@ -77,7 +81,7 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
         )
 
     start, held = _start(points, fixed or {})
-    found = minimise(evaluate, start, BOUNDS, held=held)
+    found = minimise(evaluate, start, BOUNDS, held=held, tolerance=tolerance)
     residual, _ = parts(found.value)
     model = measured - residual - shared * found.value[4]
     return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)

@@ -54,9 +54,9 @@ def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: fl
     where = np.unique(where[(where > 0) & (where < len(time))])
     if len(where) < 9:
         return 1.0
-    number = np.searchsorted(middles, time)
-    centre, width = points.time_s[number], float(np.median(np.diff(points.time_s)))
-    form = np.cos(np.clip((time - centre) * (np.pi / width), -0.5 * np.pi, 0.5 * np.pi))
+    counts = np.diff(np.concatenate([[0], where, [len(time)]]))
+    middle_of = np.concatenate([middles[:1] - np.diff(points.time_s[:2]), middles])
+    begin = np.repeat(middle_of[np.searchsorted(where, where, "right") * 0 + 0 :][: len(counts)], counts)
     starts = np.concatenate([[0], where])
     products = np.add.reduceat(residual * form, starts)[1:-1]
     squares = np.add.reduceat(form * form, starts)[1:-1]

@@ -119,15 +119,15 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     return result
 
 
-def interval95(
+def intervals95(
     value: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
     bounds: Bounds,
-    index: int,
+    indices: Sequence[int],
     held: Sequence[int] = (),
-) -> tuple[float, float]:
-    """Profile-likelihood interval of one parameter, the others refitted within their bounds.
+) -> list[tuple[float, float]]:
+    """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def interval95(
         Of chi^2/2 there; the gradient (-d chi^2/2) is not zero at a bound that is met.
     bounds
         Of the parameters.
-    index
-        The parameter.
+    indices
+        The parameters whose intervals are wanted.
     held
         Parameters that are not fitted.
 
@@ -147,19 +147,34 @@ def interval95(
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
+    matrix = covariance(normal, held)
+    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    fitted = [j for j in range(len(value)) if j not in held]
+    at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))
+    result = []
+    for index in indices:
+        sd = float(deviations[index])
+        half = math.sqrt(CHI2_95) * sd
+        ends = [float(value[index]) - half, float(value[index]) + half]
+        if sd > 0.0:
+            follow = matrix[:, index] / matrix[index, index]
+            for k, step in enumerate((-half, half)):
+                if not (at_rest and bounds.hold(value + step * follow)):
+                    ends[k] = _profiled_end(
+                        value, normal, gradient, bounds, index, held, math.copysign(_FAR * sd, step)
+                    )
+        result.append((ends[0], ends[1]))
+    return result
+
+
+def _profiled_end(
+    value: FloatArray, normal: FloatArray, gradient: FloatArray, bounds: Bounds, index: int,
+    held: Sequence[int], reach: float,
+) -> float:  # fmt: skip
+    """One end of an interval that a bound takes part in."""
     normal, gradient, bounds, value, index = _bounded_part(
         normal, gradient, bounds, value, index, held
     )
-    matrix = covariance(normal)
-    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    sd = float(deviations[index]) if np.isfinite(normal[index, index]) else 0.0
-    half = math.sqrt(CHI2_95) * sd
-    if sd == 0.0:
-        return float(value[index]), float(value[index])
-    low = max(-_FAR * sd, float(bounds.lower[index] - value[index]))
-    high = min(_FAR * sd, float(bounds.upper[index] - value[index]))
-    follow = matrix[:, index] / matrix[index, index]
-    at_rest = bool(np.all(np.abs(gradient) * deviations < 1e-2))
 
     def rise(distance: float) -> float:
         """Rise of chi^2 when the parameter is moved and the others follow."""
@@ -168,14 +183,9 @@ def interval95(
         step[index] = distance
         return float(step @ normal @ step - 2.0 * gradient @ step)
 
-    def end(reach: float) -> float:
-        """Distance to where chi^2 has risen enough."""
-        free = math.copysign(half, reach)
-        if at_rest and bounds.hold(value + free * follow):
-            return free
-        return _crossing(rise, reach)
-
-    return value[index] + end(low), value[index] + end(high)
+    low, high = float(bounds.lower[index]), float(bounds.upper[index])
+    reach = min(max(reach, low - float(value[index])), high - float(value[index]))
+    return float(value[index]) + _crossing(rise, reach)
 
 
 def _bounded_part(
@@ -187,9 +197,6 @@ def _bounded_part(
     walled = [j for j, _ in bounds.walls(free)]
     kept = [j for j in free if j == index or j in walled]
     gone = [j for j in free if j not in kept]
-    if index in held:
-        kept = [index]
-        return np.full((1, 1), np.inf), np.zeros(1), bounds, value[kept], 0
     block, cross = normal[np.ix_(kept, kept)], normal[np.ix_(gone, kept)]
     if gone:
         both = np.concatenate([cross, gradient[gone][:, None]], axis=1)

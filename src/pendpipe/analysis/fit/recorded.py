@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.recording import Recording
@@ -46,14 +47,15 @@ def fit_recording(
     InputError
         If the recording can't be analysed; see `find_turning_points`.
     """
-    if points is None:
-        points = find_turning_points(recording, place)
     if method == "turning-points":
-        from pendpipe.analysis.fit.by_points import fit_points
-
+        if points is None:
+            points = find_turning_points(recording, place)
         return fit_points(points, baseline=baseline, fixed=fixed)
     from pendpipe.analysis.fit.by_waveform import fit_waveform
+    from pendpipe.analysis.turning_points.find import turning_points_of
     from pendpipe.analysis.turning_points.samples import prepare
 
     samples = prepare(recording, place)
+    if points is None:
+        points = turning_points_of(samples, place)
     return fit_waveform(samples, points, baseline=baseline, fixed=fixed)

@@ -46,7 +46,7 @@ def start_values(
     The release is a turning point before the first reading (a virtual one, if need be),
     unless the amplitude is held: then it is the first turning point itself.
     """
-    envelope = fit_envelope(points, held)
+    envelope = fit_envelope(points, held, tolerance=0.3)
     a, b, c, y0, level = (float(number) for number in envelope.value)
     parts = loss_rates_of(fixed, points.apparent_frequency_hz)
     share = share_of(parts, b, baseline)

@@ -66,6 +66,15 @@ class Waveform:
         """Readings less model, shape (n,)."""
         return self.values - sample(*self.model(value), self.time_s)
 
+    def chi2(self, value: FloatArray) -> float:
+        """chi^2 with the share's prior; infinite where the model says nothing."""
+        model, release = self.model(value)
+        if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
+            return np.inf
+        residual = self.residual(value)
+        off = float(value[SHARE]) - PRIOR_SHARE
+        return float(residual @ residual) / self.noise_rms**2 + PRIOR_INVERSE * off**2
+
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         size = len(NAMES)

@@ -56,19 +56,23 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     InputError
         An angle beyond pi about its centre (a wrong unit).
     """
-    samples = prepare(recording, place)
+    return turning_points_of(prepare(recording, place), place)
+
+
+def turning_points_of(samples: Samples, place: str | Path = "recording") -> TurningPoints:
+    """As `find_turning_points`, of readings that are prepared already."""
     rough, stride = rough_half_cycles(samples)
     if len(rough.number) < 3:
         raise NotAnalysableError(place, *_too_few(samples, len(rough.number)))
-    places, first = _locate(samples.strided(stride), rough)
+    places, first = _locate(samples, rough, stride)
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
-    places, measured, shape = _shaped(samples, places, amplitude, rates, level)
+    places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))
     state = _State(samples, places, measured, shape, rates, level)
     keep = _kept(state)
     if keep.sum() < 3:
         raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
-    return _finish(state, keep, "m" if recording.quantity == "displacement_m" else "rad")
+    return _finish(state, keep)
 
 
 class _State(NamedTuple):
@@ -97,14 +101,14 @@ def _plain(number: int) -> FloatArray:
     return np.zeros((number, 4 + kernels.HARMONICS))
 
 
-def _locate(samples: Samples, rough: Rough) -> tuple[Places, Measured]:
+def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measured]:
     """Lock on to the half cycles with a bare cosine, and follow them into the tail."""
     places = first_places(rough)
     for _ in range(2):
-        measured = measure(samples, places, rough.level, _plain(len(places.number)))
+        shape = _plain(len(places.number))
+        measured = measure(samples, places, rough.level, shape, stride=stride)
         places = resmoothed(places, measured, samples.noise_rms)
-    places, measured = follow_tail(samples, places, measured, rough.level)
-    return places, measured
+    return follow_tail(samples, places, measured, rough.level)
 
 
 def _losses(
@@ -124,11 +128,12 @@ def _losses(
 
 
 def _shaped(
-    samples: Samples, places: Places, amplitude: FloatArray, rates: LossRates, level: float
-) -> tuple[Places, Measured, FloatArray]:
+    samples: Samples, places: Places, amplitude: FloatArray, rates: LossRates, level: float,
+    stride: int,
+) -> tuple[Places, Measured, FloatArray]:  # fmt: skip
     """Measure again with the shape that the losses, and odd harmonics, give the half cycles."""
     shape = half_cycle_shape(amplitude, places.angular_frequency, rates)
-    measured = measure(samples, places, level, shape, amplitude=amplitude)
+    measured = measure(samples, places, level, shape, stride=stride, amplitude=amplitude)
     places = resmoothed(places, measured, samples.noise_rms)
     measured = measure(samples, places, level, shape, amplitude=amplitude)
     shape, measured = odd_harmonics(samples, places, level, shape, measured)
@@ -149,7 +154,7 @@ def _noise(samples: Samples, measured: Measured) -> float:
     return max(pooled, quantisation_rms(samples.step))
 
 
-def _finish(state: _State, keep: BoolArray, unit: str) -> TurningPoints:
+def _finish(state: _State, keep: BoolArray) -> TurningPoints:
     """Put level, amplitude and time together."""
     samples, places, measured = state.samples, state.places, state.measured
     noise = samples.noise_rms
@@ -177,7 +182,7 @@ def _finish(state: _State, keep: BoolArray, unit: str) -> TurningPoints:
         start_s=float(samples.time_s[0]),
         stop_s=float(samples.time_s[-1]),
         samples=len(samples),
-        unit=unit,
+        unit=samples.unit,
         wanders=level.wanders,
         notes=_notes(samples, keep, level),
     )

@@ -14,13 +14,16 @@ HARMONICS = 3
 
 
 @njit(cache=True)
-def extremes(values: FloatArray, start: float, least: float) -> tuple[IntArray, int]:
+def extremes(
+    values: FloatArray, stride: int, start: float, least: float
+) -> tuple[IntArray, int]:
     """Find alternating extremes: each is followed by a return of at least a threshold.
 
     Parameters
     ----------
-    values
-        Readings; nothing need be known of level or period.
+    values, stride
+        Readings, of which every `stride`-th is looked at; nothing need be known of level
+        or period.
     start
         The first threshold; later it is a quarter of the median of the last five swings.
     least
@@ -31,15 +34,15 @@ def extremes(values: FloatArray, start: float, least: float) -> tuple[IntArray, 
     index, first
         Positions of the extremes; `first` is +1 if the first one is a maximum.
     """
-    found = np.empty(len(values) // 2 + 2, dtype=np.int64)
+    found = np.empty(len(values) // (2 * stride) + 2, dtype=np.int64)
     swings = np.full(5, np.nan)
     count, direction, first = 0, 0, 0
     threshold = max(start, least)
     high, low = 0, 0
     top, bottom = -np.inf, np.inf
-    for i in range(1, len(values) - 1):
+    for i in range(stride, len(values) - stride, stride):
         # The median of three: a glitch of one sample is no extreme.
-        p, q, r = values[i - 1], values[i], values[i + 1]
+        p, q, r = values[i - stride], values[i], values[i + stride]
         x = max(min(p, q), min(max(p, q), r))
         if x > top:
             high, top = i, x
@@ -87,15 +90,67 @@ def cosine_sine(phase: float) -> tuple[float, float]:
     return cosine, sine
 
 
+@njit(cache=True, fastmath=True)
+def plain_sums(
+    time_s: FloatArray,
+    values: FloatArray,
+    stride: int,
+    edges: IntArray,
+    centre_s: FloatArray,
+    rate: FloatArray,
+    level: float,
+    shape: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """As `half_cycle_sums` without harmonics: a loop that compilers turn into vectors."""
+    number = len(centre_s)
+    gram = np.zeros((number, 3, 3))
+    right = np.zeros((number, 3))
+    square = np.zeros(number)
+    for k in range(number):
+        friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
+        w, centre = rate[k], centre_s[k]
+        n, f1, s1, ff, fs, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        x0, xf, xs, xx = 0.0, 0.0, 0.0, 0.0
+        for i in range(edges[k, 0], edges[k, 1], stride):
+            phase = w * (time_s[i] - centre)
+            cosine, sine = cosine_sine(phase)
+            lack = 1.0 - cosine
+            side = 1.0 if phase > 0.0 else -1.0
+            form = (
+                cosine
+                + (side * friction - friction2) * lack
+                + viscous * (sine - phase * cosine)
+                + viscous2 * phase * (0.5 * phase * cosine - sine)
+            )
+            x = values[i] - level
+            n += 1.0
+            f1 += form
+            s1 += sine
+            ff += form * form
+            fs += form * sine
+            ss += sine * sine
+            x0 += x
+            xf += x * form
+            xs += x * sine
+            xx += x * x
+        gram[k, 0, 0], gram[k, 1, 1], gram[k, 2, 2] = n, ff, ss
+        gram[k, 0, 1] = gram[k, 1, 0] = f1
+        gram[k, 0, 2] = gram[k, 2, 0] = s1
+        gram[k, 1, 2] = gram[k, 2, 1] = fs
+        right[k, 0], right[k, 1], right[k, 2] = x0, xf, xs
+        square[k] = xx
+    return gram, right, square
+
+
 @njit(cache=True)
 def half_cycle_sums(
     time_s: FloatArray,
     values: FloatArray,
-    weights: FloatArray,
+    stride: int,
     edges: IntArray,
     centre_s: FloatArray,
     rate: FloatArray,
-    level: FloatArray,
+    level: float,
     shape: FloatArray,
     free: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -103,14 +158,14 @@ def half_cycle_sums(
 
     Parameters
     ----------
-    time_s, values, weights
-        Samples, shape (n,); `weights` of length 0 for equal ones.
+    time_s, values, stride
+        Readings, shape (n,), of which every `stride`-th is used.
     edges
         First sample and the one after the last of each half cycle, shape (k, 2).
     centre_s, rate
         Time of the turning point and phase per second, shape (k,).
     level
-        What is taken off the readings first, shape (k,).
+        What is taken off the readings first.
     shape
         Coefficients of the half cycle's shape (see `shape.py`), shape (k, 4 + HARMONICS).
     free
@@ -119,7 +174,7 @@ def half_cycle_sums(
     Returns
     -------
     gram, right, square
-        Weighted sums of products, shape (k, 3 + free, 3 + free), with the readings,
+        Sums of products, shape (k, 3 + free, 3 + free), with the readings,
         (k, 3 + free), and of the readings' squares, (k,).
     """
     number, size = len(centre_s), 3 + free
@@ -127,11 +182,10 @@ def half_cycle_sums(
     right = np.zeros((number, size))
     square = np.zeros(number)
     basis = np.empty(size)
-    even = weights.size == 0
     harmonic = free > 0 or np.any(shape[:, 4:] != 0.0)
     for k in range(number):
         friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
-        for i in range(edges[k, 0], edges[k, 1]):
+        for i in range(edges[k, 0], edges[k, 1], stride):
             phase = rate[k] * (time_s[i] - centre_s[k])
             cosine, sine = cosine_sine(phase)
             lack = 1.0 - cosine
@@ -149,14 +203,12 @@ def half_cycle_sums(
             basis[0] = 1.0
             basis[1] = form
             basis[2] = sine
-            x = values[i] - level[k]
-            w = 1.0 if even else weights[i]
-            square[k] += w * x * x
+            x = values[i] - level
+            square[k] += x * x
             for p in range(size):
-                wp = w * basis[p]
-                right[k, p] += wp * x
+                right[k, p] += basis[p] * x
                 for q in range(p + 1):
-                    gram[k, p, q] += wp * basis[q]
+                    gram[k, p, q] += basis[p] * basis[q]
         for p in range(size):
             for q in range(p):
                 gram[k, q, p] = gram[k, p, q]

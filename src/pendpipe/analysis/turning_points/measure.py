@@ -12,7 +12,6 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 _LOPSIDED: Final = 0.3
 _PHASE_PRIOR: Final = 0.05
-_NONE: Final = np.zeros(0)
 
 
 class Places(NamedTuple):
@@ -84,6 +83,7 @@ def measure(
     level: float,
     shape: FloatArray,
     *,
+    stride: int = 1,
     free: int = 0,
     amplitude: FloatArray | None = None,
 ) -> Measured:
@@ -97,16 +97,22 @@ def measure(
         Taken off the readings; the result says how the rest depends on it.
     shape
         From `shape.half_cycle_shape`.
+    stride
+        Every how many-th reading is enough.
     free
         Number of odd harmonics fitted besides.
     amplitude
         Known before; it holds the phase of a half cycle of which only a side is there.
     """
     number = len(places.number)
-    gram, right, square = kernels.half_cycle_sums(
-        samples.time_s, samples.values, _NONE, edges(samples, places),
-        places.centre_s, places.angular_frequency, np.full(number, level), shape, free,
+    arguments = (
+        samples.time_s, samples.values, stride, edges(samples, places),
+        places.centre_s, places.angular_frequency, level, shape,
     )  # fmt: skip
+    if free or shape[:, 4:].any():
+        gram, right, square = kernels.half_cycle_sums(*arguments, free)
+    else:
+        gram, right, square = kernels.plain_sums(*arguments)
     prior = np.zeros(number)
     lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:

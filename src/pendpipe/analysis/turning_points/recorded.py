@@ -33,10 +33,12 @@ def measure_recording(
         The turning points, with the cuts; and the part of the recording they are from.
     """
     decay = find_free_decay(recording)
-    part = recording.between(decay.start_s, decay.stop_s)
+    part = decay.of(recording)
     points = find_turning_points(part, place)
+    notes = (*decay.notes, *points.notes)
     cuts = tuple(Cut(cut.start_s, cut.stop_s, cut.reason) for cut in decay.cuts)
     metadata = {
         key: str(value) for key, value in (provenance or {}).items() if value is not None
     }
-    return replace(points, cuts=cuts, metadata={**points.metadata, **metadata}), part
+    metadata = {**points.metadata, **metadata}
+    return replace(points, cuts=cuts, metadata=metadata, notes=notes), part

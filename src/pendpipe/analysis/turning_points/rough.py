@@ -38,17 +38,17 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         least = 40.0 * samples.noise_rms
     piece = samples.values[:_LOOK]
     start = 0.15 * float(piece.max() - piece.min())
-    index, first = kernels.extremes(piece, start, least)
+    index, first = kernels.extremes(piece, 1, start, least)
     stride = 1
-    if len(samples) > _LOOK and len(index) > 2:
+    if len(index) > 2 and not samples.counts:
         stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
-        index, first = kernels.extremes(samples.strided(stride).values, start, least)
-    reduced = samples.strided(stride)
-    time, value = reduced.time_s[index], reduced.values[index]
+    if len(samples) > _LOOK:
+        index, first = kernels.extremes(samples.values, stride, start, least)
+    time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
     if len(index) < 3:
         return Rough(np.arange(len(index)), time, side, value, float(np.median(piece))), stride
-    whole, gap_before = _beside_gaps(reduced.time_s, index)
+    whole, gap_before = _beside_gaps(samples.time_s, index)
     time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
     number, good = kernels.count_half_cycles(time, side, gap_before)
     cut = slice(0, good)

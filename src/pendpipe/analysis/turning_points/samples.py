@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +27,8 @@ class Samples:
     ----------
     time_s, values
         Shape (n,), finite, times strictly rising.
+    unit
+        ``"rad"`` or ``"m"``.
     step
         The step of the readings; None where there is none, or where the times of the
         steps are the data (`counts`).
@@ -39,18 +41,13 @@ class Samples:
 
     time_s: FloatArray
     values: FloatArray
+    unit: str
     step: float | None
     noise_rms: float
     counts: bool = False
 
     def __len__(self) -> int:
         return len(self.time_s)
-
-    def strided(self, stride: int) -> Samples:
-        """Every `stride`-th reading: enough for a first look at a long record."""
-        if stride <= 1:
-            return self
-        return replace(self, time_s=self.time_s[::stride], values=self.values[::stride])
 
 
 def prepare(recording: Recording, place: str | Path) -> Samples:
@@ -88,8 +85,8 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
         )
     step = recording.resolution or find_step(values)
     if step is not None and _one_row_a_count(time, values, step):
-        return _edges(time, values, step)
-    return Samples(time, values, step, noise_rms(values, step))
+        return _edges(time, values, recording.unit, step)
+    return Samples(time, values, recording.unit, step, noise_rms(values, step))
 
 
 def _all_finite(values: FloatArray) -> bool:
@@ -107,15 +104,16 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
     are the converter's.
     """
     piece = values[: 1 << 18]
-    levels = np.unique(piece)
-    if len(levels) < 16:
-        return
-    for extreme, next_level in ((low, levels[1]), (high, levels[-2])):
+    for extreme in (low, high):
         at = piece == extreme
-        share = float(np.mean(at))
-        expected = math.sqrt(max(abs(next_level - extreme), 1e-12) / (high - low))
+        share = np.count_nonzero(at) / len(piece)
+        if share <= _SATURATED:
+            continue
+        levels = np.unique(piece)
+        step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
+        expected = math.sqrt(max(step, 1e-12) / (high - low))
         runs = np.count_nonzero(np.diff(at.astype(np.int8)) == 1) + int(at[0])
-        if share > max(_SATURATED, 2.0 * expected) and np.count_nonzero(at) > 8 * runs:
+        if len(levels) > 16 and share > 2.0 * expected and np.count_nonzero(at) > 8 * runs:
             raise NotAnalysableError(
                 place,
                 f"the channel is saturated: {100.0 * share:.0f} % of the readings are"
@@ -134,7 +132,7 @@ def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
     return len(piece) > 50 and single > 0.98 and uneven
 
 
-def _edges(time: FloatArray, values: FloatArray, step: float) -> Samples:
+def _edges(time: FloatArray, values: FloatArray, unit: str, step: float) -> Samples:
     """Turn counts into the angles at which they changed, half a step back.
 
     The same edge is then passed upwards and downwards at the same angle, so that the
@@ -142,4 +140,4 @@ def _edges(time: FloatArray, values: FloatArray, step: float) -> Samples:
     """
     angles = values[1:] - 0.5 * np.copysign(step, np.diff(values))
     # The lines of a scale are placed to a small part of its step.
-    return Samples(time[1:], angles, None, 0.05 * step, counts=True)
+    return Samples(time[1:], angles, unit, None, 0.05 * step, counts=True)

@@ -1,0 +1,140 @@
+"""All the figures of a campaign, and which of them could not be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from pendpipe.errors import InputError
+from pendpipe.figures import (
+    decay,
+    fig03,
+    fig04,
+    fig05,
+    fig06,
+    fig07,
+    fig08,
+    fig09,
+    fig10,
+    tail,
+)
+from pendpipe.figures.data import (
+    Entry,
+    NothingToDrawError,
+    number,
+    read_decay,
+    used,
+)
+from pendpipe.figures.placeholder import placeholder
+from pendpipe.figures.style import save
+from pendpipe.recording import read_plain
+
+Comparison = Mapping[str, Any]
+
+
+@dataclass
+class Drawn:
+    """What was drawn, and what was left out and why."""
+
+    files: list[Path] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def draw_all(comparison: Comparison, folder: Path, out: Path) -> Drawn:
+    """Draw figures 3 to 10, the tail figure and each record's decay.
+
+    Parameters
+    ----------
+    comparison
+        The content of comparison.json.
+    folder
+        The campaign's results: a folder a record lies in it.
+    out
+        Where the campaign's figures go; a record's go to its own folder.
+
+    Returns
+    -------
+    Drawn
+        A campaign with theory leaves a file for each of figures 3 to 10, with the reason
+        in it where there was nothing to draw; one without leaves them out.
+    """
+    drawn = Drawn()
+    keep_places = bool(comparison.get("has_theory"))
+    for name, draw in _campaign_figures(comparison, folder).items():
+        _draw(drawn, name, draw, out / name, keep_place=keep_places and name.startswith("fig"))
+    for entry in comparison["records"]:
+        name = entry["record"]
+        if entry.get("refused"):
+            drawn.left_out[f"{name}, decay"] = "the record was refused"
+            continue
+        stem = folder / name / "figures" / "decay"
+        _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, dpi=150)
+    return drawn
+
+
+def _campaign_figures(comparison: Comparison, folder: Path) -> dict[str, Callable[[], Figure]]:
+    """The drawing of each figure, not yet done."""
+    figures: dict[str, Callable[[], Figure]] = {
+        "fig03": lambda: fig03.draw(comparison.get("calibration")),
+        "fig04": lambda: fig04.draw(comparison),
+        "fig07": lambda: _typical_decay(comparison, folder),
+        "fig08": lambda: fig08.draw(read_decay(folder, _typical(comparison))),
+        "tail": lambda: tail.draw(comparison.get("tail")),
+    }
+    if comparison.get("has_theory"):
+        figures |= {
+            "fig05": lambda: fig05.draw(comparison),
+            "fig06": lambda: fig06.draw(comparison),
+            "fig09": lambda: fig09.draw(comparison),
+            "fig10": lambda: fig10.draw(comparison),
+        }
+    return dict(sorted(figures.items()))
+
+
+def _decay_of(folder: Path, entry: Entry) -> Callable[[], Figure]:
+    return lambda: decay.draw(read_decay(folder, entry))
+
+
+def _typical(comparison: Comparison) -> Entry:
+    """The record of figures 7 and 8."""
+    name = comparison.get("typical_record")
+    if not name:
+        raise NothingToDrawError("the configuration names no typical record")
+    for entry in used(comparison):
+        if entry["record"] == name:
+            return entry
+    raise NothingToDrawError(f"the typical record {name} was refused")
+
+
+def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
+    entry = _typical(comparison)
+    constant = number(entry.get("volts_per_radian"))
+    try:
+        recording = read_plain(folder / entry["record"] / "recording.csv")
+    except InputError as fault:
+        raise NothingToDrawError(str(fault)) from None
+    return fig07.draw(read_decay(folder, entry), recording, constant)
+
+
+def _draw(
+    drawn: Drawn,
+    name: str,
+    draw: Callable[[], Figure],
+    stem: Path,
+    *,
+    keep_place: bool = False,
+    dpi: int = 200,
+) -> None:
+    """Draw and save one figure, or note why not (and say it in the figure's place)."""
+    try:
+        figure = draw()
+    except NothingToDrawError as reason:
+        drawn.left_out[name] = str(reason)
+        if not keep_place:
+            return
+        figure = placeholder(str(reason))
+    drawn.files += save(figure, stem, dpi=dpi)

@@ -1,0 +1,222 @@
+"""A free decay is found where the pendulum swings by itself, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pendpipe.analysis.free_decay import FreeDecay, find_free_decay
+from pendpipe.errors import NotAnalysableError
+from pendpipe.recording import Recording
+
+Floats = NDArray[np.float64]
+RATE = 100.0
+PERIOD = 1.25
+OMEGA = 2 * np.pi / PERIOD
+
+
+def oscillation(amplitude: float, decrement: float, coulomb: float, most: float) -> Floats:
+    """Swing from rest at `amplitude`, half cycle by half cycle about the friction's centre.
+
+    Each half cycle loses the share `decrement` and the constant 2 `coulomb`; it stops where
+    the friction holds it.
+    """
+    half = int(RATE * PERIOD / 2)
+    phase = np.pi * np.arange(half) / half
+    out: list[Floats] = []
+    turn = amplitude
+    while abs(turn) > coulomb and len(out) * half < most * RATE:
+        after = -np.sign(turn) * max(abs(turn) * (1 - decrement) - 2 * coulomb, 0.0)
+        out.append(0.5 * (turn + after) + 0.5 * (turn - after) * np.cos(phase))
+        turn = after
+    return np.concatenate(out)[: int(most * RATE)]
+
+
+def ramp(low: float, high: float, seconds: float) -> Floats:
+    """Move smoothly by hand."""
+    phase = np.linspace(0, np.pi, int(seconds * RATE))
+    return low + (high - low) * 0.5 * (1 - np.cos(phase))
+
+
+def still(level: float, seconds: float) -> Floats:
+    return np.full(int(seconds * RATE), level)
+
+
+def recording(parts: Iterable[Floats], *, noise: float = 0.0, step: float = 0.0) -> Recording:
+    values = np.concatenate(list(parts))
+    values = values + noise * np.random.default_rng(7).standard_normal(len(values))
+    if step:
+        values = np.rint(values / step) * step
+    return Recording(
+        time_s=np.arange(len(values)) / RATE,
+        values=values,
+        quantity="angle_rad",
+        resolution=step or None,
+    )
+
+
+def reasons(found: FreeDecay) -> list[str]:
+    return [cut.reason for cut in found.cuts]
+
+
+@pytest.mark.parametrize(("noise", "step"), [(0.0, 0.0), (2e-3, 0.0), (0.0, 0.01), (1e-3, 2e-3)])
+@pytest.mark.parametrize("amplitude", [0.4, 2.6])
+def test_rest_pull_hold_and_stop_are_cut(amplitude: float, noise: float, step: float) -> None:
+    swing = oscillation(amplitude, 0.03, 5e-3, 60.0)
+    before = [still(0.0, 6.0), ramp(0.0, amplitude, 1.7), still(amplitude, 2.0)]
+    rest = still(float(swing[-1]), 8.0)
+    found = find_free_decay(recording([*before, swing, rest], noise=noise, step=step))
+    released = sum(map(len, before)) / RATE
+    assert released - 0.1 <= found.start_s <= released + 0.5 * PERIOD
+    stopped = released + len(swing) / RATE
+    # The last turning points hide in noise and step.
+    hidden = np.searchsorted(-np.abs(oscillation(amplitude, 0.03, 5e-3, 60.0)[::62]), -3e-2)
+    assert found.stop_s <= stopped + PERIOD
+    assert found.stop_s >= released + 0.62 * float(hidden) - PERIOD
+    assert reasons(found)[:2] == ["rest before release", "moved by hand before release"]
+    assert reasons(found)[-1] == "at rest after the decay"
+    assert found.half_period_s == pytest.approx(PERIOD / 2, rel=0.02)
+
+
+def test_a_recording_of_nothing_else_is_kept_whole() -> None:
+    time = np.arange(4000) / RATE
+    for phase in (0.0, 0.7, 2.0, 4.0):
+        values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time + phase)
+        found = find_free_decay(Recording(time, values, "angle_rad"))
+        assert (found.start_s, found.stop_s) == (time[0], time[-1])
+        assert found.cuts == []
+
+
+@pytest.mark.parametrize("what", ["seen by an encoder, a row a count", "with a hole", "at 7 Hz"])
+def test_uneven_and_sparse_samples_change_nothing(what: str) -> None:
+    swing = oscillation(0.5, 0.02, 2e-3, 80.0)
+    parts = [still(0.0, 5.0), ramp(0.0, 0.5, 1.5), swing, still(float(swing[-1]), 5.0)]
+    even = recording(parts, step=0.004)
+    keep = np.ones(len(even), dtype=bool)
+    if what == "seen by an encoder, a row a count":
+        keep[1:] = np.diff(even.values) != 0
+    elif what == "with a hole":
+        keep[1500:1540] = False
+    else:
+        keep[:] = np.arange(len(even)) % 14 == 0
+    part = Recording(even.time_s[keep], even.values[keep], "angle_rad", resolution=0.004)
+    whole, found = find_free_decay(even), find_free_decay(part)
+    assert found.start_s == pytest.approx(whole.start_s, abs=0.25 * PERIOD)
+    assert found.stop_s == pytest.approx(whole.stop_s, abs=1.5 * PERIOD)
+
+
+@given(
+    before=st.floats(0.0, 40.0),
+    after=st.floats(0.0, 40.0),
+    amplitude=st.floats(0.1, 2.0),
+    decrement=st.floats(0.0, 0.1),
+)
+@settings(max_examples=40, deadline=None)
+def test_more_rest_before_or_after_moves_nothing(
+    before: float, after: float, amplitude: float, decrement: float
+) -> None:
+    swing = oscillation(amplitude, decrement, 0.01 * amplitude, 60.0)
+    core = [still(0.0, 3.0), ramp(0.0, amplitude, 1.5), swing, still(float(swing[-1]), 3.0)]
+    step = amplitude / 200
+    short = recording(core, step=step)
+    long = recording([still(0.0, before), *core, still(float(swing[-1]), after)], step=step)
+    shift = int(before * RATE) / RATE
+    first, second = find_free_decay(short), find_free_decay(long)
+    assert second.start_s - shift == pytest.approx(first.start_s, abs=0.05 * PERIOD)
+    assert second.stop_s - shift == pytest.approx(first.stop_s, abs=0.1 * PERIOD)
+
+
+def test_of_two_decays_the_more_telling_is_taken_and_the_other_told() -> None:
+    small, large = oscillation(0.2, 0.05, 2e-3, 30.0), oscillation(0.8, 0.03, 2e-3, 60.0)
+    parts = [small, still(float(small[-1]), 3.0), ramp(float(small[-1]), 0.8, 1.3), large]
+    found = find_free_decay(recording(parts, step=1e-3))
+    begin = (len(small) + 430) / RATE
+    assert begin - 0.1 <= found.start_s <= begin + 0.5 * PERIOD
+    assert any("another decay" in note and "is not used" in note for note in found.notes)
+
+
+def test_a_driven_front_is_cut_and_a_steady_drive_refused() -> None:
+    time = np.arange(int(30 * RATE)) / RATE
+    driven = 0.4 * np.cos(OMEGA * time)
+    free = oscillation(0.4, 0.04, 1e-3, 60.0)
+    found = find_free_decay(recording([driven, free], noise=1e-3))
+    assert found.start_s == pytest.approx(30.0, abs=2.5 * PERIOD)
+    assert "driven: the amplitude is held up" in reasons(found)
+    with pytest.raises(NotAnalysableError, match="the amplitude does not fall"):
+        find_free_decay(recording([driven], noise=1e-3))
+
+
+def test_a_beat_is_physics_and_stays() -> None:
+    # Two modes that exchange energy: the amplitude is flat at first, and rises again.
+    time = np.arange(int(80 * RATE)) / RATE
+    beat = 1 + 0.1 * np.cos(2 * np.pi * time / 20.0)
+    values = 0.3 * beat * np.exp(-0.02 * time) * np.cos(OMEGA * time)
+    found = find_free_decay(Recording(time, values, "angle_rad"))
+    assert (found.start_s, found.stop_s) == (time[0], time[-1])
+
+
+@pytest.mark.parametrize("kick", [1.15, 0.7])
+def test_a_small_knock_and_a_wild_reading_stay(kick: float) -> None:
+    swing = oscillation(0.5, 0.02, 1e-3, 60.0)
+    swing[2000:] *= kick
+    swing[1234] = 3.0
+    swing[3100:3103] = -2.0
+    found = find_free_decay(recording([swing], noise=1e-3))
+    assert found.start_s == 0.0
+    assert found.stop_s > 55.0
+
+
+def test_a_long_gap_parts_the_record() -> None:
+    swing = oscillation(0.5, 0.02, 1e-3, 60.0)
+    whole = recording([swing], noise=1e-3)
+    keep = (whole.time_s < 20) | (whole.time_s > 33)
+    found = find_free_decay(Recording(whole.time_s[keep], whole.values[keep], "angle_rad"))
+    assert found.stop_s <= 20.0 or found.start_s >= 33.0
+
+
+def test_a_clamp_ends_the_decay_at_once() -> None:
+    swing = oscillation(0.5, 0.02, 1e-3, 20.3)
+    parts = [swing, ramp(float(swing[-1]), 0.9, 0.8), still(0.9, 10.0)]
+    found = find_free_decay(recording(parts, noise=1e-3))
+    assert found.start_s == 0.0
+    assert found.stop_s == pytest.approx(20.3, abs=0.6 * PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("parts", "noise", "said"),
+    [
+        ([still(0.3, 20.0)], 0.0, "the reading never changes"),
+        ([still(0.3, 20.0)], 1e-3, "no"),
+        ([ramp(0.0, 1.0, 3.0), still(1.0, 5.0), ramp(1.0, -0.4, 4.0)], 1e-3, "does not swing"),
+        ([ramp(0, 1, 1.0), ramp(1, 0.9, 3.0), ramp(0.9, 1.4, 0.4), ramp(1.4, 0, 2.0)], 1e-3, "no"),
+        ([oscillation(0.5, 0.5, 0.02, 2.0)[:110], still(0.0, 9.0)], 1e-3, "no"),
+        ([np.cumsum(np.random.default_rng(3).standard_normal(3000)) * 1e-2], 0.0, "no free decay"),
+    ],
+)
+def test_what_is_no_decay_is_refused_in_one_line(
+    parts: list[Floats], noise: float, said: str
+) -> None:
+    with pytest.raises(NotAnalysableError) as caught:
+        find_free_decay(recording(parts, noise=noise))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_growing_oscillation_is_no_decay() -> None:
+    time = np.arange(int(40 * RATE)) / RATE
+    values = 0.01 * np.exp(0.05 * time) * np.cos(OMEGA * time)
+    with pytest.raises(NotAnalysableError):
+        find_free_decay(Recording(time, values, "angle_rad"))
+
+
+def test_metres_are_as_good_as_radians() -> None:
+    swing = oscillation(0.07, 0.02, 1e-4, 60.0) + 0.417
+    moved = Recording(np.arange(len(swing)) / RATE, swing, "displacement_m")
+    found = find_free_decay(moved)
+    assert found.start_s == 0.0
+    assert len(found.of(moved)) >= 0.9 * len(moved)
