@@ -168,7 +168,7 @@ def test_a_small_knock_and_a_wild_reading_stay(kick: float) -> None:
     swing[3100:3103] = -2.0
     found = find_free_decay(recording([swing], noise=1e-3))
     assert found.start_s == 0.0
-    assert found.stop_s > 55.0
+    assert found.stop_s > len(swing) / RATE - PERIOD
 
 
 def test_a_long_gap_parts_the_record() -> None:

@@ -34,27 +34,24 @@ def draw(decay: Decay) -> Figure:
     linear = start * np.exp(-rate * decay.elapsed_s)
     large, large_unit = axis_unit(y, decay.unit)
     residual = y - fitted
-    small, small_unit = axis_unit(np.percentile(np.abs(residual) + sd, [98.0]), decay.unit)
+    small, small_unit = axis_unit(np.abs(residual) + sd, decay.unit)
 
     figure, upper, lower = figure_with_residuals(4.2, constrained=False, residual_share=0.5)
     _amplitudes(upper, time, large * y, large * sd)
-    upper.plot(time, large * fitted, color=INK, label="Eq. 14: $a$, $b$, $c$")
-    upper.plot(time, large * linear, color=VERMILION, linestyle="--", linewidth=1.1,
-               label="linear damping alone")  # fmt: skip
+    upper.plot(time, large * fitted, color=INK, linewidth=1.0, zorder=3,
+               label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})")  # fmt: skip
+    upper.plot(time, large * linear, color=VERMILION, linestyle="--", linewidth=1.1, zorder=3,
+               label=f"linear damping ({_rms(y - linear, decay.unit)})")  # fmt: skip
     positive = y[y > 0.0]
     if positive.size:
         upper.set_yscale("log")
         upper.set_ylim(0.7 * large * float(np.min(positive)), 1.4 * large * float(np.max(y)))
         _plain_log_labels(upper)
     upper.set_ylabel(f"Amplitude ({large_unit})")
-    key_above(upper, 3)
+    key_above(upper, 2)
 
     _amplitudes(lower, time, small * residual, small * sd)
-    lower.plot(time, small * (linear - fitted), color=VERMILION, linestyle="--", linewidth=1.1)
     lower.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel=f"Data − fit ({small_unit})")
-    # The fit's residuals set the scale: linear damping may leave the panel.
-    reach = 1.25 * small * float(np.max(np.abs(residual) + sd))
-    lower.set_ylim(-reach, reach)
     lower.margins(x=0.015)
     return figure
 
@@ -67,6 +64,13 @@ def _amplitudes(axes: Axes, time_s: FloatArray, values: FloatArray, errors: Floa
     )  # fmt: skip
 
 
+def _rms(misfit: FloatArray, unit: str) -> str:
+    """Root mean square with its unit."""
+    value = float(np.sqrt(np.mean(misfit**2)))
+    factor, short = axis_unit(np.array([value]), unit)
+    return f"{factor * value:.2g} {short}" if factor * value < 100 else f"{factor * value:.0f} {short}"
+
+
 def _plain_log_labels(axes: Axes) -> None:
     """Write 0.5, 1, 2, 5, ... on a logarithmic axis instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -76,3 +80,4 @@ def _plain_log_labels(axes: Axes) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=steps))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(which="minor", length=0)

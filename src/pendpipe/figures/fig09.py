@@ -17,6 +17,7 @@ from pendpipe.figures.data import (
     number,
     of_branch,
     series,
+    used,
 )
 from pendpipe.figures.style import GREY, INK, branch, figure_with_residuals, key_above, styled
 from pendpipe.figures.units import with_error
@@ -34,6 +35,8 @@ def draw(comparison: Mapping[str, Any]) -> Figure:
     upper.set(ylabel="Limiting quality factor $Q$", xlim=(0.0, None), ylim=(0.0, None))
     key_above(upper, 1)
 
+    spread = _theory_spread(comparison)
+    lower.axhspan(1.0 - spread, 1.0 + spread, color=GREY, alpha=0.18, linewidth=0.0)
     for name in branches(comparison):
         _ratio(lower, comparison, name)
     factor = comparison.get("theory_factor")
@@ -57,6 +60,13 @@ def draw_measured(axes: Axes, comparison: Mapping[str, Any]) -> None:
             points.x, points.y, points.y_sd, points.x_sd,
             fmt=look.marker, color=look.colour, zorder=3, label=f"measured, {look.name}",
         )  # fmt: skip
+
+
+def _theory_spread(comparison: Mapping[str, Any]) -> float:
+    """Relative standard deviation of Eq. 16 itself, from distances and diameter."""
+    theory = [entry.get("quality_factor_viscous_theory") for entry in used(comparison)]
+    spreads = [error(entry) / number(entry) for entry in theory if entry and number(entry) > 0.0]
+    return float(np.median(spreads)) if spreads else 0.0
 
 
 def _ratio(axes: Axes, comparison: Mapping[str, Any], name: str) -> None:

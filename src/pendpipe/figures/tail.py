@@ -13,7 +13,7 @@ from pendpipe.figures.data import NothingToDrawError, error, number
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled
 from pendpipe.figures.units import axis_unit, prefixed
 
-_UNITS: Final = {"a": "1/(rad s)", "b": "1/s", "c": "rad/s"}
+_UNITS: Final = {"a": "rad⁻¹ s⁻¹", "b": "s⁻¹", "c": "rad/s"}
 
 
 @styled

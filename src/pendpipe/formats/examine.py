@@ -124,16 +124,12 @@ def clipped_samples(
 
 
 def _flat_tops(values: FloatArray, off: float) -> int:
-    """Count the samples of flat runs at the maximum with a fall beyond `off` beside them."""
+    """Count the samples at the maximum, if two flat runs there fall off steeply."""
     top = np.nanmax(values)
     at = np.concatenate(([False], values == top, [False]))
     edges = np.flatnonzero(np.diff(at.astype(np.int8)))
-    starts, stops = edges[::2], edges[1::2]
-    total = runs = 0
-    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
-        sides = [values[start - 1]] if start else []
-        sides += [values[stop]] if stop < len(values) else []
-        if stop - start >= 3 and sides and top - min(sides) > off:
-            runs += 1
-            total += stop - start
-    return total if runs >= 2 else 0
+    steep = 0
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        sides = values[max(start - 1, 0) : start].tolist() + values[stop : stop + 1].tolist()
+        steep += stop - start >= 3 and bool(sides) and top - min(sides) > off
+    return int(at.sum()) if steep >= 2 else 0

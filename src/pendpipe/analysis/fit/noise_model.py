@@ -51,14 +51,14 @@ def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: fl
     """Scatter of the residual's amplitude in each half cycle against white noise's."""
     middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
     where = np.searchsorted(time, middles)
-    where = np.unique(where[(where > 0) & (where < len(time))])
-    if len(where) < 9:
+    counts = np.diff(where)
+    if len(counts) < 9 or np.any(counts < 3):
         return 1.0
-    counts = np.diff(np.concatenate([[0], where, [len(time)]]))
-    middle_of = np.concatenate([middles[:1] - np.diff(points.time_s[:2]), middles])
-    begin = np.repeat(middle_of[np.searchsorted(where, where, "right") * 0 + 0 :][: len(counts)], counts)
-    starts = np.concatenate([[0], where])
-    products = np.add.reduceat(residual * form, starts)[1:-1]
-    squares = np.add.reduceat(form * form, starts)[1:-1]
-    ratio = float(np.mean(products**2 / np.maximum(squares, 1e-12))) / rms**2
+    part = slice(int(where[0]), int(where[-1]))
+    share = (time[part] - np.repeat(middles[:-1], counts)) / np.repeat(np.diff(middles), counts)
+    # A parabola is the half wave, near enough.
+    form = share * (1.0 - share)
+    products = np.add.reduceat(residual[part] * form, where[:-1] - where[0])
+    squares = np.add.reduceat(form * form, where[:-1] - where[0])
+    ratio = float(np.mean(products**2 / squares)) / rms**2
     return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(products)) else 1.0

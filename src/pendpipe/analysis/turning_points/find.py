@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.follow import first_places, follow_tail, resmoothed
-from pendpipe.analysis.turning_points.harmonics import odd_harmonics
+from pendpipe.analysis.turning_points.harmonics import odd_harmonics, own_square
 from pendpipe.analysis.turning_points.level import Level, estimate_level
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure, smoothed
 from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
@@ -144,9 +144,8 @@ def _noise(samples: Samples, measured: Measured) -> float:
     """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
     known = np.isfinite(measured.amplitude) & (measured.count > 6)
     size = 2 + measured.harmonics.shape[1]
-    shift = measured.score / np.maximum(measured.information, 1e-300)
     # The level is common; what a half cycle wants of its own is not noise of the readings.
-    square = measured.residual_square - measured.score * shift
+    square = own_square(measured)
     freedom = float(np.sum(measured.count[known] - size - 1))
     if freedom < 8:
         return samples.noise_rms

@@ -18,13 +18,22 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 
 _CLEARLY: Final = 0.02
-_SIGNIFICANT: Final = 30.0
+_SIGNIFICANT: Final = 20.0
+_NARROW: Final = 0.5
+"""Part of a half cycle that is fitted where no shape fits the whole of it."""
+_NEIGHBOURS: Final = 10
+_CIRCULAR: Final = 1.0 / 192.0
+"""Third harmonic of a pendulum of 1 rad; it grows with the cube of the amplitude."""
 
 
 def odd_harmonics(
     samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured
 ) -> tuple[FloatArray, Measured]:
     """Add odd harmonics to the shape where the readings ask for them.
+
+    Where even these don't fit (beyond 1.5 rad, where the period changes from one half
+    cycle to the next), the middle half of the half cycle is fitted with a third harmonic
+    of its own: precise enough, since so large a swing stands far out of the noise.
 
     Returns
     -------
@@ -33,23 +42,73 @@ def odd_harmonics(
     """
     noise = _white(samples, places)
     before = _misfit(measured)
-    if before < (1.0 + _CLEARLY) * noise**2:
+    if before < (1.0 + _CLEARLY) * noise**2 and not _expected(samples, measured, noise):
         return shape, measured
+    count = float(np.nansum(measured.count))
     for free in range(1, kernels.HARMONICS + 1):
-        tried = measure(
-            samples, places, level, shape, free=free, amplitude=measured.amplitude
-        )
-        after = _misfit(tried)
-        gain = (before - after) * float(np.nansum(measured.count)) / max(after, noise**2)
-        if gain < _SIGNIFICANT + 4.0 * np.count_nonzero(np.isfinite(measured.amplitude)) ** 0.5:
+        amplitude = measured.amplitude
+        tried = measure(samples, places, level, shape, free=free, amplitude=amplitude)
+        longer = shape.copy()
+        longer[:, 4 : 4 + free] += _shares(places, tried, free)
+        shared = measure(samples, places, level, longer, amplitude=amplitude)
+        after = _misfit(shared)
+        if (before - after) * count < _SIGNIFICANT * max(after, noise**2):
             break
-        shape = shape.copy()
-        shape[:, 4 : 4 + free] = _shares(places, tried, free)
-        measured = measure(samples, places, level, shape, amplitude=measured.amplitude)
-        before = _misfit(measured)
-        if before < (1.0 + _CLEARLY) * noise**2:
+        shape, measured, before = longer, shared, after
+        if before < (1.0 + 0.1 * _CLEARLY) * noise**2:
             break
-    return shape, measured
+    return _narrowed(samples, places, level, shape, measured, noise)
+
+
+def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
+    """Whether a pendulum (sin x) of this amplitude would show its third harmonic."""
+    if samples.unit != "rad":
+        return False
+    amplitude = np.nan_to_num(measured.amplitude)
+    effect = _CIRCULAR * amplitude**3 / (noise * np.sqrt(np.nan_to_num(measured.variance, nan=1.0)))
+    return float(np.sum(effect**2)) > 9.0
+
+
+def _narrowed(
+    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    noise: float,
+) -> tuple[FloatArray, Measured]:  # fmt: skip
+    """Replace the half cycles that no shape fits by fits of their middle halves."""
+    bare = shape.copy()
+    bare[:, 4:] = 0.0
+    middle = measure(
+        samples, places, level, bare, window=_NARROW, free=1, amplitude=measured.amplitude
+    )
+    ratio, freedom = _ratio(measured, noise)
+    poor = (ratio > 1.0 + 5.0 * np.sqrt(2.0 / freedom)) & (middle.count > 8)
+    if not poor.any():
+        return shape, measured
+    # What even the middle half does not fit counts as error, not as precision.
+    enlarged = np.maximum(_ratio(middle, noise)[0], 1.0)
+    single = middle._replace(
+        amplitude=middle.peak[:, 0], variance=middle.peak[:, 1] * enlarged,
+        coupling=middle.peak[:, 2], harmonics=measured.harmonics,
+    )  # fmt: skip
+    chosen = [
+        np.where(poor.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+        for new, old in zip(single, measured, strict=True)
+    ]
+    return np.where(poor[:, None], bare, shape), Measured(*chosen)
+
+
+def _ratio(measured: Measured, noise: float) -> tuple[FloatArray, FloatArray]:
+    """Misfit of half cycles over the noise's, with that of ten neighbours to each side."""
+    known = np.isfinite(measured.amplitude) & (measured.count > 4)
+    square = np.where(known, own_square(measured), 0.0) / noise**2
+    freedom = np.where(known, np.maximum(measured.count - 3.0, 1.0), 0.0)
+    box = np.ones(min(2 * _NEIGHBOURS + 1, 2 * (len(square) // 2) - 1))
+    around = np.maximum(np.convolve(freedom, box, "same"), 1.0)
+    return np.convolve(square, box, "same") / around, around
+
+
+def own_square(measured: Measured) -> FloatArray:
+    """Sum of squares of each half cycle about its fit, at its own level."""
+    return measured.residual_square - measured.score**2 / np.maximum(measured.information, 1e-300)
 
 
 def _white(samples: Samples, places: Places) -> float:
@@ -63,8 +122,7 @@ def _white(samples: Samples, places: Places) -> float:
 def _misfit(measured: Measured) -> float:
     """Mean square of the readings about the fitted half cycles, each at its own level."""
     known = np.isfinite(measured.amplitude) & (measured.count > 8)
-    shift = measured.score**2 / np.maximum(measured.information, 1e-300)
-    square = (measured.residual_square - shift)[known]
+    square = own_square(measured)[known]
     freedom = (measured.count - measured.harmonics.shape[1] - 3)[known]
     return float(np.sum(square) / max(float(np.sum(freedom)), 1.0))
 

@@ -43,6 +43,9 @@ class Measured(NamedTuple):
     """Fall of the signed amplitude for a rise of the level."""
     harmonics: FloatArray
     """Free odd harmonics, shape (k, free)."""
+    peak: FloatArray
+    """Amplitude and free harmonics together, their sum's variance for unit noise, and the
+    sum's fall with the level; shape (k, 3)."""
     information: FloatArray
     score: FloatArray
     residual_square: FloatArray
@@ -67,8 +70,15 @@ def smoothed(amplitude: FloatArray, window: int = 3) -> FloatArray:
     return np.maximum(filled, mean)
 
 
-def edges(samples: Samples, places: Places) -> IntArray:
-    """First sample and the one after the last of each half cycle, shape (k, 2)."""
+def edges(samples: Samples, places: Places, window: float = 1.0) -> IntArray:
+    """First sample and the one after the last of each half cycle, shape (k, 2).
+
+    A `window` below 1 takes that part of each half cycle, about its middle.
+    """
+    if window < 1.0:
+        reach = 0.5 * window * places.half_period_s
+        ends = np.stack([places.centre_s - reach, places.centre_s + reach], axis=1)
+        return np.searchsorted(samples.time_s, ends)
     start = places.centre_s - 0.5 * places.half_period_s
     stop = places.centre_s + 0.5 * places.half_period_s
     between = 0.5 * (stop[:-1] + start[1:])
@@ -84,6 +94,7 @@ def measure(
     shape: FloatArray,
     *,
     stride: int = 1,
+    window: float = 1.0,
     free: int = 0,
     amplitude: FloatArray | None = None,
 ) -> Measured:
@@ -99,6 +110,8 @@ def measure(
         From `shape.half_cycle_shape`.
     stride
         Every how many-th reading is enough.
+    window
+        Part of the half cycle that is fitted.
     free
         Number of odd harmonics fitted besides.
     amplitude
@@ -106,7 +119,7 @@ def measure(
     """
     number = len(places.number)
     arguments = (
-        samples.time_s, samples.values, stride, edges(samples, places),
+        samples.time_s, samples.values, stride, edges(samples, places, window),
         places.centre_s, places.angular_frequency, level, shape,
     )  # fmt: skip
     if free or shape[:, 4:].any():
@@ -129,9 +142,20 @@ def measure(
         sine_variance=inverse[:, 1, 1],
         coupling=solution[:, 0, 1],
         harmonics=best[:, 2:] * places.side[:, None],
+        peak=_peak(best, inverse, solution[:, :, 1], places.side),
         information=gram[:, 0, 0] - np.sum(flat * solution[:, :, 1], axis=1),
         score=right[:, 0] - np.sum(flat * best, axis=1),
         residual_square=square - np.sum(best * right[:, 1:], axis=1),
         count=gram[:, 0, 0],
         lopsided=lopsided,
     )
+
+
+def _peak(
+    best: FloatArray, inverse: FloatArray, by_level: FloatArray, side: FloatArray
+) -> FloatArray:
+    """Value at the turning point: the amplitude and the free harmonics add up there."""
+    even = np.ones(best.shape[1])
+    even[1] = 0.0
+    variance = np.einsum("kpq,p,q->k", inverse, even, even)
+    return np.stack([best @ even * side, variance, by_level @ even], axis=1)

@@ -1,0 +1,41 @@
+"""Draw figures 3 to 10 of a campaign, the tail figure, and the decay of each record.
+
+What has no data is left out, and said on standard error; in a campaign with an apparatus
+each of figures 3 to 10 is written all the same, with the reason in its place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe figures``."""
+    parser.add_argument(
+        "--campaign", required=True, type=Path, metavar="CONFIG.json",
+        help="the campaign's configuration, as the workflow stores it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--comparison", required=True, type=Path, metavar="FILE",
+        help="comparison.json, from pendpipe compare",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", required=True, type=Path, metavar="FOLDER",
+        help="where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
+    )  # fmt: skip
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw."""
+    from pendpipe.figures.campaign import draw_all
+    from pendpipe.report.inputs import read_campaign_file, results_folder
+
+    folder = results_folder(arguments.campaign)
+    comparison = read_campaign_file(arguments.comparison)
+    drawn = draw_all(comparison, folder, arguments.out)
+    for name, reason in drawn.left_out.items():
+        print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
+    print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
+    return 0

@@ -1,0 +1,116 @@
+"""What `inspect` says: uniformity, gaps, step, clipping; and the two commands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe.cli import main
+from pendpipe.formats import inspect, read
+from pendpipe.formats.examine import clipped_samples, find_gaps, is_uniform, resolution, sample_rate
+from pendpipe.recording import read_plain
+
+from .decays import WindaqFile, swing
+
+TIME, ANGLE = swing(2000)
+
+
+@given(
+    step=st.floats(1e-5, 1e-1), offset=st.floats(-5, 5), decimals=st.sampled_from([None, 4.4, 7.3])
+)
+def test_the_step_of_any_converter_is_found(
+    step: float, offset: float, decimals: float | None
+) -> None:
+    amplitude = 200 * step
+    values = offset + step * np.rint(amplitude / step * ANGLE)
+    if decimals is not None:
+        # Printed with few digits: a step of the converter is that many of the print.
+        quantum = step / decimals
+        values = np.rint(values / quantum) * quantum
+    assert resolution(values) == pytest.approx(step, rel=2e-2 if decimals else 1e-6)
+
+
+def test_a_computed_reading_has_no_step() -> None:
+    assert resolution(ANGLE) is None
+    assert resolution(ANGLE + 1e-4 * np.random.default_rng(1).standard_normal(2000)) is None
+
+
+def test_gaps_do_not_spoil_rate_and_uniformity() -> None:
+    time = TIME.copy()
+    time[700:] += 0.4
+    assert is_uniform(time)
+    assert sample_rate(time) == pytest.approx(50.0)
+    (gap,) = find_gaps(time)
+    assert (gap.after_sample, gap.missing_s) == (699, pytest.approx(0.4))
+
+
+def test_silence_of_an_encoder_is_no_gap_but_minutes_are() -> None:
+    time, angle = swing(60_000, 1000.0)
+    counts = np.rint(angle / 0.002)
+    kept = np.flatnonzero(np.diff(counts, prepend=0) != 0)
+    stamps = time[kept]
+    assert not is_uniform(stamps)
+    assert find_gaps(stamps) == []
+    half = len(stamps) // 2
+    stamps[half:] += 200.0
+    assert [gap.after_sample for gap in find_gaps(stamps)] == [half - 1]
+
+
+def test_flat_tops_are_clipping_and_slow_turns_are_not() -> None:
+    coarse = np.rint(ANGLE / 0.01) * 0.01
+    assert clipped_samples(coarse, 0.01) == 0
+    cut = np.clip(ANGLE, -1.0, 0.3)
+    assert clipped_samples(cut, None) == np.sum(cut == 0.3)
+    assert clipped_samples(np.clip(coarse, -0.2, 1.0), 0.01) == np.sum(coarse <= -0.2 + 1e-9)
+
+
+def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.WDH"
+    counts = np.rint(ANGLE * 20000).astype(np.int64)[:, None]
+    events = [0, 0, -1000]
+    path.write_bytes(WindaqFile(counts, hires=True, interval_s=0.02, events=events).pack())
+    assert main(["inspect", "--json", str(path)]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["schema_version"] == 1
+    assert told["format"] == "windaq-hires"
+    assert told["channels"] == [{"name": "channel 1", "unit": "Volt"}]
+    assert (told["samples"], told["uniform"], told["clipped_samples"]) == (2000, True, 0)
+    assert told["sample_rate_hz"] == pytest.approx(50.0)
+    assert told["duration_s"] == pytest.approx(39.98)
+    assert told["resolution"] == pytest.approx(10 / 16384 / 4)
+    assert told["gaps"] == []
+    assert told["markers"][1] == {"sample": 1000, "time_s": 20.0, "comment": ""}
+    assert list(told) == [
+        *("schema_version", "format", "channels", "samples", "sample_rate_hz", "uniform"),
+        *("duration_s", "resolution", "gaps", "markers", "clipped_samples", "warnings"),
+    ]
+
+
+def test_convert_keeps_samples_constant_and_markers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "a.WDQ", tmp_path / "out.csv"
+    counts = np.rint(ANGLE * 8000).astype(np.int64)[:, None]
+    path.write_bytes(WindaqFile(counts, interval_s=0.02, events=[0, 0, -1000]).pack())
+    assert main(["convert", str(path), str(out), "--volts-per-radian", "3.85"]) == 0
+    assert "a.WDQ" in capsys.readouterr().err
+    plain = read_plain(out)
+    np.testing.assert_array_equal(plain.values, read(path).values)
+    assert plain.number("volts_per_radian") == 3.85
+    assert [mark.sample for mark in inspect(out).markers] == [0, 1000]
+    assert inspect(out).format == "plain"
+
+
+def test_a_fault_ends_with_2_one_line_and_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "a.csv", tmp_path / "out.csv"
+    path.write_text("time_s,angle_rad\n0.0,0.1\n0.1,oops\n")
+    assert main(["convert", str(path), str(out)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [path]
