@@ -34,7 +34,7 @@ def test_simulink_logs_with_pi_below_are_counted_from_below(tmp_path: Path) -> N
     savemat(path, {"Distance": log(np.zeros((800, 1))), "Theta1": log((ANGLE + np.pi)[:, None])})
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE, atol=1e-12)
-    assert any("less pi" in note for note in recording.notes)
+    assert any("1 half turn" in note for note in recording.notes)
     assert inspect(path).format == "matlab-v5"
 
 

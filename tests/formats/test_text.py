@@ -67,6 +67,9 @@ DIALECTS: dict[str, str | bytes] = {
     "pi is down, wrapped": table(
         TIME, np.where(ANGLE > 0, ANGLE - np.pi, ANGLE + np.pi), head="t,theta\n"
     ),
+    "polar angle from the horizontal": table(TIME, np.degrees(ANGLE) - 90, head="t,θ_r\n"),
+    "decimal commas in quotes": "t,phi\n"
+    + "".join(f'"{t:.3f}","{x:.9f}"\n'.replace(".", ",") for t, x in zip(TIME, ANGLE, strict=True)),
     "rate in the header, no time": table(
         np.degrees(ANGLE), head="start_deg, sample_rate, seconds\n45, 50, 16\n"
     ),

@@ -55,7 +55,7 @@ def draw(decay: Decay, recording: Recording, volts_per_radian: float | None) -> 
     upper.plot(moment, large * (level - envelope), color=INK)
     name = "Sensor output" if unit == "V" else "Motion"
     upper.set(ylabel=f"{name} ({large_unit})")
-    key_above(upper)
+    key_above(upper, 1)
     lower.errorbar(
         decay.time_s, small * misfit, small * misfit_sd,
         fmt="o", color=BLUE, markersize=2.0, elinewidth=0.6, capsize=0.0,

@@ -45,7 +45,7 @@ def draw(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
             fmt="o", color=VERMILION, markersize=4.5, label="fit to the tail from here on",
         )  # fmt: skip
         panel.set_ylabel(f"${name}$ ({unit})")
-        panel.margins(y=0.12)
+        panel.set_ylim(*(factor * end for end in _window(values, errors)))
     panels[-1].set_xlabel("Start of the fitted part (s)")
     _amplitudes_on_top(panels[0], tail, start)
     key_above(panels[0], 2, lift=1.28)
@@ -59,13 +59,30 @@ def _scale(name: str, values: FloatArray) -> tuple[float, str]:
     return axis_unit(values, unit) if name == "c" else (1.0, unit)
 
 
-def _amplitudes_on_top(
-    panel: Any, tail: Sequence[Mapping[str, Any]], start: FloatArray
-) -> None:
-    """Mark the amplitude at which each fit begins."""
+def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Limits about the whole record's value: the tails' errors, but no more than themselves.
+
+    The shortest tails know nothing any more (errors of ten thousand times the value); their
+    bars leave the panel, or no other fit could be told from the line.
+    """
+    whole = values[0]
+    reach = np.abs(values - whole) + errors
+    near = reach[reach <= abs(whole)]
+    half = 1.15 * max(float(np.max(near, initial=0.0)), 3.0 * errors[0], 1e-3 * abs(whole))
+    return whole - half, whole + half
+
+
+def _amplitudes_on_top(panel: Any, tail: Sequence[Mapping[str, Any]], start: FloatArray) -> None:
+    """Mark round amplitudes where the decay passes them."""
     amplitude = np.array([number(fit["amplitude_rad"]) for fit in tail])
     factor, unit = prefixed(float(np.nanmax(amplitude)), "rad")
+    decades = 10.0 ** np.arange(-6, 4)
+    marks = np.sort(np.outer(decades, [1.0, 2.0, 5.0]).ravel())
+    shown = factor * amplitude
+    marks = marks[(marks >= np.min(shown)) & (marks <= np.max(shown))]
+    order = np.argsort(shown)
+    moments = np.interp(np.log(marks), np.log(shown[order]), start[order])
     top = panel.secondary_xaxis("top")
-    top.set_xticks(start, [f"{factor * y:.3g}" for y in amplitude])
+    top.set_xticks(moments, [f"{mark:g}" for mark in marks])
     top.set_xlabel(f"Amplitude there ({unit})", color=INK, labelpad=3)
     top.spines["top"].set_visible(True)

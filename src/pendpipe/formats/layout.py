@@ -85,11 +85,13 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
     full = [line for line in lines if line.strip() and not is_comment(line)]
     step = max(1, len(full) // 200)
     sample = full[len(full) // 20 :: step]
+    # "0,025","0,5": the same sign twice, told apart by the quotes alone.
+    quoted = any('"' in line for line in sample)
     candidates = [
         Layout(delimiter, decimal, 0)
         for delimiter in _wanted_delimiters(options)
         for decimal in _wanted_decimals(options)
-        if delimiter != decimal
+        if delimiter != decimal or (quoted and delimiter == ",")
     ]
     best, best_score = None, (0.0, 0)
     for layout in candidates:

@@ -120,7 +120,8 @@ def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
     """Count the angle from where the pendulum hangs: undo wraps, then whole half turns.
 
     A centre within 0.35 rad of a multiple of pi is taken to be where the pendulum hangs:
-    at an odd one the file counts from the top, at an even one from some turns ago.
+    at an odd one the file counts from the top, at an even one from some turns ago. So is
+    one within 0.15 rad of a quarter turn: polar angles are counted from the horizontal.
     """
     notes = []
     finite = np.isfinite(values)
@@ -131,13 +132,15 @@ def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
     low, high = np.percentile(values[finite], (5, 95)) if finite.any() else (0.0, 0.0)
     centre = float(np.median(values[finite])) if finite.any() else 0.0
     centre = centre if high - low < 1.0 else 0.5 * float(low + high)
-    turns = round(centre / np.pi)
-    if turns and abs(centre - turns * np.pi) < 0.35:
-        notes.append(
-            f"the angle swings about {centre:.3f} rad: counted from there less"
-            f" {abs(turns) if abs(turns) > 1 else ''}pi"
-        )
-        values = values - turns * np.pi
+    for quarters, words in ((2, "half turn"), (1, "quarter turn")):
+        turns = round(centre / (0.5 * np.pi * quarters))
+        shift = 0.5 * np.pi * quarters * turns
+        if turns and abs(centre - shift) < (0.35 if quarters == 2 else 0.15):
+            notes.append(
+                f"the angle swings about {centre:.3f} rad: {shift:.4f} rad"
+                f" ({turns} {words}) taken off, so that it hangs at 0"
+            )
+            return values - shift, notes
     return values, notes
 
 

@@ -23,7 +23,7 @@ from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
 _LEAST_SHARE: Final = 0.3
-"""Of the information that a whole half cycle holds; less is not kept."""
+"""Of the readings that its neighbours have; a half cycle with fewer is not kept."""
 _SEEN: Final = 3.0
 """Standard deviations by which the last half cycle must stand out, with its neighbours."""
 
@@ -200,16 +200,22 @@ def _kept(state: _State) -> BoolArray:
     A record that ends at rest ends here with the last half cycle that is seen.
     """
     samples, places, measured = state.samples, state.places, state.measured
-    information = 1.0 / measured.variance
-    usual = float(np.nanmedian(information))
     turning = places.centre_s
     slack = 0.02 * places.half_period_s
     inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
-    keep = inside & (np.nan_to_num(information) > _LEAST_SHARE * usual)
+    keep = inside & (measured.coverage > _LEAST_SHARE * _usual(measured.coverage))
     sd = samples.noise_rms * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
     seen = keep & (smoothed(measured.amplitude, 1) > _SEEN * sd)
     keep[int(np.max(np.flatnonzero(seen), initial=-1)) + 1 :] = False
     return keep
+
+
+def _usual(coverage: FloatArray) -> FloatArray:
+    """What is usual among the five neighbours to each side."""
+    if len(coverage) < 12:
+        return np.full(len(coverage), float(np.median(coverage[coverage > 0.0])))
+    padded = np.pad(coverage, 5, mode="reflect")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 11), axis=1))
 
 
 def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:

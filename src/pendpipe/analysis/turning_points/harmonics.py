@@ -88,6 +88,9 @@ def _narrowed(
     single = middle._replace(
         amplitude=middle.peak[:, 0], variance=middle.peak[:, 1] * enlarged,
         coupling=middle.peak[:, 2], harmonics=measured.harmonics,
+        coverage=measured.coverage,
+        # Their level would be their shape's fault: it is left to the others.
+        information=1e-9 * measured.information, score=0.0 * measured.score,
     )  # fmt: skip
     chosen = [
         np.where(poor.reshape(-1, *[1] * (new.ndim - 1)), new, old)

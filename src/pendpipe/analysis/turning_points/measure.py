@@ -50,6 +50,8 @@ class Measured(NamedTuple):
     score: FloatArray
     residual_square: FloatArray
     count: FloatArray
+    coverage: FloatArray
+    """Sum of the squared shape over the readings: what the amplitude rests on."""
     lopsided: BoolArray
     """Whether readings of one side are missing, so that amplitude and phase mix."""
 
@@ -147,6 +149,7 @@ def measure(
         score=right[:, 0] - np.sum(flat * best, axis=1),
         residual_square=square - np.sum(best * right[:, 1:], axis=1),
         count=gram[:, 0, 0],
+        coverage=gram[:, 1, 1],
         lopsided=lopsided,
     )
 
