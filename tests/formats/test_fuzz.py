@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
@@ -26,7 +28,13 @@ SEEDS = {
     + "".join(f"{t:.2f},1/1/2026,1:00:00 PM,{x:.5f},\n" for t, x in zip(TIME, ANGLE, strict=True)),
 }
 BYTES = {name: text.encode() for name, text in SEEDS.items()}
-BYTES |= {"f.WDQ": WindaqFile(_COUNTS).pack(), "g.WHC": WindaqFile(_COUNTS, True).pack()}
+_MATLAB = io.BytesIO()
+savemat(_MATLAB, {"t": TIME, "s": {"theta": ANGLE, "name": "free"}, "c": [1, "two"]})
+BYTES |= {
+    "h.mat": _MATLAB.getvalue(),
+    "f.WDQ": WindaqFile(_COUNTS).pack(),
+    "g.WHC": WindaqFile(_COUNTS, True).pack(),
+}
 
 clean = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -39,7 +47,9 @@ def hold(path: Path) -> None:
         try:
             result = call(path)
         except InputError as fault:
-            assert "\n" not in str(fault)
+            said = str(fault)
+            if "\n" in said:
+                pytest.fail(f"more than one line: {said!r}")
         else:
             if call is read:
                 check(path, result)  # type: ignore[arg-type]

@@ -179,7 +179,7 @@ def test_blank_cells_are_missing_rows_and_said(tmp_path: Path) -> None:
 def test_rows_that_repeat_are_dropped_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     lines = table(TIME, ANGLE, head="t,theta\n").splitlines()
-    path.write_text("\n".join(lines[:50] + [lines[49]] + lines[50:]))
+    path.write_text("\n".join([*lines[:50], lines[49], *lines[50:]]))
     recording = read(path)
     np.testing.assert_allclose(recording.time_s, TIME)
     assert any("1 row(s) that repeat" in note for note in recording.notes)
@@ -224,14 +224,15 @@ def spoil(row: int, text: str) -> Callable[[list[str]], list[str]]:
         (spoil(7, "0.12,oops"), "line 8: 'oops' is no number"),
         (spoil(7, "oops,0.4"), "line 8: 'oops' is no number"),
         (spoil(1, "oops,0.4"), "line 2: 'oops' is no number"),
+        (spoil(2, "restarted here"), "line 3: 'restarted here' is no number"),
         (spoil(7, "0.01,0.4"), "line 8: the time falls"),
         (spoil(7, "0.10,0.4"), "line 8: the time repeats"),
         (spoil(7, "0.12,nan"), "line 8: 1 reading(s) that are NaN"),
         (spoil(7, "nan,0.4"), "line 8: the time is missing or NaN"),
         (spoil(800, "15.98,abc"), "line 801: 'abc' is no number"),
         (lambda lines: lines[:1], "no block of rows with numbers"),
-        (lambda lines: [], "the file is empty"),
-        (lambda lines: ["hello", "world"], "text table: no block of rows"),
+        (lambda _: [], "the file is empty"),
+        (lambda _: ["hello", "world"], "text table: no block of rows"),
         (lambda lines: [line.split(",")[1] for line in lines], "no time column and no sample rate"),
         (lambda lines: [line.split(",")[0] for line in lines], "no column looks like an angle"),
     ],

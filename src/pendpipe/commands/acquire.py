@@ -81,7 +81,9 @@ def _stage(arguments: argparse.Namespace) -> int:
     from pathlib import Path
 
     from pendpipe.commands._campaign import load
+    from pendpipe.commands._compiled import start_numba
 
+    start_numba()
     campaign, out = load(arguments.campaign), Path(arguments.out)
     if arguments.caliper:
         from pendpipe.stages.caliper import run_caliper

@@ -30,11 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
     from pendpipe.figures.campaign import draw_all
-    from pendpipe.report.inputs import read_campaign_file, results_folder
+    from pendpipe.figures.inputs import read_comparison, read_content, results_folder
 
-    folder = results_folder(arguments.campaign)
-    comparison = read_campaign_file(arguments.comparison)
-    drawn = draw_all(comparison, folder, arguments.out)
+    folder = results_folder(read_content(arguments.campaign))
+    drawn = draw_all(read_comparison(arguments.comparison), folder, arguments.out)
     for name, reason in drawn.left_out.items():
         print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
     print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)

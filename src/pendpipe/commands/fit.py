@@ -59,6 +59,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _fit(arguments: argparse.Namespace) -> None:
+    from pendpipe.commands._compiled import start_numba
+
+    start_numba()
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording
@@ -107,7 +110,9 @@ def _statement(out: Path, result: FitResult) -> str:
     lines = [f"{out}: {result.method}, {result.turning_points} turning points"]
     for name, estimate in result.parameters.items():
         bound = " (at its bound)" if estimate.at_bound else ""
-        lines.append(f"  {name:<22}{estimate.value:.8g} +- {estimate.sd:.2g} {estimate.unit}{bound}")
+        lines.append(
+            f"  {name:<22}{estimate.value:.8g} +- {estimate.sd:.2g} {estimate.unit}{bound}"
+        )
     limit = result.quality_factor_limit
     if limit is not None:
         lines.append(f"  {'quality_factor_limit':<22}{limit.value:.6g} +- {limit.sd:.2g}")

@@ -20,7 +20,7 @@ delta itself has dropped out: the difference to m is taken analytically.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from numba import njit
 
@@ -38,11 +38,18 @@ COLUMN, ZETA, VALUE, SCRATCH = range(160, 240, 20)
 BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(240, 360, 20)  # sensitivities.py
 NODE_SIZE = 360
 
-# No exceptions, and no reference counts (which forbids to allocate): both cost more than they
-# are worth here. Multiplications and additions may be fused.
-kernel = njit(_nrt=False, error_model="numpy", fastmath={"contract"})
+# No exceptions, no reference counts (which forbids to allocate), and no entry from Python: each
+# costs more than it is worth here. Multiplications and additions may be fused.
+_OPTIONS: dict[str, Any] = {
+    "_nrt": False,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+kernel = njit(**_OPTIONS)
 """How every function of the engine is compiled."""
-part = njit(_nrt=False, error_model="numpy", fastmath={"contract"}, forceinline=True)
+part = njit(**_OPTIONS, forceinline=True)
 """How those are that take the whole workspace, which is too much to hand over at each call."""
 
 

@@ -157,16 +157,30 @@ def read_decay(folder: Path, entry: Entry) -> Decay:
     if np.count_nonzero(keep) < 3:
         keep[:] = True
     columns = {key: column[keep] for key, column in columns.items()}
-    # Signed, so that noise about zero stays noise about zero.
-    sides = 1.0 - 2.0 * (columns["half_cycle"] % 2.0)
-    signed = columns["angle_rad"] * sides
-    amplitude = signed if float(np.sum(signed)) >= 0.0 else -signed
     covariance = fit.get("covariance") or {}
     return Decay(
-        name, columns["time_s"], amplitude, columns["angle_sd_rad"], columns["level_rad"],
+        name, columns["time_s"], _amplitude(columns, metadata, fit), columns["angle_sd_rad"],
+        columns["level_rad"],
         fit["parameters"], tuple(covariance.get("order", ())),
         np.array(covariance.get("matrix", []), dtype=np.float64), metadata.get("unit", "rad"),
     )  # fmt: skip
+
+
+def _amplitude(
+    columns: Mapping[str, FloatArray], metadata: Mapping[str, str], fit: Mapping[str, Any]
+) -> FloatArray:
+    """Angles without their alternating sign, about the level that the fit found.
+
+    A level too high by one lowers the signed angles by the table's ``level_coupling``.
+    """
+    # Signed, so that noise about zero stays noise about zero.
+    side = 1.0 - 2.0 * (columns["half_cycle"] % 2.0)
+    if float(np.sum(side * columns["angle_rad"])) < 0.0:
+        side = -side
+    too_high = float(np.mean(columns["level_rad"])) - number(fit["parameters"].get("offset"))
+    coupling = float(metadata.get("level_coupling", "1"))
+    shift = coupling * too_high if np.isfinite(too_high) else 0.0
+    return side * (columns["angle_rad"] + shift)
 
 
 def _table(text: str) -> tuple[dict[str, FloatArray] | None, dict[str, str]]:

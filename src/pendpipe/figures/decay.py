@@ -32,21 +32,23 @@ def draw(decay: Decay) -> Figure:
     fitted = physics.amplitude(decay.elapsed_s, decay.value("amplitude"), *decay.rates)
     start, rate = fit_exponential(decay.elapsed_s, y, sd)
     linear = start * np.exp(-rate * decay.elapsed_s)
+    moment = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
+    smooth = physics.amplitude(moment, decay.value("amplitude"), *decay.rates)
     large, large_unit = axis_unit(y, decay.unit)
     residual = y - fitted
     small, small_unit = axis_unit(np.abs(residual) + sd, decay.unit)
 
     figure, upper, lower = figure_with_residuals(4.2, constrained=False, residual_share=0.5)
     _amplitudes(upper, time, large * y, large * sd)
-    upper.plot(time, large * fitted, color=INK, linewidth=1.0, zorder=3,
+    upper.plot(time[0] + moment, large * smooth, color=INK, linewidth=1.0, zorder=3,
                label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})")  # fmt: skip
-    upper.plot(time, large * linear, color=VERMILION, linestyle="--", linewidth=1.1, zorder=3,
+    upper.plot(time[0] + moment, large * start * np.exp(-rate * moment), color=VERMILION, linestyle="--", linewidth=1.1, zorder=3,
                label=f"linear damping ({_rms(y - linear, decay.unit)})")  # fmt: skip
-    positive = y[y > 0.0]
-    if positive.size:
-        upper.set_yscale("log")
-        upper.set_ylim(0.7 * large * float(np.min(positive)), 1.4 * large * float(np.max(y)))
-        _plain_log_labels(upper)
+    # The logarithm of an amplitude within its own noise is chance.
+    lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
+    upper.set_yscale("log")
+    upper.set_ylim(0.75 * large * lowest, 1.35 * large * float(np.max(y)))
+    _plain_log_labels(upper)
     upper.set_ylabel(f"Amplitude ({large_unit})")
     key_above(upper, 2)
 
@@ -76,7 +78,9 @@ def _plain_log_labels(axes: Axes) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axes.get_ylim()
-    steps = (1.0,) if high > 300.0 * low else (1.0, 2.0, 5.0)
+    steps = (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
+    if high < 8.0 * low:
+        steps = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
     axes.yaxis.set_major_locator(LogLocator(subs=steps))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())

@@ -35,7 +35,7 @@ def draw(calibration: Mapping[str, Any] | None) -> Figure:
 
     figure, upper, lower = figure_with_residuals()
     ends = 1.06 * np.array([np.min(angle), np.max(angle)])
-    label = f"line: ({with_error(slope, error(calibration['volts_per_radian']))}) V/rad"
+    label = f"line: {with_error(slope, error(calibration['volts_per_radian']), 'V/rad')}"
     upper.plot(turn * ends, offset + slope * ends, color=INK, zorder=3, label=label)
     upper.errorbar(
         turn * angle, volts, volts_sd, turn * angle_sd,

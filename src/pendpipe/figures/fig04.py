@@ -27,7 +27,7 @@ def draw(comparison: Mapping[str, Any]) -> Figure:
 
     figure, upper, lower = figure_with_residuals(4.6)
     edge = 1.05 * float(np.max(squared))
-    label = f"$Q = k\\,f^{{\\,2}}$, $k$ = ({with_error(coefficient, error(fitted))}) s²"
+    label = f"$Q = k\\,f^{{\\,2}}$, $k$ = {with_error(coefficient, error(fitted), 's^2')}"
     upper.plot([0.0, edge], [0.0, coefficient * edge], color=INK, label=label)
     upper.errorbar(
         squared, points.y, points.y_sd, squared_sd,

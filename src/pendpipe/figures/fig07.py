@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pendpipe import physics
-from pendpipe.figures.data import Decay
+from pendpipe.figures.data import Decay, number
 from pendpipe.figures.style import (
     BLUE,
     INK,
@@ -35,7 +35,7 @@ def draw(decay: Decay, recording: Recording, volts_per_radian: float | None) -> 
     """
     scale = volts_per_radian if recording.quantity == "volts" and volts_per_radian else 1.0
     unit = recording.unit
-    level = scale * float(np.median(decay.level_rad))
+    level = scale * _level(decay)
     time = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
     start, rates = decay.value("amplitude"), decay.rates
     envelope = scale * physics.amplitude(time, start, *rates)
@@ -63,3 +63,9 @@ def draw(decay: Decay, recording: Recording, volts_per_radian: float | None) -> 
     lower.set(xlabel="Time (s)", ylabel=f"Turning points\n− envelope ({small_unit})")
     lower.margins(x=0.01, y=0.1)
     return figure
+
+
+def _level(decay: Decay) -> float:
+    """The fitted level, or where there is none that of the turning points."""
+    fitted = number(decay.parameters.get("offset"))
+    return fitted if np.isfinite(fitted) else float(np.median(decay.level_rad))

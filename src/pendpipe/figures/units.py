@@ -27,13 +27,63 @@ def axis_unit(values: FloatArray, unit: str) -> tuple[float, str]:
     return prefixed(max(finite, default=0.0), unit)
 
 
-def with_error(value: float, sd: float) -> str:
-    """Value and standard deviation for a label inside a figure: two digits of the error.
+def pretty_unit(unit: str) -> str:
+    """A unit of the result files as it is printed.
 
-    >>> with_error(3.85031, 0.00072)
-    '3.85031 ± 0.00072'
+    >>> pretty_unit("1/(rad s)")
+    'rad⁻¹ s⁻¹'
     """
-    if not (math.isfinite(sd) and sd > 0.0):
-        return f"{value:.4g}"
-    digits = max(1 - math.floor(math.log10(sd)), 0)
-    return f"{value:.{digits}f} ± {sd:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    known = {
+        "1/(rad s)": "rad⁻¹ s⁻¹", "1/(m s)": "m⁻¹ s⁻¹", "1/s": "s⁻¹", "s^2": "s²",
+        "kg m^2": "kg m²",
+    }  # fmt: skip
+    return known.get(unit, unit)
+
+
+def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = False) -> str:
+    """Value and standard deviation to two digits of the latter.
+
+    Without a standard deviation four digits are printed. `short` gives the metrologists'
+    form, in which the error of the last digits stands in brackets.
+
+    >>> with_error(3.85031, 0.00072, "V/rad")
+    '(3.85031 ± 0.00072) V/rad'
+    >>> with_error(1.4291e-06, 2.6e-08, "rad/s", short=True)
+    '1.429(26) × 10⁻⁶ rad/s'
+    """
+    unit = pretty_unit(unit)
+    if not math.isfinite(value):
+        return "–"
+    known = sd is not None and math.isfinite(sd) and sd > 0.0
+    error = float(f"{sd:.1e}") if known and sd is not None else 0.0
+    size = max(abs(value), error)
+    power = math.floor(math.log10(size)) if size > 0.0 else 0
+    power = power if power >= 6 or power <= -4 else 0
+    scaled, error = value / 10.0**power, error / 10.0**power
+    tens = f" × 10{_superscript(power)}" if power else ""
+    if not known:
+        number = f"{scaled:.4g}"
+        if "e" in number:
+            number = f"{scaled:.0f}"
+        return _join(_minus(number) + tens, unit)
+    decimals = max(1 - math.floor(math.log10(error) + 1e-9), 0)
+    number = _minus(f"{scaled:.{decimals}f}")
+    if short:
+        digits = f"{error:.{decimals}f}"
+        # Below one only the digits count; from one on the point stays, as in 136.1(1.2).
+        inside = digits if error >= 1.0 else digits.lstrip("0.") or "0"
+        return _join(f"{number}({inside}){tens}", unit)
+    text = f"{number} ± {error:.{decimals}f}"
+    return _join(f"({text}){tens}" if tens or unit else text, unit)
+
+
+def _join(number: str, unit: str) -> str:
+    return f"{number} {unit}" if unit else number
+
+
+def _minus(number: str) -> str:
+    return number.replace("-", "\N{MINUS SIGN}")
+
+
+def _superscript(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

@@ -57,6 +57,8 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
             )
         scans.append(row)
         numbers.append(number)
+    if not scans:
+        raise InputError(place, "there is no whole scan", "record again, or give another file")
     if not srate and options.sample_rate is None:
         srate = _SLOWEST
         notes.append("the capture does not say its srate: 65535 (11.44 Hz) is taken")

@@ -27,6 +27,10 @@ _WORTH: Final[dict[Role, float]] = {
 }
 
 
+_ABSURD: Final = 1e100
+"""Beyond this nothing was measured; squares of it are no numbers."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """The columns that were chosen.
@@ -76,7 +80,7 @@ def rising(values: FloatArray) -> float:
 def oscillation(values: FloatArray) -> float:
     """Root mean square about the trend, 0 unless the trend is crossed three times."""
     finite = values[np.isfinite(values)]
-    if len(finite) < 4:
+    if len(finite) < 4 or np.abs(finite).max() > _ABSURD:
         return 0.0
     ramp = np.linspace(-1.0, 1.0, len(finite))
     slope = float(finite @ ramp) / float(ramp @ ramp)
@@ -98,6 +102,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     InputError
         When a named column does not exist, or no column can be the reading.
     """
+    if not table.columns:
+        raise InputError(table.place, "there is no column of numbers", "give time and readings")
     own_clock = [column for column in table.columns if column.time_s is not None]
     time, counts = (None, False) if own_clock else _time(table, options)
     channels = tuple(column for column in table.columns if column is not time)

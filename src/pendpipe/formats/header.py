@@ -104,15 +104,24 @@ def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
 def _refuse_spoilt_rows(
     place: Path, filled: Sequence[tuple[int, str]], names_at: int, layout: Layout
 ) -> None:
-    """A row of the block's width between names and numbers is a row with a fault."""
-    for number, line in filled:
+    """Refuse text where the numbers begin: a row of the block's width under the names.
+
+    Rows of numbers alone are no fault; but then the line after them is, for the block
+    would else begin with them.
+    """
+    below = [(number, line) for number, line in filled if names_at and number > names_at]
+    for place_of, (number, line) in enumerate(below):
         cells = layout.split(line)
-        numbers = sum(map(layout.is_number, cells))
-        if names_at and number > names_at and numbers and len(cells) == layout.width > 1:
-            text = next(cell for cell in cells if not layout.is_number(cell))
-            raise InputError(
-                f"{place}, line {number}", f"'{text}' is no number", "mend or drop the row"
-            )
+        numbers = [layout.is_number(cell) for cell in cells]
+        if len(cells) != layout.width or layout.width == 1 or not any(numbers):
+            continue
+        wrong = [cell for cell, good in zip(cells, numbers, strict=True) if not good and cell]
+        if not wrong:
+            number, text = below[place_of + 1] if place_of + 1 < len(below) else (number, line)
+            wrong = [text.strip()[:60]]
+        raise InputError(
+            f"{place}, line {number}", f"'{wrong[0]}' is no number", "mend or drop the row"
+        )
 
 
 def _interval(lines: Sequence[str]) -> float | None:

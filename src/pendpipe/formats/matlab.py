@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
+from pendpipe.formats.matlab_check import DamagedError, sound_variables
 from pendpipe.formats.names import role_of
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
@@ -28,7 +29,8 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         raise InputError(
             place, "this is a MATLAB 7.3 file (HDF5)", "save it in MATLAB with save(..., '-v7')"
         )
-    if not data.startswith(b"MATLAB 5.0") and place.suffix.lower() != ".mat":
+    # Version 4 has no mark of its own, and is not written any more.
+    if not data.startswith(b"MATLAB 5.0") and data[126:128] not in (b"IM", b"MI"):
         raise NotThisFormatError("the file does not begin with 'MATLAB 5.0'")
     arrays = dict(_numbers(_load(place, data)))
     columns = {name: values for name, values in arrays.items() if values.size > 3}
@@ -57,17 +59,20 @@ def _load(place: Path, data: bytes) -> dict[str, Any]:
     import io
     import warnings
 
+    remedy = "save it again in MATLAB with save(..., '-v7')"
+    try:
+        names = sound_variables(data)
+    except DamagedError as fault:
+        raise InputError(place, f"the MATLAB file can't be read: {fault}", remedy) from None
     from scipy.io import loadmat
 
+    stream: Any = io.BytesIO(data)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            stream: Any = io.BytesIO(data)
-            loaded = loadmat(stream, squeeze_me=True, struct_as_record=True)
+            loaded = loadmat(stream, squeeze_me=True, variable_names=names)
     except Exception as fault:  # scipy raises whatever its parser stumbles on
-        raise InputError(
-            place, f"the MATLAB file can't be read ({fault})", "save it again with '-v7'"
-        ) from None
+        raise InputError(place, f"the MATLAB file can't be read: {fault}", remedy) from None
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 

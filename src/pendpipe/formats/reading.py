@@ -75,7 +75,9 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     plain = read_if_plain(place, data, options)
     table = table_of_plain(place, plain) if plain is not None else _table(place, data, options)
     choice = choose(table, options, reading=False)
-    if not choice.readings and choice.channels:
+    if not choice.readings:
+        if not choice.channels:
+            raise InputError(place, "there is no column but the time", "give readings beside it")
         choice = replace(choice, readings=choice.channels[:1])
     notes = [*table.notes, *choice.notes]
     try:

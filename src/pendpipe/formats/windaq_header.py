@@ -121,6 +121,11 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
                 f"the scale of channel {channel.number} is damaged ({channel.slope:g})",
                 "give another copy",
             )
+    # A scan without a word would let a damaged header claim any number of scans.
+    if header.packed and min(channel.divisor for channel in header.channels) > 1:
+        raise InputError(
+            place, "no channel of this packed file is in every scan", "give another copy"
+        )
     promised = place.suffix.lower() in (".wdh", ".whc")
     if ours and promised != header.hires:
         kind = "HiRes" if header.hires else "14-bit"

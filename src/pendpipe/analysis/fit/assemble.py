@@ -15,7 +15,8 @@ from pendpipe.estimate import Estimate
 
 _LOUD: Final = 5.0
 """Standard deviations of chi^2 by which a misfit is told from chance."""
-_UNDETERMINED: Final = 0.3
+_UNDETERMINED: Final = 0.01
+"""Part of the loss at the start by which a y0 may be uncertain before the record is a tail."""
 
 
 class Numbers(NamedTuple):

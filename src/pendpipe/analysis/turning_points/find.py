@@ -13,7 +13,7 @@ from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.follow import first_places, follow_tail, resmoothed
 from pendpipe.analysis.turning_points.harmonics import odd_harmonics, own_square
 from pendpipe.analysis.turning_points.level import Level, estimate_level
-from pendpipe.analysis.turning_points.measure import Measured, Places, measure, smoothed
+from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.shape import LossRates, half_cycle_shape, loss_rates, shape_error
@@ -120,6 +120,7 @@ def _losses(
     amplitude = measured.amplitude - places.side * measured.coupling * shift
     sd = noise * np.sqrt(measured.variance)
     use = known & (amplitude > 2.0 * sd)
+    use[last_seen(measured, noise) + 1 :] = False
     if use.sum() >= 3:
         rates = loss_rates(places.centre_s[use], amplitude[use], sd[use])
     else:
@@ -142,7 +143,7 @@ def _shaped(
 
 def _noise(samples: Samples, measured: Measured) -> float:
     """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
-    known = np.isfinite(measured.amplitude) & (measured.count > 6)
+    known = np.isfinite(measured.amplitude) & (measured.count > 6) & ~measured.single
     size = 2 + measured.harmonics.shape[1]
     # The level is common; what a half cycle wants of its own is not noise of the readings.
     square = own_square(measured)
@@ -204,10 +205,20 @@ def _kept(state: _State) -> BoolArray:
     slack = 0.02 * places.half_period_s
     inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
     keep = inside & (measured.coverage > _LEAST_SHARE * _usual(measured.coverage))
-    sd = samples.noise_rms * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
-    seen = keep & (smoothed(measured.amplitude, 1) > _SEEN * sd)
-    keep[int(np.max(np.flatnonzero(seen), initial=-1)) + 1 :] = False
+    keep[last_seen(measured, samples.noise_rms) + 1 :] = False
     return keep
+
+
+def last_seen(measured: Measured, noise: float) -> int:
+    """The last half cycle that stands out of the noise, with its neighbours; -1 if none.
+
+    Neighbours are on opposite sides: together they cancel an error of the level.
+    """
+    amplitude = np.nan_to_num(measured.amplitude)
+    around = np.convolve(amplitude, [0.25, 0.5, 0.25], "same")
+    sd = noise * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
+    seen = around > np.maximum(_SEEN * sd, 1e-6 * float(np.max(amplitude)))
+    return int(np.max(np.flatnonzero(seen), initial=-1))
 
 
 def _usual(coverage: FloatArray) -> FloatArray:

@@ -85,18 +85,32 @@ def _narrowed(
         return shape, measured
     # What even the middle half does not fit counts as error, not as precision.
     enlarged = np.maximum(_ratio(middle, noise)[0], 1.0)
+    information, score = _level_of_peaks(places, middle, enlarged)
     single = middle._replace(
         amplitude=middle.peak[:, 0], variance=middle.peak[:, 1] * enlarged,
         coupling=middle.peak[:, 2], harmonics=measured.harmonics,
-        coverage=measured.coverage,
-        # Their level would be their shape's fault: it is left to the others.
-        information=1e-9 * measured.information, score=0.0 * measured.score,
+        coverage=measured.coverage, information=information, score=score,
+        single=np.ones(len(poor), dtype=bool),
+        residual_square=own_square(middle) + score**2 / np.maximum(information, 1e-300),
     )  # fmt: skip
     chosen = [
         np.where(poor.reshape(-1, *[1] * (new.ndim - 1)), new, old)
         for new, old in zip(single, measured, strict=True)
     ]
     return np.where(poor[:, None], bare, shape), Measured(*chosen)
+
+
+def _level_of_peaks(
+    places: Places, middle: Measured, enlarged: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What neighbouring peaks say of the level, (p + 2 p' + p'')/4, whatever the wave's form."""
+    peak = np.nan_to_num(middle.peak[:, 0]) * places.side
+    padded = np.pad(peak, 1)
+    level = 0.25 * (padded[:-2] + 2.0 * padded[1:-1] + padded[2:])
+    level[0], level[-1] = level[1], level[-2]
+    # A hundredth: whole half cycles, where there are any, know better.
+    information = 0.01 / np.nan_to_num(middle.peak[:, 1] * enlarged, nan=np.inf)
+    return information, information * level
 
 
 def _ratio(measured: Measured, noise: float) -> tuple[FloatArray, FloatArray]:

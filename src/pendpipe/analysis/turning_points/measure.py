@@ -54,6 +54,8 @@ class Measured(NamedTuple):
     """Sum of the squared shape over the readings: what the amplitude rests on."""
     lopsided: BoolArray
     """Whether readings of one side are missing, so that amplitude and phase mix."""
+    single: BoolArray
+    """Whether the shape is the half cycle's own, and only its middle is fitted."""
 
     def phase(self, noise: float) -> FloatArray:
         """Phase by which each turning point is late, in rad; at most 1."""
@@ -151,6 +153,7 @@ def measure(
         count=gram[:, 0, 0],
         coverage=gram[:, 1, 1],
         lopsided=lopsided,
+        single=np.zeros(number, dtype=bool),
     )
 
 

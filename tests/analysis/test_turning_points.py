@@ -1,0 +1,287 @@
+"""Turning points measured from all readings, against those of the engine."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pendpipe.analysis.turning_points import (
+    TurningPoints,
+    find_turning_points,
+    read_turning_points,
+    write_turning_points,
+)
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+OMEGA = 2.0 * math.pi * 0.516
+FIG_8 = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
+START = Release(-0.3, 0.068, 0.003)
+
+
+def record(
+    model: Eq8,
+    release: Release,
+    time_s: FloatArray,
+    noise: float = 0.0,
+    seed: int = 1,
+    step: float | None = None,
+) -> Recording:
+    values = sample(model, release, time_s)
+    values = values + noise * np.random.default_rng(seed).standard_normal(len(time_s))
+    if step is not None:
+        values = np.round(values / step) * step
+    return Recording(time_s, values, "angle_rad", resolution=step)
+
+
+def errors(
+    points: TurningPoints, model: Eq8, release: Release
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Errors of angle (on its own side) and time, and the true amplitudes."""
+    truth = turning_points(model, release, until_s=float(points.time_s[-1]) + 10.0)
+    nearest = np.abs(truth.time_s[:, None] - points.time_s).argmin(axis=0)
+    assert np.all(np.diff(nearest) == np.diff(points.half_cycle))
+    angle = points.angle_rad + points.level_rad - truth.angle_rad[nearest]
+    true_amplitude = np.abs(truth.angle_rad[nearest] - release.offset_rad)
+    return angle * points.side, points.time_s - truth.time_s[nearest], true_amplitude
+
+
+def test_errors_are_as_large_as_stated_and_unbiased() -> None:
+    """20 x 309 turning points at 0.1 mrad noise: pulls have mean 0 and variance 1."""
+    time = np.arange(32768) * (300.0 / 32768)
+    pulls = []
+    for seed in range(20):
+        points = find_turning_points(record(FIG_8, START, time, 1e-4, seed))
+        assert len(points) == 309
+        angle, late, _ = errors(points, FIG_8, START)
+        pulls.append([angle / points.angle_sd_rad, late / points.time_sd_s])
+    number = 20 * 309
+    pull = np.array(pulls)
+    assert abs(pull[:, 0].mean()) < 3.5 / math.sqrt(number)
+    assert np.all(np.abs(pull.std(axis=(0, 2)) - 1.0) < 4.0 / math.sqrt(2.0 * number))
+
+
+def test_precision_is_that_of_every_reading_used() -> None:
+    """A cosine's amplitude from n readings of its half cycle has variance 2 noise^2/n."""
+    time = np.arange(32768) * (300.0 / 32768)
+    points = find_turning_points(record(FIG_8, START, time, 1e-4))
+    per_half_cycle = 32768 / 300.0 / (2 * 0.516)
+    bound = points.noise_rms_rad * math.sqrt(2.0 / per_half_cycle)
+    assert np.median(points.angle_sd_rad) == pytest.approx(bound, rel=0.02)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    quality=st.floats(30.0, 1000.0),
+    quadratic=st.floats(0.0, 1.0),
+    coulomb=st.floats(0.0, 0.3),
+    share=st.floats(0.0, 1.0),
+    frequency=st.floats(0.05, 1.1),
+    phase=st.floats(0.0, 0.9),
+    offset=st.floats(-0.1, 0.1),
+)
+def test_without_noise_only_the_shape_is_left_open(
+    quality: float, quadratic: float, coulomb: float, share: float,
+    frequency: float, phase: float, offset: float,
+) -> None:  # fmt: skip
+    """Errors of (losses/omega)^2 of the amplitude at most, whatever the mixture."""
+    omega = 2.0 * math.pi * frequency
+    b = 0.5 * omega / quality
+    model = Eq8(omega, quadratic * b / 0.1, share * b, (1.0 - share) * b, coulomb * b * 0.1)
+    release = Release(-phase / frequency, 0.1, offset)
+    time = np.arange(4000) * (20.0 / frequency / 4000)
+    points = find_turning_points(record(model, release, time))
+    angle, late, truth = errors(points, model, release)
+    losses = (model.quadratic * truth + b + model.coulomb / truth) / omega
+    assert np.all(np.abs(angle) < truth * (1e-5 + 2.0 * losses**2))
+    assert np.all(np.abs(angle[1:-1]) < (truth * (3e-6 + losses**2))[1:-1])
+    assert np.all(np.abs(late) * omega < 1e-4 + losses)
+
+
+def test_heavy_damping() -> None:
+    """Q = 5: the amplitude falls by 27 % from one turning point to the next."""
+    model = Eq8(OMEGA, viscous=OMEGA / 10.0)
+    release = Release(-0.1, 0.5)
+    time = np.arange(4000) * 0.003
+    points = find_turning_points(record(model, release, time, 1e-5))
+    angle, _, truth = errors(points, model, release)
+    assert len(points) >= 10
+    assert truth[0] / truth[1] == pytest.approx(math.exp(math.pi / 10.0), rel=0.01)
+    assert np.all(np.abs(angle) < 4.0 * points.angle_sd_rad)
+
+
+def test_uneven_sampling() -> None:
+    rng = np.random.default_rng(4)
+    time = np.sort(rng.uniform(0.0, 100.0, 9000))
+    points = find_turning_points(record(FIG_8, START, time, 1e-4))
+    angle, late, _ = errors(points, FIG_8, START)
+    assert len(points) >= 102
+    assert np.std(angle / points.angle_sd_rad) == pytest.approx(1.0, abs=0.25)
+    assert np.std(late / points.time_sd_s) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_gap_is_counted_over() -> None:
+    """Half cycles in a gap keep their numbers, and the sign alternates with the number."""
+    time = np.arange(10000) * 0.01
+    whole = record(FIG_8, START, time, 1e-4)
+    quality = np.zeros(10000, dtype=np.uint8)
+    quality[(time > 30.0) & (time < 47.0)] = 2
+    gapped = Recording(time, np.where(quality == 2, np.nan, whole.values), "angle_rad", quality)
+    points = find_turning_points(gapped)
+    angle, _, _ = errors(points, FIG_8, START)
+    assert points.half_cycle[-1] == 102
+    assert 15 <= points.half_cycle[-1] + 1 - len(points) <= 19
+    assert np.all(np.abs(angle) < 5.0 * points.angle_sd_rad)
+    assert np.all(points.amplitude_rad > 0.0)
+
+
+def test_release_at_the_first_reading_is_a_turning_point() -> None:
+    release = Release(0.0, 0.068)
+    points = find_turning_points(record(FIG_8, release, np.arange(6000) * 0.01, 1e-4))
+    angle, late, _ = errors(points, FIG_8, release)
+    assert abs(points.time_s[0]) < 0.01
+    assert abs(angle[0]) < 4.0 * points.angle_sd_rad[0]
+    assert points.angle_sd_rad[0] > 1.2 * points.angle_sd_rad[1]
+    assert abs(late[0]) < 4.0 * points.time_sd_s[0] + 0.01 / OMEGA
+
+
+def test_a_wandering_level_is_followed() -> None:
+    time = np.arange(30000) * 0.01
+    still = record(FIG_8, START, time, 1e-4)
+    wander = 4e-3 * np.sin(2.0 * math.pi * time / 170.0)
+    points = find_turning_points(Recording(time, still.values + wander, "angle_rad"))
+    expected = START.offset_rad + 4e-3 * np.sin(2.0 * math.pi * points.time_s / 170.0)
+    inner = slice(10, -10)
+    assert points.wanders
+    assert np.sqrt(np.mean((points.level_rad - expected)[inner] ** 2)) < 5e-5
+    truth = turning_points(FIG_8, START, until_s=300.0)
+    nearest = np.abs(truth.time_s[:, None] - points.time_s).argmin(axis=0)
+    amplitude = np.abs(truth.angle_rad[nearest] - START.offset_rad)
+    assert np.all(np.abs(points.amplitude_rad - amplitude)[inner] < 1.5e-4)
+
+
+def test_a_still_level_is_one_number() -> None:
+    points = find_turning_points(record(FIG_8, START, np.arange(30000) * 0.01, 1e-4))
+    assert not points.wanders
+    assert abs(points.level_rad[0] - START.offset_rad) < 4.0 * points.level_sd_rad
+
+
+def test_level_error_is_shared_with_alternating_effect() -> None:
+    """A level too high by e lowers every signed angle by 4/pi e: the covariance says so."""
+    recording = record(FIG_8, START, np.arange(6000) * 0.01, 1e-4)
+    points = find_turning_points(recording)
+    covariance = points.covariance()
+    shared = covariance[0, 5]
+    assert points.level_coupling == pytest.approx(4.0 / math.pi, rel=0.01)
+    assert shared == pytest.approx((4.0 / math.pi * points.level_sd_rad) ** 2, rel=0.03)
+    assert covariance[5, 5] == pytest.approx(points.angle_sd_rad[5] ** 2 + shared)
+
+
+def test_noise_is_never_below_the_rounding() -> None:
+    step = 1.27e-3
+    points = find_turning_points(record(FIG_8, START, np.arange(8000) * 0.02, 0.0, step=step))
+    assert points.step_rad == step
+    assert points.noise_rms_rad >= step / math.sqrt(12.0)
+    angle, _, _ = errors(points, FIG_8, START)
+    assert np.all(np.abs(angle) < step)
+
+
+def test_the_tail_is_followed_below_the_noise() -> None:
+    """Half cycles of twice their own error are found by the phase of those before."""
+    model = Eq8(OMEGA, viscous=0.02)
+    release = Release(-0.2, 0.05)
+    points = find_turning_points(record(model, release, np.arange(18000) * 0.02, 2e-3))
+    _, _, truth = errors(points, model, release)
+    assert truth[-1] < 2e-3
+    assert abs(np.mean(points.amplitude_rad[-20:] - truth[-20:])) < (
+        4.0 * points.angle_sd_rad[-1] / math.sqrt(20.0)
+    )
+
+
+def test_ends_with_the_motion() -> None:
+    """Coulomb friction stops the pendulum after 31 half cycles; rest has no turning points."""
+    model = Eq8(OMEGA, coulomb=1e-3)
+    release = Release(-0.2, 0.06)
+    points = find_turning_points(record(model, release, np.arange(6000) * 0.02, 1e-4))
+    truth = turning_points(model, release)
+    assert len(truth.time_s) - 4 <= points.half_cycle[-1] + 1 <= len(truth.time_s)
+
+
+@pytest.mark.parametrize(("amplitude", "allowed"), [(0.3, 1e-4), (1.0, 2e-4), (2.5, 4e-3)])
+def test_circular_error(amplitude: float, allowed: float) -> None:
+    """A real pendulum's half cycle is no cosine (7 % of third harmonic at 2.6 rad)."""
+    scipy_integrate = pytest.importorskip("scipy.integrate")
+    b = 0.02
+    run = scipy_integrate.solve_ivp(
+        lambda _, z: [z[1], -2.0 * b * z[1] - OMEGA**2 * np.sin(z[0])],
+        (0.0, 40.0), [amplitude, 0.0], rtol=1e-11, atol=1e-12, dense_output=True,
+        events=lambda _, z: z[1], method="DOP853",
+    )  # fmt: skip
+    time = np.arange(8000) * 0.005
+    noise = 1e-4 * np.random.default_rng(2).standard_normal(8000)
+    points = find_turning_points(Recording(time, run.sol(time)[0] + noise, "angle_rad"))
+    turned = run.t_events[0]
+    nearest = np.abs(turned[:, None] - points.time_s).argmin(axis=0)
+    truth = np.abs(run.y_events[0][nearest, 0])
+    assert len(points) >= 30
+    assert np.all(np.abs(points.amplitude_rad - truth) < allowed * truth + 4e-4)
+
+
+def test_one_row_a_count() -> None:
+    """An encoder that writes when its count changes: the times are the data."""
+    step = 2.618e-3
+    model = Eq8(OMEGA, quadratic=0.05, viscous=0.005, coulomb=1e-4)
+    release = Release(-0.2, 0.39)
+    fine = np.arange(1_500_000) * 5e-5
+    counts = np.round(sample(model, release, fine) / step)
+    change = np.flatnonzero(np.diff(counts)) + 1
+    recording = Recording(fine[change], counts[change] * step, "angle_rad")
+    points = find_turning_points(recording)
+    angle, _, _ = errors(points, model, release)
+    assert np.max(np.abs(angle[1:-1])) < 0.1 * step
+    assert any("one row a count" in note for note in points.notes)
+
+
+def test_the_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    points = find_turning_points(record(FIG_8, START, np.arange(6000) * 0.01, 1e-4))
+    path = tmp_path / "turning_points.csv"
+    write_turning_points(path, points)
+    again = read_turning_points(path)
+    for name in ("half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad"):
+        assert np.array_equal(getattr(again, name), getattr(points, name))
+    assert again.noise_rms_rad == points.noise_rms_rad
+    assert again.level_sd_rad == points.level_sd_rad
+    assert (again.start_s, again.stop_s) == (points.start_s, points.stop_s)
+    assert again.samples == 6000
+
+
+TIME = np.arange(3000) * 0.01
+BAD = {
+    "dead": np.full(3000, 0.2),
+    "saturated": np.clip(0.3 * np.cos(3.0 * TIME), -0.1, 0.1),
+    "noise": 1e-4 * np.random.default_rng(3).standard_normal(3000),
+    "beyond pi": 40.0 * np.exp(-0.02 * TIME) * np.cos(3.0 * TIME),
+    "half cycles": 0.3 * np.cos(0.1 * TIME),
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_unfit_readings_are_refused_in_one_line(fault: str) -> None:
+    with pytest.raises(InputError, match=fault) as refusal:
+        find_turning_points(Recording(TIME, BAD[fault], "angle_rad"), "a.csv")
+    assert str(refusal.value).startswith("a.csv: ")
+    assert "\n" not in str(refusal.value)
+
+
+def test_metres_have_no_pi() -> None:
+    values = 40.0 * np.exp(-0.02 * TIME) * np.cos(3.0 * TIME)
+    points = find_turning_points(Recording(TIME, values, "displacement_m"))
+    assert points.unit == "m"
+    assert points.amplitude_rad[0] == pytest.approx(40.0 * math.exp(-0.02 * points.time_s[0]), 1e-3)
