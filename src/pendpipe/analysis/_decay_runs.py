@@ -25,7 +25,7 @@ class Run:
     Parameters
     ----------
     path
-        How far the pendulum has gone in them: the measure of what they tell.
+        How far the pendulum has gone in them.
     bridged
         Disturbed half cycles inside.
     fades
@@ -42,13 +42,18 @@ class Run:
     driven: bool = False
 
     @property
+    def worth(self) -> float:
+        """What it can tell: its path, less for a few half cycles (two tell no decay)."""
+        return self.path * (1.0 - 2.0 / self.legs)
+
+    @property
     def legs(self) -> int:
         """Number of half cycles."""
         return self.last - self.first + 1
 
 
 def best_runs(cycles: HalfCycles) -> list[Run]:
-    """Find the runs, largest path first."""
+    """Find the runs, the most telling first."""
     count = len(cycles)
     if count < 3:
         return []
@@ -65,7 +70,7 @@ def best_runs(cycles: HalfCycles) -> list[Run]:
     runs.append((first, count - 1))
     trimmed = [_trimmed(cycles, *run) for run in runs]
     kept = [run for run in _joined(cycles, trimmed) if run.legs >= 3 and _regular(cycles, run)]
-    return sorted((_undriven(cycles, run) for run in kept), key=lambda run: -run.path)
+    return sorted((_undriven(cycles, run) for run in kept), key=lambda run: -run.worth)
 
 
 def _follows(cycles: HalfCycles) -> BoolArray:

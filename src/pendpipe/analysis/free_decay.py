@@ -104,9 +104,9 @@ def find_free_decay(recording: Recording) -> FreeDecay:
             "no free decay: no three half cycles follow each other with falling amplitude",
             "handling, a clamp or a drive can't be analysed",
         )
-    first, last, cycles, run = max(found, key=lambda entry: entry[3].path)
-    rivals = sum(entry[3].path > 0.5 * run.path for entry in found) - 1
-    if run.legs < 2 * _LEAST_HALF_CYCLES and rivals >= 2:
+    first, last, cycles, run = max(found, key=lambda entry: entry[3].worth)
+    rivals = sum(entry[3].path > 0.2 * run.path for entry in found) - 1
+    if run.legs < 6 * _LEAST_HALF_CYCLES and rivals >= max(2, run.legs // 3):
         raise NotAnalysableError(
             place,
             f"no free decay: {rivals + 1} short oscillations of {run.legs} half cycles or so",

@@ -67,7 +67,7 @@ def resolution(values: FloatArray) -> float | None:
     values with one step.
     """
     finite = values[np.isfinite(values)]
-    if len(finite) < 2:
+    if len(finite) < 2 or np.abs(finite).max() > 1e100:
         return None
     jumps = np.abs(np.diff(finite))
     # Values that arithmetic has left a rounding error apart are one value.

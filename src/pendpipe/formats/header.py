@@ -70,7 +70,8 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
     candidates: list[tuple[int, int, list[str]]] = []
     for number, line in filled:
         bare = line.strip().lstrip("".join(COMMENT)).strip()
-        for cells in (layout.split(line.strip("\n")), layout.split(bare), bare.split()):
+        by_blanks = [bare.split()] if is_comment(line) else []
+        for cells in (layout.split(line), layout.split(bare), *by_blanks):
             while len(cells) > layout.width and not cells[-1]:
                 cells.pop()
             texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]

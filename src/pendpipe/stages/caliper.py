@@ -15,20 +15,22 @@ from pendpipe.files import replaced
 from pendpipe.simulation.record import generator
 
 RATE_HZ = 200.0
+SETTLING = 0.1
+"""Part of each dwell that is left out at either end, where the caliper is moved."""
 
 
 class Staircase:
     """The sensor's volts while the caliper holds one position after the other."""
 
     def __init__(self, run: CaliperRun, sensor: Sensor, angles: FloatArray, seed: int) -> None:
-        self.dwell_s = run.samples / RATE_HZ
+        self.dwell_s = run.samples / RATE_HZ / (1.0 - 2.0 * SETTLING)
         self.sensor = sensor
         self.angles = angles
         self.random = np.random.default_rng([seed, len(angles)])
 
     def __call__(self, time_s: FloatArray) -> FloatArray:
         """Return volts at ascending times; shape (n,)."""
-        position = np.floor(time_s / self.dwell_s + 1e-6).astype(np.int64)
+        position = np.floor(time_s / self.dwell_s).astype(np.int64)
         angle = self.angles[np.clip(position, 0, len(self.angles) - 1)]
         noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
         return self.sensor.offset_volts + self.sensor.volts_per_radian * angle + noise
@@ -56,14 +58,15 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
         truth.device.kind,
         signal,
         rate_hz=RATE_HZ,
-        duration_s=run.points * run.samples / RATE_HZ,
+        duration_s=run.points * signal.dwell_s,
         clock_scale=truth.device.clock_scale,
     )
-    steps = np.floor(recording.time_s * RATE_HZ / run.samples + 1e-6).astype(np.int64)
+    dwells = recording.time_s / signal.dwell_s
+    steps, settled = np.floor(dwells), np.abs(dwells % 1.0 - 0.5) < 0.5 - SETTLING
     with replaced(table) as stream:
         stream.write(f"# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n")
         for index, length in enumerate(reading.tolist()):
-            volts = recording.values[steps == index]
+            volts = recording.values[settled & (steps == index)]
             spread = float(np.std(volts, ddof=1) / np.sqrt(len(volts)))
             stream.write(f"{length!r},{float(np.mean(volts))!r},{spread!r}\n")
 

@@ -137,7 +137,9 @@ def _shaped(
     measured = measure(samples, places, level, shape, stride=stride, amplitude=amplitude)
     places = resmoothed(places, measured, samples.noise_rms)
     measured = measure(samples, places, level, shape, amplitude=amplitude)
-    shape, measured = odd_harmonics(samples, places, level, shape, measured)
+    size = np.abs(np.nan_to_num(measured.amplitude))
+    relative, _ = shape_error(size, places.angular_frequency, rates)
+    shape, measured = odd_harmonics(samples, places, level, shape, measured, relative * size)
     return places, measured, shape
 
 

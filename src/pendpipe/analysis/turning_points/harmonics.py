@@ -27,13 +27,21 @@ _CIRCULAR: Final = 1.0 / 192.0
 
 
 def odd_harmonics(
-    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured
-) -> tuple[FloatArray, Measured]:
+    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    open_error: FloatArray,
+) -> tuple[FloatArray, Measured]:  # fmt: skip
     """Add odd harmonics to the shape where the readings ask for them.
 
     Where even these don't fit (beyond 1.5 rad, where the period changes from one half
     cycle to the next), the middle half of the half cycle is fitted with a third harmonic
     of its own: precise enough, since so large a swing stands far out of the noise.
+
+    Parameters
+    ----------
+    samples, places, level, shape, measured
+        The readings, and what was made of them so far.
+    open_error
+        What the shape of the losses leaves open in each amplitude (`shape.shape_error`).
 
     Returns
     -------
@@ -57,7 +65,7 @@ def odd_harmonics(
         shape, measured, before = longer, shared, after
         if before < (1.0 + 0.1 * _CLEARLY) * noise**2:
             break
-    return _narrowed(samples, places, level, shape, measured, noise)
+    return _narrowed(samples, places, level, shape, measured, np.hypot(noise, open_error))
 
 
 def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
@@ -71,7 +79,7 @@ def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
 
 def _narrowed(
     samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
-    noise: float,
+    noise: FloatArray,
 ) -> tuple[FloatArray, Measured]:  # fmt: skip
     """Replace the half cycles that no shape fits by fits of their middle halves."""
     bare = shape.copy()
@@ -113,7 +121,7 @@ def _level_of_peaks(
     return information, information * level
 
 
-def _ratio(measured: Measured, noise: float) -> tuple[FloatArray, FloatArray]:
+def _ratio(measured: Measured, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Misfit of half cycles over the noise's, with that of ten neighbours to each side."""
     known = np.isfinite(measured.amplitude) & (measured.count > 4)
     square = np.where(known, own_square(measured), 0.0) / noise**2

@@ -98,8 +98,8 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Los
         return LossRates(0.0, max(float(fall / t[-1]), 0.0), 0.0)
     y = np.maximum(amplitude, 0.0)
     columns = np.stack([-_integral(t, y**2), -_integral(t, y), -t, np.ones_like(t)], axis=1)
-    # Late integrals carry the errors of all before: the weights need not be sharper.
-    weight = 1.0 / np.hypot(sd, 1e-3 * y)
+    # Late integrals carry the errors of all before: the weights must not be sharper.
+    weight = 1.0 / np.hypot(sd, 3e-4 * y[0])
     scale = np.maximum(np.abs(columns).max(axis=0), 1e-300)
     for held in ((), (2,), (0,), (0, 2)):
         free = [j for j in range(4) if j not in held]

@@ -1,0 +1,90 @@
+"""What stands below each figure: what it shows and how to read it."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+
+class Caption(NamedTuple):
+    """Words that go with a figure."""
+
+    title: str
+    shows: str
+    reading: str
+
+
+CAPTIONS: Final = {
+    "fig03": Caption(
+        "Figure 3. The sensor",
+        "The sensor's volts against the angle that a caliper set, with the straight line.",
+        "The lower panel is data minus line: points that scatter about zero mean a linear sensor,"
+        " an arc or an S would mean that angles are read wrongly. Bars are one standard"
+        " deviation; that of the slope is shared by all records.",
+    ),
+    "fig04": Caption(
+        "Figure 4. Hysteretic damping, in air",
+        "The limiting Q of each record in air against the square of its frequency.",
+        "A straight line through the origin is the mark of internal friction in the structure:"
+        " viscous damping with a constant coefficient would give Q ∝ f, a curve here. The lower"
+        " panel is the relative deviation from the line; the grey band is the line's own"
+        " standard deviation.",
+    ),
+    "fig05": Caption(
+        "Figure 5. What water does to the period",
+        "Theory of how much buoyancy and the water that swings along (added mass) lengthen the"
+        " period, alone and together. Symbols are the records, lines the way between them.",
+        "The scale is logarithmic. In the low branch the weights nearly balance, so a little"
+        " buoyancy takes away most of the restoring torque.",
+    ),
+    "fig06": Caption(
+        "Figure 6. The history term",
+        "The viscous limit of Q: Stokes' law for steady flow (dashed), Eq. 16 with its history"
+        " term 1 + a/δ (solid), and what was measured after Eq. 17 (symbols).",
+        "The scale is the decimal logarithm, so 1 is a factor of ten. The arrows say by how much"
+        " the history term divides Q in the middle of a branch.",
+    ),
+    "fig07": Caption(
+        "Figure 7. A typical free decay",
+        "Every sample of the typical record and the fitted envelope, Eq. 14.",
+        "The lower panel is data minus fit: the turning points less the envelope, with their"
+        " standard deviations. A trend there would be physics that the model does not have.",
+    ),
+    "fig08": Caption(
+        "Figure 8. The same decay's dissipation history",
+        "Q against time from Eq. 15 with the fitted a, b, c. Circles are the logarithmic"
+        " decrement between turning points: they owe nothing to the model.",
+        "Q rises while the quadratic drag (a) dies away, is largest where y = √(c/a), and falls"
+        " when the bearing's friction (c) takes over. The dashed line is what exponential losses"
+        " alone would give. The band (95 %) may be thinner than the line.",
+    ),
+    "fig09": Caption(
+        "Figure 9. Experiment against theory",
+        "The limiting Q of every record in water, with Eq. 16 and the hysteretic part of figure"
+        " 4 together. No parameter is adjusted to these points.",
+        "Lower panel: measured over theory, at each record's own geometry. A common shortfall"
+        " means that the drag is larger than Eq. 16 by the factor printed there; the grey band is"
+        " what distances and diameter leave uncertain in the theory. At low frequency the points"
+        " come closer to 1 since hysteresis, not water, does the damping.",
+    ),
+    "fig10": Caption(
+        "Figure 10. Hysteresis left out",
+        "The same points with Eq. 16 alone, in red; the full theory in grey.",
+        "The shaded gap is the error of ignoring internal friction: large in the low branch,"
+        " small in the high one.",
+    ),
+    "tail": Caption(
+        "The trap of tail fits",
+        "a, b and c of the typical record, fitted to ever shorter tails of it; the blue line and"
+        " band are the fit to the whole record.",
+        "The later a fit begins, the less it knows: bars of one standard deviation grow until"
+        " they leave the panel, first in a, then in b and c. Fit whole records.",
+    ),
+    "decay": Caption(
+        "Decay",
+        "Amplitudes of the turning points, with Eq. 14 from the fitted a, b, c and, for contrast,"
+        " the best fit of linear damping alone.",
+        "The upper scale is logarithmic: linear damping is a straight line there. Below: data"
+        " minus Eq. 14, bars of one standard deviation. Eq. 14 is of first order in 1/Q: below a Q"
+        " of about 20 a waveform fit may differ from it by a few parts in ten thousand.",
+    ),
+}

@@ -1,0 +1,122 @@
+"""What the page says beside the numbers: steps, warnings, and the sections of the campaign."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pendpipe.figures.data import Entry, error, number, used
+from pendpipe.figures.units import with_error
+from pendpipe.report.health import STATES
+
+Comparison = Mapping[str, Any]
+
+
+class Step(NamedTuple):
+    """A stage of the campaign and how it went."""
+
+    name: str
+    word: str
+    symbol: str
+    colour: str
+    remark: str
+
+
+class Warned(NamedTuple):
+    """A warning and the records that it concerns."""
+
+    text: str
+    records: list[str]
+
+
+def steps(comparison: Comparison, drawn: Sequence[str], folder: Path) -> list[Step]:
+    """The stages, done or not."""
+    entries = comparison["records"]
+    fitted = used(comparison)
+    refused = len(entries) - len(fitted)
+    left = f", {refused} refused" if refused else ""
+    calibration = comparison.get("calibration")
+    coefficient = comparison.get("hysteretic_coefficient")
+    theory = bool(comparison.get("has_theory"))
+    diagnosed = sum(
+        (folder / str(entry["record"]) / "diagnosis" / "diagnosis.json").is_file()
+        for entry in entries
+    )
+    return [
+        _step("acquire", bool(entries), f"{len(entries)} records{left}"),
+        _step("calibrate", bool(calibration), "caliper run" if calibration else
+              "no caliper run: records bring their own constant, or are in rad already"),
+        _step("turning points", bool(fitted),
+              f"{sum(int(e.get('turning_points') or 0) for e in fitted)} found"),
+        _step("fit a, b, c", bool(fitted), f"{len(fitted)} records"),
+        _step("separate (Eq. 17)", bool(coefficient),
+              "k from the benchmark in air" if coefficient else "no benchmark in air"),
+        _step("compare (Eq. 16)", theory, "" if theory else "no apparatus is described"),
+        _step("diagnose", bool(diagnosed), f"{diagnosed} records" if diagnosed else
+              "not part of this run: pendpipe diagnose looks for physics left out"),
+        _step("figures", bool(drawn), f"{len(drawn)} of the campaign"),
+    ]  # fmt: skip
+
+
+def _step(name: str, done: bool, remark: str) -> Step:
+    symbol, colour = STATES["ok" if done else "not run"]
+    return Step(name, "done" if done else "skipped", symbol, colour, remark)
+
+
+def grouped_warnings(entries: Sequence[Entry]) -> list[Warned]:
+    """Warnings that differ in their numbers only, told once with all their records."""
+    groups: dict[str, Warned] = {}
+    for entry in entries:
+        for warning in entry.get("warnings") or []:
+            key = re.sub(r"[-+]?\d[\d.e+-]*", "#", str(warning))
+            group = groups.setdefault(key, Warned(str(warning), []))
+            group.records.append(str(entry["record"]))
+    return sorted(groups.values(), key=lambda group: -len(group.records))
+
+
+def exponent_tables(comparison: Comparison) -> list[dict[str, Any]]:
+    """For each branch: the exponent, its curvature, and how it depends on the range."""
+    tables = []
+    for branch, found in (comparison.get("viscous_exponents") or {}).items():
+        if not found:
+            continue
+        curvature = found.get("curvature")
+        slopes = found.get("local_slopes") or []
+        tables.append({
+            "branch": branch,
+            "value": with_error(number(found), error(found)),
+            "curvature": with_error(number(curvature), error(curvature)) if curvature else "",
+            "slopes": ", ".join(f"{slope:.2f}".replace("-", "−") for slope in slopes),
+            "ranges": [
+                (part["first"], part["last"], with_error(part["exponent"], part["sd"]))
+                for part in found.get("ranges") or []
+            ],
+        })  # fmt: skip
+    return tables
+
+
+def budget_rows(comparison: Comparison) -> list[tuple[str, str, float]]:
+    """Source, its relative standard deviation, and the share of the variance in percent."""
+    parts = comparison.get("budget") or []
+    total = sum(part["relative_sd"] ** 2 for part in parts) or 1.0
+    rows = [
+        (part["source"], f"{100 * part['relative_sd']:.2g} %", 100 * part["relative_sd"] ** 2 / total)
+        for part in parts
+    ]  # fmt: skip
+    return sorted(rows, key=lambda row: -row[2])
+
+
+def check_rows(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+    """With and without the history term and the hysteresis: theory over measurement, chi^2."""
+    rows = []
+    for check in comparison.get("checks") or []:
+        ratio = [value for value in check.get("ratio") or [] if value is not None]
+        rows.append((
+            "with" if check["history"] else "left out",
+            "with" if check["hysteresis"] else "left out",
+            f"{min(ratio):.3g} to {max(ratio):.3g}" if ratio else "–",
+            f"{check['chi2']:.3g} / {check['dof']}" if check.get("chi2") is not None else "–",
+        ))  # fmt: skip
+    return rows

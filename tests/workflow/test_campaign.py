@@ -1,0 +1,139 @@
+"""A small campaign runs end to end, recovers what was hidden in it, and reruns only what it must."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+SMALL = ROOT / "tests/workflow/small"
+
+
+class Campaign:
+    """A campaign in a folder of its own, run by Snakemake from the project's root."""
+
+    def __init__(self, folder: Path) -> None:
+        self.results = folder / "results"
+        self.records = folder / "records.tsv"
+        shutil.copy(SMALL / "records.tsv", self.records)
+        content = yaml.safe_load((SMALL / "config.yaml").read_text(encoding="utf-8"))
+        content |= {"results": self.results.as_posix(), "records": self.records.as_posix()}
+        self.configuration = folder / "config.yaml"
+        self.configuration.write_text(yaml.safe_dump(content), encoding="utf-8")
+
+    def snakemake(self, *arguments: str) -> str:
+        """Run Snakemake and return what it said; it must end well."""
+        command = [sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"]
+        done = subprocess.run(
+            [*command, "--configfile", str(self.configuration), *arguments],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
+    def planned(self, *arguments: str) -> dict[str, int]:
+        """Count the jobs that Snakemake would run."""
+        said = self.snakemake("-n", *arguments)
+        return {
+            name: int(count)
+            for name, count in re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Read campaign.json."""
+        content: dict[str, Any] = json.loads((self.results / "campaign.json").read_text())
+        return content
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """The small campaign, run once."""
+    campaign = Campaign(tmp_path_factory.mktemp("campaign"))
+    campaign.snakemake()
+    return campaign
+
+
+def pull(number: dict[str, float], truth: float) -> float:
+    return (number["value"] - truth) / number["sd"]
+
+
+def test_what_was_hidden_is_found(campaign: Campaign) -> None:
+    """k, the drag factor, Fig. 7's limit and Q_v,exp, each within five standard deviations."""
+    summary = campaign.summary()
+    truth = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))["simulated"]
+    k, factor = truth["hysteretic_coefficient_s2"], truth["drag_factor"]
+    assert abs(pull(summary["hysteretic_coefficient"], k)) < 5
+    assert abs(pull(summary["theory_factor"], factor)) < 5
+    assert abs(pull(summary["volts_per_radian"], truth["sensor"]["volts_per_radian"])) < 5
+    typical = next(entry for entry in summary["records"] if entry["record"] == "water-low-7")
+    # The paper's own record: a limit of 136 and Q_v,exp of 156, to its three digits.
+    limit, viscous = typical["quality_factor_limit"], typical["quality_factor_viscous"]
+    assert abs(limit["value"] - 136) < 0.5 + 5 * limit["sd"]
+    assert abs(viscous["value"] - 156) < 0.5 + 5 * viscous["sd"]
+
+
+def test_the_summary_has_the_contracts_keys(campaign: Campaign) -> None:
+    summary = campaign.summary()
+    for name in (
+        "hysteretic_coefficient",
+        "theory_factor",
+        "history_coefficient",
+        "volts_per_radian",
+    ):
+        assert set(summary[name]) == {"value", "sd", "unit"}
+    assert set(summary["viscous_exponents"]) == {"low", "high"}
+    names = {"record", "fluid", "branch", "frequency", "moment_of_inertia", "a", "b", "c"}
+    names |= {f"quality_factor_{part}" for part in ("limit", "hysteretic", "viscous")}
+    assert all(names <= set(record) for record in summary["records"])
+
+
+def test_a_refused_record_is_told_of_and_stops_nobody(campaign: Campaign) -> None:
+    refused = json.loads((campaign.results / "broken/refused.json").read_text())
+    assert refused["record"] == "broken"
+    assert "\n" not in refused["reason"]
+    assert refused["reason"] in (campaign.results / "report.html").read_text(encoding="utf-8")
+    assert "broken" not in {record["record"] for record in campaign.summary()["records"]}
+
+
+def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
+    assert "Nothing to be done" in campaign.snakemake("-n")
+
+
+def test_forcing_the_fit_reruns_it_and_what_follows(campaign: Campaign) -> None:
+    planned = campaign.planned("--forcerun", "fit")
+    records = len(campaign.records.read_text(encoding="utf-8").splitlines()) - 1
+    assert planned["fit"] == records
+    assert planned["separate"] == planned["compare"] == planned["report"] == 1
+    assert not {"acquire", "calibrate", "turning_points"} & set(planned)
+
+
+def test_an_added_row_runs_its_own_jobs_and_the_campaigns(campaign: Campaign) -> None:
+    before = campaign.records.read_text(encoding="utf-8")
+    row = "water-high-3\tsimulated\twater\thigh\thigh-3\t\t\t\t\t20.0\n"
+    campaign.records.write_text(before + row, encoding="utf-8")
+    try:
+        planned = campaign.planned()
+    finally:
+        campaign.records.write_text(before, encoding="utf-8")
+    for stage in ("acquire", "calibrate", "turning_points", "fit"):
+        assert planned[stage] == 1
+    for stage in ("separate", "compare", "figures", "report"):
+        assert planned[stage] == 1
+
+
+def test_the_results_name_no_path_of_the_machine(campaign: Campaign) -> None:
+    for path in (campaign.results / "report.html", campaign.results / "campaign.json"):
+        text = path.read_text(encoding="utf-8")
+        assert str(ROOT) not in text
+        assert str(campaign.results) not in text
