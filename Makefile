@@ -35,6 +35,7 @@ check: .venv/installed
 .venv/installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/python -m pendpipe.warm_up
 	touch $@
 
 .venv/installed-bench: .venv/installed

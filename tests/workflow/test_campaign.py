@@ -1,4 +1,4 @@
-"""A small campaign runs end to end, recovers what was hidden in it, and reruns only what it must."""
+"""A small campaign runs end to end, finds what was hidden in it, and reruns only what it must."""
 
 from __future__ import annotations
 

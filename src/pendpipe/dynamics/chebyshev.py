@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from pendpipe.dynamics.layout import DEGREE
+
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-
-DEGREE = 16
-"""The degree of the polynomials; there are ``DEGREE + 1`` nodes."""
 
 NODES: FloatArray = -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
 """The nodes from -1 to 1."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.panel import NODE_COUNT, kernel, part
+from pendpipe.dynamics.layout import NODE_COUNT
+from pendpipe.dynamics.panel import kernel, part
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

@@ -15,14 +15,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.chebyshev import DEGREE
+from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT
 from pendpipe.dynamics.emission import emit
 from pendpipe.dynamics.panel import (
     COS,
     EXCESS,
     LOSS,
-    NODE_COUNT,
-    kernel,
     part,
     place,
     polynomial,
@@ -31,7 +29,7 @@ from pendpipe.dynamics.panel import (
     unresolved,
 )
 from pendpipe.dynamics.sensitivities import sensitivities
-from pendpipe.dynamics.workspace import HEAD, panel_width
+from pendpipe.dynamics.workspace import panel_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

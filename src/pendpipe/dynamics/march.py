@@ -22,14 +22,12 @@ from pendpipe.dynamics.table import (
     look_up_turning_point,
     points_for,
 )
-from pendpipe.dynamics.workspace import HEAD, MOST_PANELS, carve, panel_width, row_width
+from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, STOPPED
+from pendpipe.dynamics.workspace import carve, panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.workspace import Work
-
-RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
-
 
 @kernel
 def sticks(shape: FloatArray, y: float) -> bool:
@@ -121,7 +119,6 @@ def _emit_row(
     return first, guess
 
 
-@part
 def march(
     constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
     most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,

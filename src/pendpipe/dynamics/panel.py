@@ -24,19 +24,17 @@ from typing import TYPE_CHECKING, Any
 
 from numba import njit
 
-from pendpipe.dynamics.chebyshev import ANALYSIS_T, DEGREE, INTEGRATION_T, NODES, POWERS_T
+from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
+from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-
-NODE_COUNT = DEGREE + 1
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
 COS, SIN, LOSS, BEFORE, EARLIER, SLIP, EXCESS, SLOPE = range(0, 160, 20)
 COLUMN, ZETA, VALUE, SCRATCH = range(160, 240, 20)
 BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(240, 360, 20)  # sensitivities.py
-NODE_SIZE = 360
 
 # No exceptions, no reference counts (which forbids to allocate), and no entry from Python: each
 # costs more than it is worth here. Multiplications and additions may be fused.

@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.chebyshev import DEGREE, INTEGRATION_T
+from pendpipe.dynamics.chebyshev import INTEGRATION_T
+from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 from pendpipe.dynamics.panel import (
     BY_CENTRE,
     BY_H,
@@ -25,7 +26,6 @@ from pendpipe.dynamics.panel import (
     FORCING,
     GROWTH,
     LOSS,
-    NODE_COUNT,
     SCRATCH,
     SIN,
     SLIP,

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from pendpipe.dynamics.chebyshev import powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.panel import kernel, part
-from pendpipe.dynamics.workspace import HEAD, MOST_POINTS, panel_width, row_width
+from pendpipe.dynamics.layout import HEAD, MOST_POINTS
+from pendpipe.dynamics.workspace import panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

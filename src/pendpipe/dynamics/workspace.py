@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from pendpipe.dynamics.panel import NODE_COUNT, NODE_SIZE, kernel
+from pendpipe.dynamics import layout
+from pendpipe.dynamics.layout import DESCRIPTION, MOST_PANELS, MOST_POINTS, NODE_SIZE, THETA
+from pendpipe.dynamics.panel import NODE_COUNT, kernel
+from pendpipe.dynamics.views import matrix
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-
-HEAD = 2
-MOST_POINTS = 18
-MOST_PANELS = 4
-_DESCRIPTION = 6
-_THETA = 512
-
 
 class Work(NamedTuple):
     """Workspace and constants of a march; S sensitivities (the amplitude and S - 1 rates)."""
@@ -61,29 +57,8 @@ class Work(NamedTuple):
     """How `march` lays out its tables."""
 
 
-@kernel
-def panel_width(polynomials: int) -> int:
-    """Return how many numbers of a row belong to one panel."""
-    return 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
-
-
-@kernel
-def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
-    """Return the length of a half cycle's row."""
-    return HEAD + 2 * sensitivities + panels * panel_width(polynomials)
-
-
-def buffer_size(sensitivities: int, polynomials: int) -> int:
-    """Return how long a buffer `carve` needs."""
-    per_panel = 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
-    width = HEAD + 2 * sensitivities + MOST_PANELS * per_panel
-    fixed = NODE_SIZE + 2 + NODE_COUNT * NODE_COUNT + 4 * MOST_POINTS + _DESCRIPTION + _THETA + 2
-    return (
-        fixed
-        + 6 * sensitivities
-        + (2 * sensitivities + 3) * NODE_COUNT
-        + (2 * MOST_POINTS + 2) * width
-    )
+panel_width = kernel(layout.panel_width)
+row_width = kernel(layout.row_width)
 
 
 @kernel
@@ -103,22 +78,22 @@ def carve(
     placed, rest = rest[:2], rest[2:]
     sigma, rest = rest[:s], rest[s:]
     shift, rest = rest[:s], rest[s:]
-    kept, rest = rest[: 2 * s].reshape(2, s), rest[2 * s :]
-    columns, rest = rest[: (s + 1) * n].reshape(s + 1, n), rest[(s + 1) * n :]
-    chebyshev, rest = rest[: n * n].reshape(n, n), rest[n * n :]
+    kept, rest = matrix(rest, 2, s), rest[2 * s :]
+    columns, rest = matrix(rest, s + 1, n), rest[(s + 1) * n :]
+    chebyshev, rest = matrix(rest, n, n), rest[n * n :]
     amplitude, rest = rest[:s], rest[s:]
     clock, rest = rest[:s], rest[s:]
     row, rest = rest[:width], rest[width:]
     rows, rest = (
-        rest[: (points + 1) * width].reshape(points + 1, width),
+        matrix(rest, points + 1, width),
         rest[(points + 1) * width :],
     )
     cosines, rest = rest[: 4 * points], rest[4 * points :]
-    segment, rest = rest[:_DESCRIPTION], rest[_DESCRIPTION:]
-    table, rest = rest[: points * width].reshape(points, width), rest[points * width :]
-    total, rest = rest[: (s + 2) * n].reshape(s + 2, n), rest[(s + 2) * n :]
+    segment, rest = rest[:DESCRIPTION], rest[DESCRIPTION:]
+    table, rest = matrix(rest, points, width), rest[points * width :]
+    total, rest = matrix(rest, s + 2, n), rest[(s + 2) * n :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, cosines, segment, table, total,
-        rest[:_THETA], rest[_THETA:],
+        rest[:THETA], rest[THETA:],
     )  # fmt: skip

@@ -50,7 +50,7 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
              truth.get("hysteretic_coefficient_s2")),
         _row("Drag measured over Eq. 16", comparison.get("theory_factor"), "theory_factor",
              truth.get("drag_factor")),
-        _row("History coefficient C_H of Eq. 2, with no drag factor",
+        _row("History coefficient C_H of Eq. 2, if it takes the whole difference",
              comparison.get("history_coefficient"), "history_coefficient",
              truth.get("history_coefficient") if truth.get("drag_factor") == 1.0 else None),
         *_exponents(comparison),

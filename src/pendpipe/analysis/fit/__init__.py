@@ -1,6 +1,11 @@
 """a, b, c and the rest of one recording: Eq. 14 on turning points, Eq. 8 on all readings."""
 
+from typing import TYPE_CHECKING
+
 from pendpipe.analysis.fit.result import FitResult, read_fit
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.recorded import fit_recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
 

@@ -1,10 +1,15 @@
 """Turning points from all the readings of their half cycles (the first step to Eq. 14)."""
 
+from typing import TYPE_CHECKING
+
 from pendpipe.analysis.turning_points.table import (
     TurningPoints,
     read_turning_points,
     write_turning_points,
 )
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.turning_points.find import find_turning_points
 
 __all__ = ["TurningPoints", "find_turning_points", "read_turning_points", "write_turning_points"]
 

@@ -112,13 +112,14 @@ def _level_of_peaks(
     places: Places, middle: Measured, enlarged: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """What neighbouring peaks say of the level, (p + 2 p' + p'')/4, whatever the wave's form."""
-    peak = np.nan_to_num(middle.peak[:, 0]) * places.side
-    padded = np.pad(peak, 1)
-    level = 0.25 * (padded[:-2] + 2.0 * padded[1:-1] + padded[2:])
-    level[0], level[-1] = level[1], level[-2]
+    seen = np.isfinite(middle.peak[:, 0]) & (middle.count > 8)
+    peak = np.where(seen, middle.peak[:, 0], 0.0) * places.side
+    level = np.convolve(peak, [0.25, 0.5, 0.25], "same")
+    between = np.convolve(seen.astype(np.float64), np.ones(3), "same") > 2.5
     # A hundredth: whole half cycles, where there are any, know better.
     information = 0.01 / np.nan_to_num(middle.peak[:, 1] * enlarged, nan=np.inf)
-    return information, information * level
+    information = np.where(between, information, 1e-9 * information)
+    return information, np.where(between, information * level, 0.0)
 
 
 def _ratio(measured: Measured, noise: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,52 @@
+"""Write the page about a campaign: one self-contained HTML file.
+
+It opens without a network, prints, and can be read without a script. Figures are taken
+from the folder `figures` beside the page, where pendpipe figures has put them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe report``."""
+    parser.add_argument(
+        "--campaign", required=True, type=Path, metavar="CONFIG.json",
+        help="the campaign's configuration, as the workflow stores it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--comparison", required=True, type=Path, metavar="FILE",
+        help="comparison.json, from pendpipe compare",
+    )  # fmt: skip
+    parser.add_argument(
+        "--summary", required=True, type=Path, metavar="FILE",
+        help="campaign.json, from pendpipe compare; it can be saved from the page",
+    )  # fmt: skip
+    parser.add_argument(
+        "--figures", type=Path, metavar="FOLDER",
+        help="where figures 3 to 10 are; the folder figures beside the page by default",
+    )  # fmt: skip
+    parser.add_argument("--out", required=True, type=Path, metavar="PAGE.html", help="the page")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    from pendpipe.figures.inputs import read_comparison, read_content, results_folder
+    from pendpipe.files import replaced
+    from pendpipe.report.page import render
+
+    configuration = read_content(arguments.campaign)
+    page = render(
+        configuration,
+        read_comparison(arguments.comparison),
+        read_content(arguments.summary, "run pendpipe compare first"),
+        results_folder(configuration),
+        arguments.figures or arguments.out.parent / "figures",
+    )
+    with replaced(arguments.out) as stream:
+        stream.write(page)
+    print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
+    return 0

@@ -1,0 +1,44 @@
+"""Sizes that the engine and its callers must agree on; free of Numba."""
+
+from __future__ import annotations
+
+DEGREE = 16
+"""Of the polynomials on a panel."""
+NODE_COUNT = DEGREE + 1
+NODE_SIZE = 360
+"""Of the workspace of one panel; see `panel.py`."""
+HEAD = 2
+"""The first numbers of a half cycle's row; see `half_cycle.py`."""
+MOST_POINTS = 18
+"""Half cycles in a table."""
+MOST_PANELS = 4
+"""Panels to a half cycle in a table."""
+DESCRIPTION = 6
+THETA = 512
+CONSTANTS = 9
+"""m, h, q, g, omega; time and offset of the release, and twice the side of the release."""
+
+RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
+"""How a march ends."""
+
+
+def panel_width(polynomials: int) -> int:
+    """Return how many numbers of a half cycle's row belong to one panel."""
+    return 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
+
+
+def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
+    """Return the length of a half cycle's row."""
+    return HEAD + 2 * sensitivities + panels * panel_width(polynomials)
+
+
+def work_size(sensitivities: int, polynomials: int) -> int:
+    """Return how many numbers `workspace.carve` needs."""
+    s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
+    matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
+    return NODE_SIZE + 4 + 6 * s + matrices + 4 * MOST_POINTS + DESCRIPTION + THETA
+
+
+def inputs_size(directions: int) -> int:
+    """Return how many numbers tell the engine what to do: constants, rates, directions."""
+    return CONSTANTS + 5 * directions

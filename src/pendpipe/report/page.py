@@ -1,0 +1,159 @@
+"""The page itself: everything prepared, handed to the template."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from pendpipe.figures.data import used
+from pendpipe.report import remarks
+from pendpipe.report.captions import CAPTIONS
+from pendpipe.report.findings import findings
+from pendpipe.report.glossary import GLOSSARY
+from pendpipe.report.headline import headline
+from pendpipe.report.health import CHI2_RANGE
+from pendpipe.report.records import Line, heads, lines
+from pendpipe.report.vector import inline_svg
+
+TEMPLATES: Final = Path(__file__).parent / "templates"
+BUDGET_BYTES: Final = 5_000_000
+"""The page stays below this; what no longer fits is named, and left in its file."""
+_RESERVE_BYTES: Final = 500_000
+
+Content = Mapping[str, Any]
+
+
+def render(
+    configuration: Content, comparison: Content, summary: Content, folder: Path, figures: Path
+) -> str:
+    """Make the page.
+
+    Parameters
+    ----------
+    configuration, comparison, summary
+        The campaign's configuration, comparison.json and campaign.json.
+    folder
+        The campaign's results, with a folder for each record.
+    figures
+        Where figures 3 to 10 are.
+
+    Returns
+    -------
+    str
+        One HTML document that refers to nothing outside itself.
+    """
+    drawn = _campaign_figures(figures)
+    entries = list(comparison["records"])
+    table = lines(entries, _hashes(folder, entries))
+    decays, outside = _decays(folder, table, spent=sum(map(len, drawn.values())))
+    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
+    style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("page.html").render(
+        title=comparison.get("title") or "A campaign of free decays",
+        has_theory=bool(comparison.get("has_theory")),
+        simulated=sum(entry.get("source") == "simulated" for entry in entries),
+        rows=headline(comparison, configuration.get("simulated") or {}),
+        findings=findings(comparison),
+        figures=drawn,
+        captions=CAPTIONS,
+        columns=heads(used(comparison)),
+        records=table,
+        counts=_counts(table),
+        chi2_range=CHI2_RANGE,
+        decays=decays,
+        outside=outside,
+        warned=remarks.grouped_warnings(entries),
+        exponents=remarks.exponent_tables(comparison),
+        budget=remarks.budget_rows(comparison),
+        checks=remarks.check_rows(comparison),
+        steps=remarks.steps(comparison, list(drawn), folder),
+        glossary=GLOSSARY,
+        provenance=comparison.get("provenance") or {},
+        downloads=_downloads(table, comparison, summary),
+        # These two are the package's own files; the policy names the script by its hash.
+        style=Markup(style),  # noqa: S704
+        script=Markup(script),  # noqa: S704
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+    )
+
+
+def _campaign_figures(figures: Path) -> dict[str, Markup]:
+    """The figures that are there, ready for the page."""
+    drawn = {}
+    for name, caption in CAPTIONS.items():
+        path = figures / f"{name}.svg"
+        if path.is_file():
+            text = path.read_text(encoding="utf-8")
+            drawn[name] = inline_svg(text, name, caption.title, caption.shows)
+    return drawn
+
+
+def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Markup], list[str]]:
+    """Each record's decay figure while the budget lasts, and the records beyond it."""
+    decays: dict[str, Markup] = {}
+    outside: list[str] = []
+    left = BUDGET_BYTES - _RESERVE_BYTES - spent
+    for line in table:
+        path = folder / line.name / "figures" / "decay.svg"
+        if line.refused or not path.is_file():
+            continue
+        # The prefix is a number: a record's name need not be an identifier.
+        words = f"{CAPTIONS['decay'].shows} Record {line.name}."
+        svg = inline_svg(path.read_text(encoding="utf-8"), line.anchor,
+                         f"Decay of {line.name}", words)  # fmt: skip
+        left -= len(svg.encode())
+        if left < 0:
+            outside.append(line.name)
+        else:
+            decays[line.name] = svg
+    return decays, outside
+
+
+def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
+    """SHA-256 of each record's input, from its fit."""
+    hashes = {}
+    for entry in entries:
+        path = folder / str(entry["record"]) / "fit.json"
+        if path.is_file():
+            fit = json.loads(path.read_text(encoding="utf-8"))
+            hashes[str(entry["record"])] = str((fit.get("provenance") or {}).get("input_sha256", ""))
+    return hashes
+
+
+def _counts(table: list[Line]) -> list[tuple[str, str, str, int]]:
+    """How many records stand in each state that occurs: word, symbol, colour, number."""
+    found = [(line.health.word, line.health.symbol, line.health.colour) for line in table]
+    return [(*state, found.count(state)) for state in dict.fromkeys(found)]
+
+
+def _downloads(table: list[Line], comparison: Content, summary: Content) -> dict[str, str]:
+    """Files inside the page, as data addresses: they can be saved without a script."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    names = [head for head, _, _ in heads(used(comparison))]
+    pairs = [name for head in names for name in (head, f"sd of {head}")]
+    writer.writerow(["record", "fit", "fluid", "branch", *pairs])
+    for line in table:
+        numbers = [text for cell in line.cells for text in (cell.value, cell.sd)]
+        writer.writerow([line.name, line.health.word, line.fluid, line.branch, *numbers])
+    return {
+        "records.csv": _data_address("text/csv", stream.getvalue()),
+        "campaign.json": _data_address("application/json", json.dumps(summary, indent=1)),
+    }
+
+
+def _data_address(kind: str, text: str) -> str:
+    return f"data:{kind};base64,{base64.b64encode(text.encode()).decode()}"
