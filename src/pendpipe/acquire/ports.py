@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from pendpipe.acquire.clock import ScaledClock
-from pendpipe.acquire.drivers import DRIVERS
+from pendpipe.acquire.drivers import FAMILIES
 from pendpipe.acquire.drivers.base import Identity
-from pendpipe.acquire.line import Line
+from pendpipe.acquire.line import Line, LineLostError
 from pendpipe.errors import InputError
 
 VENDOR: Final = 0x0683
@@ -59,10 +59,14 @@ def identify(port: str) -> Identity:
         If the port can't be opened, or no known device answers.
     """
     clock = ScaledClock()
-    for driver in DRIVERS.values():
-        with Line(port, driver.baudrate) as line:
+    for family in FAMILIES:
+        with Line(port, family.baudrate) as line:
+            instrument = family(line, clock)
+            instrument.attempts = 1
             try:
-                return driver(line, clock).identify()
+                return instrument.hello()
+            except LineLostError:
+                raise
             except InputError:
                 continue
     raise InputError(port, "no known device answers", "check cable and power, or give --model")

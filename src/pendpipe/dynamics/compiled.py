@@ -1,54 +1,85 @@
-"""The compiled entry to the engine.
-
-Numba notices a change of the file in which a cached function stands, but not of the files whose
-functions it calls. So the digest of all of them is a free variable of the entry, which is part
-of the key under which Numba keeps it.
-"""
+"""The engine as a Python function, compiled by Numba once for an installation."""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import hashlib
+import os
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from numba import njit
-
-from pendpipe.dynamics.march import march
+from pendpipe.dynamics import machine_code
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pendpipe.arrays import FloatArray
+    from collections.abc import Callable, Iterator
 
 _SOURCES = (
-    "chebyshev.py", "emission.py", "half_cycle.py", "march.py", "panel.py", "sensitivities.py",
-    "table.py", "workspace.py",
+    "chebyshev.py", "emission.py", "entry.py", "half_cycle.py", "layout.py", "march.py",
+    "panel.py", "sensitivities.py", "table.py", "views.py", "workspace.py",
+)  # fmt: skip
+_POINTER, _INTEGER, _NUMBER = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_ENTRY = ctypes.CFUNCTYPE(
+    _INTEGER,
+    _POINTER, _INTEGER, _INTEGER, _NUMBER, _INTEGER, _INTEGER, _NUMBER,
+    _POINTER, _INTEGER, _POINTER, _POINTER, _POINTER, _INTEGER,
 )  # fmt: skip
 
 
-def _digest() -> int:
-    """Return a number that changes with the engine's sources."""
+def _file_name() -> str:
+    """Return a name that changes with the engine's sources and with the machine."""
     folder = Path(__file__).parent
     text = b"".join((folder / name).read_bytes() for name in _SOURCES)
-    return int.from_bytes(hashlib.blake2b(text, digest_size=6).digest())
+    sources = hashlib.blake2b(text, digest_size=8).hexdigest()
+    machine = hashlib.blake2b(machine_code.platform().encode(), digest_size=8).hexdigest()
+    return f"engine-{machine}-{sources}.bin"
+
+
+def _folders() -> Iterator[Path]:
+    """Yield where the machine code may lie: as Numba's own cache, beside the source or at home."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        yield Path(os.environ["NUMBA_CACHE_DIR"])
+        return
+    yield Path(__file__).parent / "__pycache__"
+    with contextlib.suppress(RuntimeError):  # there is no home
+        home = Path.home() / ".cache"
+        yield Path(os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or home) / "pendpipe"
+
+
+def _compile() -> tuple[int, Any]:
+    """Compile the engine, and keep its code where that is allowed."""
+    from pendpipe.dynamics.entry import compiled_entry
+
+    entry = compiled_entry()
+    name = _file_name()
+    for folder in _folders():
+        try:
+            machine_code.keep(folder / name, entry.inspect_llvm(), entry.native_name)
+        except OSError:
+            continue
+        for old in folder.glob(f"{name.rpartition('-')[0]}-*.bin"):
+            if old.name != name:
+                old.unlink(missing_ok=True)
+        break
+    return entry.address, entry
 
 
 @cache
-def engine() -> Callable[..., tuple[int, int]]:
-    """Return `march.march`, compiled; the first call in a new installation takes a while."""
-    sources = _digest()
+def engine() -> Callable[..., int]:
+    """Return the engine's entry; see `entry.py` for its arguments.
 
-    def run(
-        constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float,
-        tabulate: bool, most: int, until_s: float,
-        time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
-        buffer: FloatArray,
-    ) -> tuple[int, int]:  # fmt: skip
-        buffer[0] = sources  # a use, so that it is a free variable
-        return march(
-            constants, directions, rates, y, tabulate, most, until_s,
-            time_s, angle_rad, jacobian, turning, buffer,
-        )  # fmt: skip
-
-    return njit(run, cache=True, _nrt=False, error_model="numpy")  # type: ignore[no-any-return]
+    The first call in a new installation compiles for half a minute; those in later processes
+    take about a tenth of a second.
+    """
+    name = _file_name()
+    for folder in _folders():
+        loaded = machine_code.load(folder / name)
+        if loaded is not None:
+            break
+    else:
+        loaded = _compile()
+    address, owner = loaded
+    function = _ENTRY(address)
+    function.owner = owner  # type: ignore[attr-defined]
+    return function

@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from pendpipe.dynamics.compiled import engine
-from pendpipe.dynamics.march import OVERDAMPED, STOPPED
-from pendpipe.dynamics.workspace import buffer_size
+from pendpipe.dynamics.layout import (
+    CONSTANTS,
+    OVERDAMPED,
+    STOPPED,
+    inputs_size,
+    work_size,
+)
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -65,19 +70,34 @@ def _run(
     if method not in ("map", "clock"):
         message = f'method must be "map" or "clock", not {method!r}'
         raise ValueError(message)
-    sensitivities = directions.shape[0] + 1 if directions.size else 0
+    count = rates.size
+    sensitivities = count + 1 if count else 0
     polynomials = sensitivities + 1 if time_s.size else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
-    omega = model.angular_frequency
-    count, state = engine()(
-        np.array([*model.shape(), omega, release.time_s, release.offset_rad, side, side]),
-        directions, rates, abs(release.angle_rad), method == "map", most, until_s,
-        time_s, angle_rad, jacobian, turning, np.zeros(buffer_size(sensitivities, polynomials)),
+    buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
+    buffer[:CONSTANTS] = (
+        *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
+    )  # fmt: skip
+    if count:
+        buffer[CONSTANTS : CONSTANTS + count] = rates
+        buffer[CONSTANTS + count : inputs_size(count)] = directions.ravel()
+    found, state = divmod(
+        engine()(
+            buffer.ctypes.data, buffer.size, count, abs(release.angle_rad), method == "map",
+            most, until_s, _address(time_s), time_s.size, _address(angle_rad),
+            _address(jacobian), _address(turning), turning.shape[1],
+        ),
+        OVERDAMPED + 1,
     )  # fmt: skip
     if state == OVERDAMPED:
         message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
         raise ValueError(message)
-    return count, state == STOPPED
+    return found, state == STOPPED
+
+
+def _address(array: FloatArray) -> int:
+    """Return where an array's numbers are; asking an empty one is not worth the time."""
+    return array.ctypes.data if array.size else 0
 
 
 def turning_points(

@@ -29,7 +29,8 @@ def panel_width(polynomials: int) -> int:
 
 def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
     """Return the length of a half cycle's row."""
-    return HEAD + 2 * sensitivities + panels * panel_width(polynomials)
+    width = 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
+    return HEAD + 2 * sensitivities + panels * width
 
 
 def work_size(sensitivities: int, polynomials: int) -> int:

@@ -150,7 +150,7 @@ def march(
     -------
     The number of turning points, and RUNNING, STOPPED or OVERDAMPED.
     """
-    columns = rates.size + 1 if directions.shape[1] > 0 else 0
+    columns = rates.size + 1 if rates.size > 0 else 0
     polynomials = columns + 1 if time_s.size > 0 else 0
     work = carve(buffer, constants, directions, rates, columns, polynomials)
     shape, motion, signs = work.shape, work.motion, constants[7:9]

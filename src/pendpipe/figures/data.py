@@ -74,7 +74,8 @@ class Decay:
     @property
     def elapsed_s(self) -> FloatArray:
         """Time since the first turning point: the t of Eq. 14."""
-        return self.time_s - self.time_s[0]
+        elapsed: FloatArray = self.time_s - self.time_s[0]
+        return elapsed
 
 
 def number(entry: Any) -> float:
@@ -106,7 +107,8 @@ def series(entries: Iterable[Entry], quantity: str) -> Series:
     ]  # fmt: skip
     rows = sorted(row for row in rows if np.isfinite(row[0]) and np.isfinite(row[2]))
     table = np.array([row[:4] for row in rows], dtype=np.float64).reshape(-1, 4)
-    return Series(*table.T, names=tuple(row[4] for row in rows))
+    x, x_sd, y, y_sd = table.T
+    return Series(x, x_sd, y, y_sd, tuple(row[4] for row in rows))
 
 
 def branches(comparison: Mapping[str, Any]) -> list[str]:

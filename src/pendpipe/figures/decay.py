@@ -19,7 +19,7 @@ from pendpipe.figures.style import (
     plain_text,
     styled,
 )
-from pendpipe.figures.units import axis_unit
+from pendpipe.figures.units import axis_unit, compact
 
 MANY = 150
 """From this many points on they are drawn as pixels inside the SVG, to keep it small."""
@@ -42,8 +42,11 @@ def draw(decay: Decay) -> Figure:
     _amplitudes(upper, time, large * y, large * sd)
     upper.plot(time[0] + moment, large * smooth, color=INK, linewidth=1.0, zorder=3,
                label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})")  # fmt: skip
-    upper.plot(time[0] + moment, large * start * np.exp(-rate * moment), color=VERMILION, linestyle="--", linewidth=1.1, zorder=3,
-               label=f"linear damping ({_rms(y - linear, decay.unit)})")  # fmt: skip
+    upper.plot(
+        time[0] + moment, large * start * np.exp(-rate * moment), color=VERMILION,
+        linestyle="--", linewidth=1.1, zorder=3,
+        label=f"linear damping ({_rms(y - linear, decay.unit)})",
+    )  # fmt: skip
     # The logarithm of an amplitude within its own noise is chance.
     lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
     upper.set_yscale("log")
@@ -68,9 +71,7 @@ def _amplitudes(axes: Axes, time_s: FloatArray, values: FloatArray, errors: Floa
 
 def _rms(misfit: FloatArray, unit: str) -> str:
     """Root mean square with its unit."""
-    value = float(np.sqrt(np.mean(misfit**2)))
-    factor, short = axis_unit(np.array([value]), unit)
-    return f"{factor * value:.2g} {short}" if factor * value < 100 else f"{factor * value:.0f} {short}"
+    return compact(float(np.sqrt(np.mean(misfit**2))), unit)
 
 
 def _plain_log_labels(axes: Axes) -> None:
@@ -78,7 +79,7 @@ def _plain_log_labels(axes: Axes) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axes.get_ylim()
-    steps = (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
+    steps: tuple[float, ...] = (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
     if high < 8.0 * low:
         steps = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
     axes.yaxis.set_major_locator(LogLocator(subs=steps))

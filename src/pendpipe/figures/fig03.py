@@ -46,7 +46,7 @@ def draw(calibration: Mapping[str, Any] | None) -> Figure:
     lower.errorbar(
         turn * angle, 1e3 * residual, 1e3 * residual_sd, fmt="o", color=BLUE, markersize=3.5
     )
-    lower.set(xlabel=f"Angle ({unit})", ylabel=f"Data − line (mV)")
+    lower.set(xlabel=f"Angle ({unit})", ylabel="Data − line (mV)")
     lower.margins(y=0.25)
     verdict = _linearity(calibration)
     if verdict:

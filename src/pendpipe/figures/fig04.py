@@ -18,7 +18,9 @@ PERIODS_S = (15, 6, 4, 3, 2.5, 2, 1.5, 1)
 @styled
 def draw(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q of the air benchmark with the line k f^2, and their ratio."""
-    points = series([e for e in used(comparison) if e.get("fluid") == "air"], "quality_factor_limit")
+    points = series(
+        [e for e in used(comparison) if e.get("fluid") == "air"], "quality_factor_limit"
+    )
     fitted = comparison.get("hysteretic_coefficient")
     coefficient = number(fitted)
     if not len(points.x) or not np.isfinite(coefficient):
@@ -49,8 +51,8 @@ def draw(comparison: Mapping[str, Any]) -> Figure:
     exponent = (fitted or {}).get("free_exponent")
     if exponent:
         text = with_error(number(exponent), error(exponent))
-        lower.set_title(f"With a free exponent: $Q \\propto f^{{\\,n}}$, $n$ = {text}", fontsize=8.5,
-                        pad=3)  # fmt: skip
+        label = f"With a free exponent: $Q \\propto f^{{\\,n}}$, $n$ = {text}"
+        lower.set_title(label, fontsize=8.5, pad=3)
     return figure
 
 

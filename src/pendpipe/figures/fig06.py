@@ -36,9 +36,7 @@ def draw(comparison: Mapping[str, Any]) -> Figure:
             points.x, points.y, points.y_sd, points.x_sd, fmt=look.marker, color=look.colour,
             markerfacecolor="white", markersize=4.5, label=f"{name}: measured, Eq. 17",
         )  # fmt: skip
-    axes.set(
-        xlabel="Frequency (Hz)", ylabel="$\\log_{10}\\, Q_v$", xlim=(0.0, None)
-    )
+    axes.set(xlabel="Frequency (Hz)", ylabel="$\\log_{10}\\, Q_v$", xlim=(0.0, None))
     handles, labels = axes.get_legend_handles_labels()
     # A column of the key for each branch, theory before measurement.
     order = sorted(range(len(labels)), key=lambda i: names.index(labels[i].partition(":")[0]))

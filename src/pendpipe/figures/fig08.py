@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pendpipe import physics
@@ -39,8 +40,7 @@ def draw(decay: Decay) -> Figure:
     time = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
     quality, half_width = quality_with_band(decay, time)
     moment = decay.time_s[0] + time
-    a, b, c = decay.rates
-    frequency = decay.value("frequency")
+    b, frequency = decay.value("b"), decay.value("frequency")
 
     figure, axes = new_figure(3.6)
     axes.fill_between(
@@ -64,13 +64,14 @@ def draw(decay: Decay) -> Figure:
             color=VERMILION, fontsize=8.5,
         )  # fmt: skip
         _mark_maximum(axes, decay, time, quality)
-    axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$", ylim=(0.0, 1.16 * top))
+    axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$")
+    axes.set_ylim(0.0, 1.16 * top)
     axes.margins(x=0.01)
     key_above(axes, 2)
     return figure
 
 
-def _mark_maximum(axes: object, decay: Decay, time: FloatArray, quality: FloatArray) -> None:
+def _mark_maximum(axes: Axes, decay: Decay, time: FloatArray, quality: FloatArray) -> None:
     """Mark where Q is largest, if that lies inside the record."""
     index = int(np.nanargmax(quality))
     if index in (0, len(time) - 1):
@@ -78,9 +79,9 @@ def _mark_maximum(axes: object, decay: Decay, time: FloatArray, quality: FloatAr
     a, b, c = decay.rates
     largest = float(physics.largest_quality_factor(decay.value("frequency"), a, b, c))
     moment = float(decay.time_s[0] + time[index])
-    axes.plot([moment], [largest], "D", color=BLUE, markersize=5, zorder=4)  # type: ignore[attr-defined]
-    axes.annotate(  # type: ignore[attr-defined]
-        f"maximum {largest:.1f}\nwhere $y = \\sqrt{{c/a}}$", (moment, largest), (0.0, -30.0),
+    axes.plot([moment], [largest], "D", color=BLUE, markersize=5, zorder=4)
+    axes.annotate(
+        f"maximum {largest:.1f}\nwhere $y$ = √($c$/$a$)", (moment, largest), (0.0, -30.0),
         textcoords="offset points", ha="center", va="top", fontsize=8.5,
         arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7},
     )  # fmt: skip

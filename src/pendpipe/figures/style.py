@@ -19,13 +19,13 @@ from pendpipe.files import replaced
 
 Arguments = ParamSpec("Arguments")
 
-BLUE, VERMILION, GREEN = "#0072B2", "#C7450B", "#007A5A"
+BLUE, VERMILION, GREEN = "#0072B2", "#C8321A", "#007A5A"
 INK, GREY, PALE = "#1A1A1A", "#5F6670", "#9CC4E0"
 WIDTH_IN: Final = 5.2
 """One size for all: letters stay legible at a column's width and on a phone."""
 
 _FONTS: Final = ["DejaVu Sans", "Verdana", "Arial", "sans-serif"]
-_LOOK: Final[dict[str, Any]] = {
+_LOOK: Final[dict[Any, Any]] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 9.0,
     "axes.labelsize": 9.0,
@@ -127,9 +127,7 @@ def figure_with_residuals(
 
 def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0) -> None:
     """Put the legend above the axes, where it can't hide data."""
-    axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, lift), ncols=columns, borderaxespad=0.3
-    )
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, lift), ncols=columns, borderaxespad=0.3)
 
 
 def plain_text(text: str) -> str:
@@ -141,7 +139,11 @@ def save(figure: Figure, stem: Path, *, dpi: int = 200) -> list[Path]:
     """Write a figure as SVG and PNG, the same bytes whenever the same data are drawn."""
     written = [stem.with_name(f"{stem.name}.{form}") for form in ("svg", "png")]
     # A salt for each figure, so that two of them in one page do not share identifiers.
-    saving = {**_LOOK, "svg.hashsalt": f"pendpipe {stem.name}", "font.family": _FONTS}
+    saving: dict[Any, Any] = {
+        **_LOOK,
+        "svg.hashsalt": f"pendpipe {stem.name}",
+        "font.family": _FONTS,
+    }
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "pendpipe"},
         "png": {"Software": "pendpipe"},

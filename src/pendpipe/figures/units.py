@@ -27,6 +27,18 @@ def axis_unit(values: FloatArray, unit: str) -> tuple[float, str]:
     return prefixed(max(finite, default=0.0), unit)
 
 
+def compact(value: float, unit: str) -> str:
+    """A size without its error, to three digits, with an SI prefix.
+
+    >>> compact(8.032e-5, "rad")
+    '80.3 µrad'
+    """
+    factor, short = prefixed(abs(value), unit)
+    shown = factor * value
+    digits = f"{shown:#.3g}".rstrip(".") if abs(shown) < 999.5 else f"{shown:.0f}"
+    return f"{digits} {short}"
+
+
 def pretty_unit(unit: str) -> str:
     """A unit of the result files as it is printed.
 
@@ -67,7 +79,9 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
             number = f"{scaled:.0f}"
         return _join(_minus(number) + tens, unit)
     decimals = max(1 - math.floor(math.log10(error) + 1e-9), 0)
-    number = _minus(f"{scaled:.{decimals}f}")
+    # An error of 120 leaves no meaning in the last digit of 1234.
+    coarse = min(1 - math.floor(math.log10(error) + 1e-9), 0)
+    number = _minus(f"{round(scaled, coarse) if coarse else scaled:.{decimals}f}")
     if short:
         digits = f"{error:.{decimals}f}"
         # Below one only the digits count; from one on the point stays, as in 136.1(1.2).

@@ -38,7 +38,7 @@ def _hysteresis(comparison: Comparison) -> Iterator[str]:
 
 
 def _drag(comparison: Comparison) -> Iterator[str]:
-    factor = comparison.get("theory_factor")
+    factor = comparison.get("theory_factor") or {}
     value, sd = number(factor), error(factor)
     if not math.isfinite(value) or not sd:
         return
@@ -50,6 +50,13 @@ def _drag(comparison: Comparison) -> Iterator[str]:
         f"The drag in water is {with_error(value, sd)} times that of Eq. 16,"
         f" {away:.0f} standard deviations from 1 (paper: 1.13)."
     )
+    history = comparison.get("history_coefficient") or {}
+    better = (history.get("chi2") or 0.0) - (factor.get("chi2") or 0.0)
+    if better > 9.0:
+        yield (
+            "A common factor describes that better than a larger history term"
+            f" (χ² lower by {better:.0f})."
+        )
     worst = max(comparison.get("budget") or [], key=lambda part: part["relative_sd"], default=None)
     if worst:
         yield (
@@ -76,7 +83,8 @@ def _left_out(comparison: Comparison) -> Iterator[str]:
 def _exponents(comparison: Comparison) -> Iterator[str]:
     for branch, found in (comparison.get("viscous_exponents") or {}).items():
         exponents = [part["exponent"] for part in (found or {}).get("ranges") or []]
-        if len(exponents) > 1:
+        # Worth saying where the choice of the ends matters more than a tenth.
+        if len(exponents) > 1 and max(exponents) - min(exponents) > 0.1 * abs(number(found)):
             low, high = (f"{end:.2f}".replace("-", "−") for end in (min(exponents), max(exponents)))
             yield (
                 f"The exponent of the {branch} branch is no constant of nature: over parts of the"

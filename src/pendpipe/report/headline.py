@@ -76,7 +76,8 @@ def _percent(value: float, printed: Printed) -> str:
     """How far a value lies from the paper's, in percent of the paper's."""
     if not printed.value:
         return ""
-    return f"{100.0 * (value / printed.value - 1.0):+.1f} %".replace("-", "−")
+    percent = round(100.0 * (value / printed.value - 1.0), 1)
+    return f"{percent:+.1f} %".replace("-", "−") if percent else "0.0 %"
 
 
 def _exponents(comparison: Comparison) -> Iterator[Row | None]:

@@ -14,14 +14,13 @@ from typing import Any, Final
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from pendpipe.figures.data import used
 from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.report.findings import findings
 from pendpipe.report.glossary import GLOSSARY
 from pendpipe.report.headline import headline
 from pendpipe.report.health import CHI2_RANGE
-from pendpipe.report.records import Line, heads, lines
+from pendpipe.report.records import Line, Table, table_of_records
 from pendpipe.report.vector import inline_svg
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -53,8 +52,9 @@ def render(
     """
     drawn = _campaign_figures(figures)
     entries = list(comparison["records"])
-    table = lines(entries, _hashes(folder, entries))
-    decays, outside = _decays(folder, table, spent=sum(map(len, drawn.values())))
+    has_theory = bool(comparison.get("has_theory"))
+    table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
+    decays, outside = _decays(folder, table.lines, spent=sum(map(len, drawn.values())))
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
     environment = Environment(
@@ -63,15 +63,17 @@ def render(
     )  # fmt: skip
     return environment.get_template("page.html").render(
         title=comparison.get("title") or "A campaign of free decays",
-        has_theory=bool(comparison.get("has_theory")),
+        has_theory=has_theory,
         simulated=sum(entry.get("source") == "simulated" for entry in entries),
         rows=headline(comparison, configuration.get("simulated") or {}),
         findings=findings(comparison),
         figures=drawn,
         captions=CAPTIONS,
-        columns=heads(used(comparison)),
-        records=table,
-        counts=_counts(table),
+        columns=table.columns,
+        has_fluid=any(line.fluid for line in table.lines),
+        has_branch=any(line.branch for line in table.lines),
+        records=table.lines,
+        counts=_counts(table.lines),
         chi2_range=CHI2_RANGE,
         decays=decays,
         outside=outside,
@@ -82,10 +84,10 @@ def render(
         steps=remarks.steps(comparison, list(drawn), folder),
         glossary=GLOSSARY,
         provenance=comparison.get("provenance") or {},
-        downloads=_downloads(table, comparison, summary),
+        downloads=_downloads(table, summary),
         # These two are the package's own files; the policy names the script by its hash.
-        style=Markup(style),  # noqa: S704
-        script=Markup(script),  # noqa: S704
+        style=Markup(style),
+        script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
     )
 
@@ -129,7 +131,9 @@ def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
         path = folder / str(entry["record"]) / "fit.json"
         if path.is_file():
             fit = json.loads(path.read_text(encoding="utf-8"))
-            hashes[str(entry["record"])] = str((fit.get("provenance") or {}).get("input_sha256", ""))
+            hashes[str(entry["record"])] = str(
+                (fit.get("provenance") or {}).get("input_sha256", "")
+            )
     return hashes
 
 
@@ -139,14 +143,14 @@ def _counts(table: list[Line]) -> list[tuple[str, str, str, int]]:
     return [(*state, found.count(state)) for state in dict.fromkeys(found)]
 
 
-def _downloads(table: list[Line], comparison: Content, summary: Content) -> dict[str, str]:
+def _downloads(table: Table, summary: Content) -> dict[str, str]:
     """Files inside the page, as data addresses: they can be saved without a script."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    names = [head for head, _, _ in heads(used(comparison))]
+    names = [f"{c.head} ({c.unit})" if c.unit else c.head for c in table.columns]
     pairs = [name for head in names for name in (head, f"sd of {head}")]
     writer.writerow(["record", "fit", "fluid", "branch", *pairs])
-    for line in table:
+    for line in table.lines:
         numbers = [text for cell in line.cells for text in (cell.value, cell.sd)]
         writer.writerow([line.name, line.health.word, line.fluid, line.branch, *numbers])
     return {

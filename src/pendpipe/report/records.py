@@ -9,22 +9,32 @@ from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 from pendpipe.figures.data import Entry, error, number
-from pendpipe.figures.units import pretty_unit, with_error
+from pendpipe.figures.units import compact, pretty_unit, with_error
 from pendpipe.report.health import Health, health
 
+
+class Column(NamedTuple):
+    """A column of numbers: quantity, head, unit, and whether a narrow screen leaves it out."""
+
+    quantity: str
+    head: str
+    unit: str = ""
+    narrow: bool = True
+
+
 COLUMNS: Final = (
-    ("frequency", "f", "Hz", True),
-    ("a", "a", "", True),
-    ("b", "b", "s⁻¹", False),
-    ("c", "c", "", True),
-    ("quality_factor_limit", "Q limit", "", False),
-    ("quality_factor_viscous", "Q viscous", "", True),
-    ("quality_factor_viscous_theory", "Q of Eq. 16", "", True),
-    ("chi2_per_dof", "χ²/dof", "", True),
+    Column("frequency", "f", narrow=False),
+    Column("a", "a"),
+    Column("b", "b"),
+    Column("c", "c"),
+    Column("quality_factor_limit", "Q limit", narrow=False),
+    Column("quality_factor_viscous", "Q viscous"),
+    Column("quality_factor_viscous_theory", "Q of Eq. 16"),
+    Column("amplitude_rms_rad", "Misfit"),
+    Column("linear_damping_rms_rad", "Linear misfit"),
+    Column("chi2_per_dof", "χ²/dof"),
 )
-"""Quantity, head, unit, and whether a narrow screen leaves it out."""
-
-
+_MISFITS: Final = ("amplitude_rms_rad", "linear_damping_rms_rad")
 _PATH: Final = re.compile(r"(?<![\w./\\])(?:[A-Za-z]:[\\/]|~?/|\.{1,2}/)[^\s'\"(),;]+")
 """An absolute path, or one that begins at a dot; not the slash of V/rad."""
 
@@ -45,34 +55,59 @@ class Line(NamedTuple):
     health: Health
     fluid: str
     branch: str
+    frequency: str
     cells: list[Cell]
     facts: list[tuple[str, str]]
     cuts: list[str]
     warnings: list[str]
     refused: str
+    sha256: str
 
 
-def lines(entries: list[Entry], hashes: Mapping[str, str]) -> list[Line]:
-    """Prepare every record, refused ones included, in the order of the table of records."""
-    return [_line(entry, index, hashes) for index, entry in enumerate(entries, start=1)]
+class Table(NamedTuple):
+    """The table of records: its columns of numbers and its lines."""
+
+    columns: list[Column]
+    lines: list[Line]
 
 
-def heads(entries: list[Entry]) -> list[tuple[str, str, bool]]:
-    """Head, unit and narrowness of each column; units as the records have them."""
-    found: dict[str, set[str]] = {}
-    for entry in entries:
-        for quantity, *_ in COLUMNS:
-            estimate = entry.get(quantity)
-            if isinstance(estimate, Mapping):
-                found.setdefault(quantity, set()).add(pretty_unit(estimate.get("unit", "")))
-    return [
-        # Angles and lengths in one campaign: each cell then says its own unit.
-        (head, units.pop() if len(units := set(found.get(quantity, {unit}))) == 1 else "", narrow)
-        for quantity, head, unit, narrow in COLUMNS
+def table_of_records(entries: list[Entry], hashes: Mapping[str, str], *, has_theory: bool) -> Table:
+    """Prepare every record, refused ones included, in the order of the table of records.
+
+    A column that no record fills is left out. Beside a theory there is no room for the
+    misfits, which are then told in each record's own section only.
+    """
+    columns = [
+        column._replace(unit=_common_unit(entries, column.quantity))
+        for column in COLUMNS
+        if any(_cell(column, entry).value for entry in entries)
+        and not (has_theory and column.quantity in _MISFITS)
     ]
+    return Table(
+        columns,
+        [_line(entry, index, columns, hashes) for index, entry in enumerate(entries, start=1)],
+    )
 
 
-def _line(entry: Entry, index: int, hashes: Mapping[str, str]) -> Line:
+def _common_unit(entries: list[Entry], quantity: str) -> str:
+    """The unit of a column for its head; none where angles and lengths are mixed."""
+    units = {
+        pretty_unit(found.get("unit", ""))
+        for entry in entries
+        if isinstance(found := _found(entry, quantity), Mapping)
+    }
+    return units.pop() if len(units) == 1 and quantity not in _MISFITS else ""
+
+
+def _found(entry: Entry, quantity: str) -> Any:
+    """A quantity of a record; the misfits are told in a group of their own."""
+    if quantity not in _MISFITS:
+        return entry.get(quantity)
+    value = number((entry.get("misfit") or {}).get(quantity))
+    return {"value": value, "unit": (entry.get("amplitude") or {}).get("unit", "rad")}
+
+
+def _line(entry: Entry, index: int, columns: list[Column], hashes: Mapping[str, str]) -> Line:
     name = str(entry["record"])
     refused = str(entry.get("refused") or "")
     return Line(
@@ -81,26 +116,41 @@ def _line(entry: Entry, index: int, hashes: Mapping[str, str]) -> Line:
         health=health(entry),
         fluid=entry.get("fluid") or "",
         branch=entry.get("branch") or "",
-        cells=[_cell(entry.get(quantity)) for quantity, *_ in COLUMNS],
-        facts=[] if refused else list(_facts(entry, hashes.get(name, ""))),
+        frequency=_cell(COLUMNS[0], entry).text,
+        cells=[_cell(column, entry) for column in columns],
+        facts=[] if refused else list(_facts(entry)),
         cuts=[_cut(cut) for cut in entry.get("cuts") or []],
         warnings=[str(warning) for warning in entry.get("warnings") or []],
         refused=without_folders(refused),
+        sha256=hashes.get(name, ""),
     )
 
 
-def _cell(found: Any) -> Cell:
+def _cell(column: Column, entry: Entry) -> Cell:
+    """A number of the table, with its unit where the column's head has none."""
+    found = _found(entry, column.quantity)
     value, sd = number(found), error(found)
-    if not math.isfinite(value):
+    unit = "" if column.unit or not isinstance(found, Mapping) else found.get("unit", "")
+    if not math.isfinite(value) or _unresolved(column.quantity, found):
         return Cell("–", "", "")
-    text = with_error(value, sd, short=True)
-    if isinstance(found, Mapping) and found.get("at_bound"):
+    full = (repr(value), repr(sd) if sd else "")
+    if column.quantity == "chi2_per_dof":
+        return Cell(f"{value:.3f}" if value < 9.995 else f"{value:.0f}", *full)
+    if column.quantity in _MISFITS:
+        return Cell(compact(value, unit), *full)
+    if found.get("at_bound"):
         upper = (found.get("interval95") or [None, None])[1]
-        text = f"< {upper:.2g}" if upper else "0"
-    return Cell(text.replace("e-0", "e−"), repr(value), repr(sd) if sd else "")
+        return Cell(f"< {with_error(float(f'{upper:.2g}'), None, unit)}" if upper else "0", *full)
+    return Cell(with_error(value, sd, unit, short=True), *full)
 
 
-def _facts(entry: Entry, digest: str) -> Iterator[tuple[str, str]]:
+def _unresolved(quantity: str, found: Any) -> bool:
+    """Whether Eq. 17 has left nothing but noise: in air the hysteresis is all there is."""
+    spread = error(found)
+    return quantity == "quality_factor_viscous" and spread > 0.3 * abs(number(found))
+
+
+def _facts(entry: Entry) -> Iterator[tuple[str, str]]:
     """Everything that the section of a record lists, as pairs of name and value."""
     yield "Source", without_folders(str(entry.get("source") or ""))
     place = ", ".join(filter(None, (entry.get(key) for key in ("fluid", "branch", "geometry"))))
@@ -123,29 +173,32 @@ def _facts(entry: Entry, digest: str) -> Iterator[tuple[str, str]]:
     }
     for text, key in quantities.items():
         found = entry.get(key)
-        if math.isfinite(number(found)) and isinstance(found, Mapping):
+        if not isinstance(found, Mapping) or _unresolved(key, found):
+            continue
+        if math.isfinite(number(found)):
             bound = ", at its bound" if found.get("at_bound") else ""
             yield text, with_error(number(found), error(found), found.get("unit", "")) + bound
     yield "Method", str(entry.get("method") or "")
-    yield "Used", (
-        f"{entry.get('samples')} samples, {entry.get('turning_points')} turning points,"
-        f" {number(entry.get('start_s')):.4g} s to {number(entry.get('stop_s')):.4g} s"
+    yield (
+        "Used",
+        (
+            f"{entry.get('samples')} samples, {entry.get('turning_points')} turning points,"
+            f" {number(entry.get('start_s')):.4g} s to {number(entry.get('stop_s')):.4g} s"
+        ),
     )
     yield from _noise(entry)
-    if digest:
-        yield "SHA-256 of the recording", digest
 
 
 def _noise(entry: Entry) -> Iterator[tuple[str, str]]:
     unit = (entry.get("amplitude") or {}).get("unit", "rad")
     pair = (number(entry.get("noise_rms_rad")), number(entry.get("residual_rms_rad")))
     if all(map(math.isfinite, pair)):
-        noise, residual = (with_error(value, None, unit) for value in pair)
+        noise, residual = (compact(value, unit) for value in pair)
         yield "Noise; residual (rms)", f"{noise}; {residual}"
     misfit = entry.get("misfit")
     if misfit:
         own, linear = (
-            with_error(number(misfit.get(key)), None, unit)
+            compact(number(misfit.get(key)), unit)
             for key in ("amplitude_rms_rad", "linear_damping_rms_rad")
         )
         yield "Misfit of the amplitudes (rms)", f"{own}; with linear damping alone {linear}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -102,9 +103,13 @@ def budget_rows(comparison: Comparison) -> list[tuple[str, str, float]]:
     parts = comparison.get("budget") or []
     total = sum(part["relative_sd"] ** 2 for part in parts) or 1.0
     rows = [
-        (part["source"], f"{100 * part['relative_sd']:.2g} %", 100 * part["relative_sd"] ** 2 / total)
+        (
+            part["source"],
+            f"{100 * part['relative_sd']:.2g} %",
+            100 * part["relative_sd"] ** 2 / total,
+        )
         for part in parts
-    ]  # fmt: skip
+    ]
     return sorted(rows, key=lambda row: -row[2])
 
 
@@ -113,10 +118,11 @@ def check_rows(comparison: Comparison) -> list[tuple[str, str, str, str]]:
     rows = []
     for check in comparison.get("checks") or []:
         ratio = [value for value in check.get("ratio") or [] if value is not None]
+        chi2 = float(f"{number(check.get('chi2')):.2g}")
         rows.append((
             "with" if check["history"] else "left out",
             "with" if check["hysteresis"] else "left out",
             f"{min(ratio):.3g} to {max(ratio):.3g}" if ratio else "–",
-            f"{check['chi2']:.3g} / {check['dof']}" if check.get("chi2") is not None else "–",
+            f"{with_error(chi2, None)} / {check['dof']}" if math.isfinite(chi2) else "–",
         ))  # fmt: skip
     return rows

@@ -31,12 +31,16 @@ class Loss:
     suspect_before
         Whether the scan before is suspect too: bytes without a frame mark followed it, so
         that one of them may belong inside it.
+    reason
+        What the device said of it (``"stop 01"``), or ``"clock"`` where the bytes are whole
+        and the recorder's clock tells of the loss.
     """
 
     after_scan: int
     discarded_bytes: int
     lost_scans: int
     suspect_before: bool = False
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class Decoder(Protocol):
         """Decode further bytes; an unfinished scan waits for the next call."""
 
     def finish(self) -> Scans:
-        """Say what is left over at the end: no counts, perhaps a loss."""
+        """Say what is left over at the end: scans held back till now, perhaps a loss."""
 
 
 @dataclass(frozen=True)
@@ -92,10 +96,13 @@ class Setup:
     rate_hz
         Scans a second that the device's documented clock gives: the nearest to what was
         asked that its divisors allow.
+    range_volts
+        Full scale of every channel is plus and minus it.
     """
 
     channels: tuple[int, ...]
     rate_hz: float
+    range_volts: float = 10.0
 
 
 class Driver(Protocol):
@@ -109,14 +116,20 @@ class Driver(Protocol):
     baudrate: ClassVar[int]
     bits: ClassVar[int]
     range_volts: ClassVar[float]
+    attempts: int
 
     def __init__(self, line: Line, clock: Clock) -> None: ...
+
+    def hello(self) -> Identity:
+        """Make the device quiet and ask it who it is, in the language of the family."""
 
     def identify(self) -> Identity:
         """Make the device quiet and ask it who it is; refuse another model."""
 
-    def configure(self, channels: Sequence[int], rate_hz: float) -> Setup:
-        """Choose channels and scan rate."""
+    def configure(
+        self, channels: Sequence[int], rate_hz: float, range_volts: float | None = None
+    ) -> Setup:
+        """Choose channels, scan rate and the smallest range that holds `range_volts`."""
 
     def start(self) -> None:
         """Begin the stream; the next byte received belongs to the first scan."""
@@ -126,6 +139,9 @@ class Driver(Protocol):
 
     def read(self, limit_s: float) -> Scans:
         """Receive and decode, for a use without the recorder."""
+
+    def ended(self, data: bytes) -> str:
+        """Return what the device says of the end of its stream, if it does in these bytes."""
 
     def stop(self) -> None:
         """End the stream and throw away what still arrives."""
@@ -158,6 +174,10 @@ class StreamReader:
     def receive(self, limit_s: float) -> bytes:
         """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""
         return self.line.receive(limit_s)
+
+    def ended(self, data: bytes) -> str:  # noqa: ARG002 - the legacy families tell nothing
+        """Return what the device says of the end of its stream: by default nothing."""
+        return ""
 
     def read(self, limit_s: float) -> Scans:
         """Receive and decode, for a use without the recorder."""

@@ -1,7 +1,7 @@
-"""The USB family of the DI-2108: text commands, binary words.
+"""The USB family of the DI-1100 to DI-4108 in CDC mode: text commands, binary words.
 
-Commands end in CR and are echoed with it, perhaps with NULs behind; ``start`` is not
-echoed, ``stop`` is, in the midst of the data (dataq-facts A8).
+``start`` is not echoed. A device whose buffer overflows writes ``stop 01`` (02, 03) into
+its data and falls silent (dataq-facts A8).
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, Final
 
-from pendpipe.acquire.drivers.base import Identity, Setup, StreamReader
-from pendpipe.acquire.drivers.words import WordDecoder
+from pendpipe.acquire.drivers.base import Setup
+from pendpipe.acquire.drivers.choice import choose_channels, choose_range
+from pendpipe.acquire.drivers.text import TextDriver
+from pendpipe.acquire.drivers.words import STOP_CODE, STOP_CODE_BYTES, WordDecoder
 from pendpipe.errors import InputError
 
 _BASE_HZ: Final = 60_000_000
@@ -20,50 +22,24 @@ _PACKETS: Final = (16, 32, 64, 128, 256, 512, 1024, 2048)
 _PACKETS_PER_SECOND: Final = 20.0
 
 
-class DI2108(StreamReader):
-    """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode.
-
-    Parameters
-    ----------
-    line
-        An open line; the speed does not matter.
-    clock
-        The recorder's clock, in which the waits for the device are counted.
-    """
+class DI2108(TextDriver):
+    """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode."""
 
     model: ClassVar[str] = "DI-2108"
-    baudrate: ClassVar[int] = 115200
     bits: ClassVar[int] = 16
     range_volts: ClassVar[float] = 10.0
+    ranges: ClassVar[tuple[float, ...]] = (10.0,)
+    """Full scales in the order of their codes in bits 8 to 11 of a word of the scan list."""
     channels: ClassVar[int] = 8
     divisors: ClassVar[tuple[int, int]] = (375, 65535)
     decimations: ClassVar[int] = 512
     further_decimations: ClassVar[int] = 40000
-    patience_s: ClassVar[float] = 2.0
-    """How long an answer may take, in seconds of the host; ``stop`` may stall for one."""
-    attempts: ClassVar[int] = 3
+    _tail = b""
 
-    def identify(self) -> Identity:
-        """End a stream of an earlier run and ask the device who it is.
-
-        Raises
-        ------
-        InputError
-            If nothing answers, or another model does.
-        """
-        self.stop()
-        maker = self._command("info 0")
-        number = self._command("info 1")
-        if maker != "DATAQ" or number != self.model.removeprefix("DI-"):
-            raise InputError(
-                self.line.port,
-                f"this is a {maker} {number}, no {self.model}",
-                "give its --model",
-            )
-        return Identity(self.model, self._command("info 2"), self._command("info 6"))
-
-    def configure(self, channels: Sequence[int], rate_hz: float) -> Setup:
-        """Choose channels (1 to 8) and scan rate.
+    def configure(
+        self, channels: Sequence[int], rate_hz: float, range_volts: float | None = None
+    ) -> Setup:
+        """Choose channels, scan rate and range.
 
         The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources
         disagree whether this is the rate of scans or of samples: it is measured as well.
@@ -71,26 +47,25 @@ class DI2108(StreamReader):
         Raises
         ------
         InputError
-            On a channel that the box does not have, or a rate out of its range.
+            On a channel or a range that the box does not have, or a rate out of its reach.
         """
-        chosen = tuple(sorted(set(channels)))
-        if not chosen or chosen[0] < 1 or chosen[-1] > self.channels:
-            raise InputError(
-                self.line.port,
-                f"the {self.model} has no channel {', '.join(map(str, channels)) or 'none'}",
-                f"choose from 1 to {self.channels}",
-            )
+        port = self.line.port
+        chosen = choose_channels(port, self.model, channels, self.channels)
+        high = choose_range(port, self.model, self.ranges, range_volts, self.range_volts)
         divisor, decimation, further = self._divisors(rate_hz)
         self._command("encode 0", needed=False)  # binary; a DI-4108 was seen not to echo it
         for position, channel in enumerate(chosen):
-            self._command(f"slist {position} {channel - 1}")
+            word = self.ranges.index(high) << 8 | channel - 1
+            self._command(f"slist {position} {word}")
         self._command(f"srate {divisor}")
-        self._command(f"dec {decimation}")
+        if self.decimations > 1:
+            self._command(f"dec {decimation}")
         self._command(f"deca {further}")
-        self._command("filter * 0")  # the last reading, no mean: a mean would be a filter
+        # The last reading, no mean: a mean would be a filter.
+        self._command("filter * 0", needed=False)
         rate = _BASE_HZ / (divisor * decimation * further)
-        self._command(f"ps {_packet_code(2 * len(chosen) * rate)}")
-        self.setup = Setup(chosen, rate)
+        self._command(f"ps {_packet_code(2 * len(chosen) * rate)}", needed=False)
+        self.setup = Setup(chosen, rate, high)
         return self.setup
 
     def start(self) -> None:
@@ -98,20 +73,20 @@ class DI2108(StreamReader):
         if self.setup is None:
             raise RuntimeError("configure() comes before start()")
         self._decoder = self.decoder(len(self.setup.channels))
+        self._tail = b""
         self.line.write(b"start\r")
 
-    def stop(self) -> None:
-        """End the stream and throw away what still arrives, the echo among it."""
-        for _ in range(self.attempts):
-            self.line.write(b"stop\r")
-            if b"stop" in self.line.discard(self.quiet_s):
-                return
-            self._clock.sleep(0.5)
+    def ended(self, data: bytes) -> str:
+        """Return the stop code (``"stop 01"``: overflow) if it stands in these bytes."""
+        seen = self._tail + data
+        self._tail = seen[1 - STOP_CODE_BYTES :]
+        found = STOP_CODE.search(seen)
+        return found.group().decode("ascii") if found else ""
 
     @classmethod
     def decoder(cls, channels: int) -> WordDecoder:
         """Return a fresh decoder for scans of so many channels."""
-        return WordDecoder(channels)
+        return WordDecoder(channels, cls.bits)
 
     def _divisors(self, rate_hz: float) -> tuple[int, int, int]:
         """Find srate, dec and deca whose rate is nearest to `rate_hz`."""
@@ -124,9 +99,11 @@ class DI2108(StreamReader):
                 f"choose a rate between {slowest:.3g} and {_BASE_HZ / low:g} Hz",
             )
         product = _BASE_HZ / rate_hz
-        further = min(self.further_decimations, max(1, math.ceil(product / (high * 512))))
+        further = math.ceil(product / (high * self.decimations))
+        further = min(self.further_decimations, max(1, further))
         first = max(1, math.ceil(product / (high * further)))
         last = min(self.decimations, max(first, int(product / (low * further))))
+        first = min(first, self.decimations)
         found = (
             (min(high, max(low, round(product / (decimation * further)))), decimation)
             for decimation in range(first, last + 1)
@@ -136,28 +113,39 @@ class DI2108(StreamReader):
         )
         return divisor, decimation, further
 
-    def _command(self, text: str, needed: bool = True) -> str:
-        """Send a command and return what its echo says beyond it.
 
-        A missing or wrong echo is tried again; without `needed` it is then let pass.
-        """
-        echo = ""
-        for attempt in range(self.attempts):
-            if attempt:
-                self.line.discard(self.quiet_s)
-            self.line.write(text.encode("ascii") + b"\r")
-            answer = self.line.read_until(b"\r", self.patience_s)
-            echo = answer.decode("ascii", "replace").strip("\0\r\n ")
-            if answer.endswith(b"\r") and echo.startswith(text):
-                return echo.removeprefix(text).strip()
-        if not needed:
-            return ""
-        fault = f"answers {echo[:40]!r} to '{text}'" if echo else "does not answer"
-        raise InputError(
-            self.line.port,
-            f"the device {fault}",
-            f"check cable, power, CDC mode and --model (asked for a {self.model})",
-        )
+class DI1100(DI2108):
+    """The DI-1100: 4 channels, 12 bits at the top of a word, +-10 V, 40 kHz."""
+
+    model: ClassVar[str] = "DI-1100"
+    bits: ClassVar[int] = 12
+    channels: ClassVar[int] = 4
+    divisors: ClassVar[tuple[int, int]] = (1500, 65535)
+    decimations: ClassVar[int] = 1
+
+
+class DI1110(DI2108):
+    """The DI-1110: 8 channels, 12 bits at the top of a word, +-10 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-1110"
+    bits: ClassVar[int] = 12
+    decimations: ClassVar[int] = 1
+
+
+class DI1120(DI2108):
+    """The DI-1120: 4 channels, 14 bits at the top of a word, +-2 to +-100 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-1120"
+    bits: ClassVar[int] = 14
+    channels: ClassVar[int] = 4
+    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class DI4108(DI2108):
+    """The DI-4108: 8 channels, 16 bits, +-0.2 to +-10 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4108"
+    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
 
 
 def _packet_code(bytes_per_second: float) -> int:

@@ -1,4 +1,4 @@
-"""The RS-232 family of the DI-154RS: commands of three bytes, each letter echoed.
+"""The RS-232 family of the DI-154RS and DI-194RS: commands of three bytes, echoed.
 
 A command is NUL, a letter, an argument. The NUL is not echoed; letter and argument are,
 one by one, and the next byte is sent after the echo of the last (dataq-facts A1).
@@ -11,6 +11,7 @@ from typing import ClassVar, Final
 
 from pendpipe.acquire.clock import Clock
 from pendpipe.acquire.drivers.base import Identity, Setup, StreamReader
+from pendpipe.acquire.drivers.choice import choose_channels, choose_range, refuse_another
 from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
 from pendpipe.acquire.line import Line
 from pendpipe.errors import InputError
@@ -42,35 +43,40 @@ class DI154RS(StreamReader):
     channels: ClassVar[int] = 4
     patience_s: ClassVar[float] = 2.0
     """How long an echo may take, in seconds of the host (the vendor's host waits 2 s)."""
-    attempts: ClassVar[int] = 3
+    attempts: int = 3
 
     def __init__(self, line: Line, clock: Clock) -> None:
         super().__init__(line, clock)
         self._baudrate = self.baudrate
 
-    def identify(self) -> Identity:
+    def hello(self) -> Identity:
         """Wake the device, end a stream of an earlier run, and ask who it is.
+
+        Raises
+        ------
+        InputError
+            If nothing answers.
+        """
+        # The supply comes up over the modem lines, raised when the port was opened.
+        self._clock.sleep(0.1)
+        self.stop()
+        name = self._command(b"N", b"Z", reply=10)
+        return Identity(_IDENTITIES.get(name) or f"device that calls itself {name!r}")
+
+    def identify(self) -> Identity:
+        """Wake the device and ask who it is; refuse another model.
 
         Raises
         ------
         InputError
             If nothing answers, or another model does.
         """
-        # The supply comes up over the modem lines, raised when the port was opened.
-        self._clock.sleep(0.1)
-        self.stop()
-        name = self._command(b"N", b"Z", reply=10)
-        found = _IDENTITIES.get(name)
-        if found != self.model:
-            raise InputError(
-                self.line.port,
-                f"this is a {found or 'device that calls itself ' + repr(name)}, no {self.model}",
-                "give its --model",
-            )
-        return Identity(found)
+        return refuse_another(self.line.port, self.hello(), self.model)
 
-    def configure(self, channels: Sequence[int], rate_hz: float) -> Setup:
-        """Choose channels (1 to 4) and scan rate.
+    def configure(
+        self, channels: Sequence[int], rate_hz: float, range_volts: float | None = None
+    ) -> Setup:
+        """Choose channels (1 to 4) and scan rate; the range is +-10 V.
 
         The device waits `count` bit times between scans, so that the rate is
         baud/(20 n + count) for n channels. The formula rests on two programs of others, not
@@ -82,7 +88,8 @@ class DI154RS(StreamReader):
         InputError
             On a channel that the box does not have, or a rate that the line can't carry.
         """
-        chosen = _channels(self.line.port, self.model, channels, self.channels)
+        chosen = choose_channels(self.line.port, self.model, channels, self.channels)
+        choose_range(self.line.port, self.model, (self.range_volts,), range_volts, 0.0)
         samples = len(chosen) * rate_hz
         baudrate = 4800 if samples <= 4800 / _BITS_PER_SAMPLE else 9600
         count = round(baudrate / rate_hz) - _BITS_PER_SAMPLE * len(chosen) if rate_hz > 0 else -1
@@ -97,7 +104,7 @@ class DI154RS(StreamReader):
         self._command(b"C", bytes([mask]))
         self._command(b"L", bytes([count & 0xFF]))
         self._command(b"M", bytes([count >> 8]))
-        self.setup = Setup(chosen, baudrate / (_BITS_PER_SAMPLE * len(chosen) + count))
+        self.setup = Setup(chosen, baudrate / (_BITS_PER_SAMPLE * len(chosen) + count), 10.0)
         return self.setup
 
     def start(self) -> None:
@@ -179,10 +186,8 @@ class DI154RS(StreamReader):
         return byte
 
 
-def _channels(port: str, model: str, channels: Sequence[int], last: int) -> tuple[int, ...]:
-    """Put the channels in the order of the scan; refuse what the box does not have."""
-    chosen = tuple(sorted(set(channels)))
-    if not chosen or chosen[0] < 1 or chosen[-1] > last:
-        listed = ", ".join(map(str, channels)) or "none"
-        raise InputError(port, f"the {model} has no channel {listed}", f"choose from 1 to {last}")
-    return chosen
+class DI194RS(DI154RS):
+    """The DI-194RS: the same line and commands, 10 bits."""
+
+    model: ClassVar[str] = "DI-194RS"
+    bits: ClassVar[int] = 10

@@ -75,7 +75,8 @@ def fit_period(
     shares = _SHARES if share is None else (share,) * 3
     trials = [_line(points, amplitude, a, b, c, each, omega, held) for each in shares]
     middle = trials[1]
-    spread = (trials[2][0] - trials[0][0]) / math.sqrt(12.0)
+    off = [trials[0][0] - middle[0], trials[2][0] - middle[0]]
+    spread = off[int(abs(off[1][0]) > abs(off[0][0]))] / math.sqrt(3.0)
     matrix = middle[1] * (middle[2] if middle[2] > _LOUD else 1.0)
     if share is None:
         # All times share what the unknown division of b does to the half cycles' shape.

@@ -139,8 +139,6 @@ def _shaped(
     measured = measure(samples, places, level, shape, amplitude=amplitude)
     size = np.abs(np.nan_to_num(measured.amplitude))
     relative, _ = shape_error(size, places.angular_frequency, rates)
-    # The unknown share of b leaves the odd part of the shape open, in the first order.
-    relative += 0.2 * max(rates.b, 0.0) / places.angular_frequency
     shape, measured = odd_harmonics(samples, places, level, shape, measured, relative * size)
     return places, measured, shape
 

@@ -15,7 +15,7 @@ from pendpipe.analysis.noise import white_rms
 from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.measure import Measured, Places, edges, measure
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 
 _CLEARLY: Final = 0.02
 _SIGNIFICANT: Final = 20.0
@@ -87,12 +87,11 @@ def _narrowed(
     middle = measure(
         samples, places, level, bare, window=_NARROW, free=1, amplitude=measured.amplitude
     )
-    ratio, freedom = _ratio(measured, noise)
-    poor = (ratio > 1.0 + 5.0 * np.sqrt(2.0 / freedom)) & (middle.count > 8)
+    poor = _even_misfit(samples, places, level, shape, measured, noise) & (middle.count > 8)
     if not poor.any():
         return shape, measured
     # What even the middle half does not fit counts as error, not as precision.
-    enlarged = np.maximum(_ratio(middle, noise)[0], 1.0)
+    enlarged = np.maximum(_ratio(middle, noise), 1.0)
     information, score = _level_of_peaks(places, middle, enlarged)
     single = middle._replace(
         amplitude=middle.peak[:, 0], variance=middle.peak[:, 1] * enlarged,
@@ -122,14 +121,33 @@ def _level_of_peaks(
     return information, np.where(between, information * level, 0.0)
 
 
-def _ratio(measured: Measured, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Misfit of half cycles over the noise's, with that of ten neighbours to each side."""
+def _even_misfit(
+    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    noise: FloatArray,
+) -> BoolArray:  # fmt: skip
+    """Which half cycles would be fitted better with even terms of their own.
+
+    Odd terms (of the unknown share of b) do no harm to the amplitude and are not asked for.
+    """
+    freer = measure(samples, places, level, shape, free=2, amplitude=measured.amplitude)
+    known = np.isfinite(freer.amplitude) & (freer.count > 8)
+    gain = np.where(known, own_square(measured) - own_square(freer), 0.0) / noise**2
+    total, half_cycles = _around(gain), np.maximum(_around(known.astype(np.float64)), 1.0)
+    return np.asarray(total > 2.0 * half_cycles + 5.0 * np.sqrt(4.0 * half_cycles))
+
+
+def _around(values: FloatArray) -> FloatArray:
+    """Sum over each half cycle and ten neighbours to each side."""
+    box = np.ones(min(2 * _NEIGHBOURS + 1, 2 * (len(values) // 2) - 1))
+    return np.convolve(values, box, "same")
+
+
+def _ratio(measured: Measured, noise: FloatArray) -> FloatArray:
+    """Misfit of half cycles over the noise's, with that of their neighbours."""
     known = np.isfinite(measured.amplitude) & (measured.count > 4)
     square = np.where(known, own_square(measured), 0.0) / noise**2
     freedom = np.where(known, np.maximum(measured.count - 3.0, 1.0), 0.0)
-    box = np.ones(min(2 * _NEIGHBOURS + 1, 2 * (len(square) // 2) - 1))
-    around = np.maximum(np.convolve(freedom, box, "same"), 1.0)
-    return np.convolve(square, box, "same") / around, around
+    return _around(square) / np.maximum(_around(freedom), 1.0)
 
 
 def own_square(measured: Measured) -> FloatArray:

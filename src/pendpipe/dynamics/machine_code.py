@@ -1,0 +1,97 @@
+"""Keeping the engine's machine code, so that a process need not import Numba to run it.
+
+A job of the workflow is short: importing Numba (and what it imports) would take most of it. The
+code that Numba made is therefore written to a file and loaded by llvmlite alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# What LLVM itself may call for, besides what the code declares.
+_LIBRARY = ("ceil", "cos", "exp", "log", "memcpy", "memmove", "memset", "sin")
+
+
+def platform() -> str:
+    """Return what the code depends on besides its source."""
+    features = llvm.get_host_cpu_features().flatten()
+    return f"{llvmlite.__version__} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+
+
+def _target_machine() -> Any:
+    """Return LLVM's idea of this machine."""
+    with contextlib.suppress(RuntimeError):  # newer versions have done it already, and say so
+        llvm.initialize()
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=3,
+        jit=True,
+    )
+
+
+def keep(path: Path, assembly: str, name: str) -> None:
+    """Write the machine code of a module, whose function `name` will be called, to `path`."""
+    machine = _target_machine()
+    module = llvm.parse_assembly(assembly)
+    declared = [
+        function.name
+        for function in module.functions
+        if function.is_declaration and not function.name.startswith("llvm.")
+    ]
+    code = machine.emit_object(module)
+    head = {"name": name, "needs": declared, "digest": hashlib.blake2b(code).hexdigest()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.{os.getpid()}")
+    part.write_bytes(json.dumps(head).encode() + b"\n" + code)
+    part.replace(path)
+
+
+def load(path: Path) -> tuple[int, Any] | None:
+    """Return the address of the function kept in `path`, and what must stay alive with it.
+
+    None if there is no such file, or it is damaged, or this process lacks what it needs.
+    """
+    try:
+        line, code = path.read_bytes().split(b"\n", 1)
+        head = json.loads(line)
+        sound = hashlib.blake2b(code).hexdigest() == head["digest"]
+    except (OSError, ValueError, KeyError):
+        return None
+    if not sound:
+        return None
+    machine = _target_machine()
+    with contextlib.suppress(AttributeError):
+        for name in {*_LIBRARY, *head["needs"]}:
+            _provide(name)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        return engine.get_function_address(head["name"]), engine
+    return None
+
+
+def _provide(name: str) -> None:
+    """Tell LLVM where a function is; AttributeError if the C library lacks it."""
+    if llvm.address_of_symbol(name) is not None:
+        return
+    library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
+    if name.startswith(("numba_", "NRT_", "Py")):
+        # Ways to raise exceptions: the engine never does, though its entry declares them.
+        name_there = "abort"
+    else:
+        name_there = name
+    llvm.add_symbol(name, ctypes.cast(getattr(library, name_there), ctypes.c_void_p).value)

@@ -1,0 +1,79 @@
+"""Small bounded problems: steps and intervals against the plain way of finding them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.optimize import minimize
+
+from pendpipe.analysis.fit.quadratic import Bounds, bounded_step, covariance, intervals95
+
+HALF_95 = 1.959963984540054
+ENTRY = st.floats(-2.0, 2.0)
+
+
+@given(
+    root=hnp.arrays(np.float64, (4, 4), elements=ENTRY),
+    gradient=hnp.arrays(np.float64, 4, elements=st.floats(-5.0, 5.0)),
+)
+def test_a_bounded_step_is_the_lowest_allowed_point(root, gradient) -> None:  # type: ignore[no-untyped-def]
+    normal = root @ root.T + 0.1 * np.eye(4)
+    bounds = Bounds(np.array([-0.3, -0.1, 0.0, -np.inf]), np.array([np.inf, 0.2, np.inf, np.inf]))
+    step = bounded_step(normal, gradient, bounds)
+    found = minimize(
+        lambda d: 0.5 * d @ normal @ d - gradient @ d, np.array([0.0, 0.0, 0.0, 0.0]),
+        jac=lambda d: normal @ d - gradient, bounds=list(zip(*bounds, strict=True)),
+        method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-9},
+    )  # fmt: skip
+    assert bounds.hold(step)
+    assert 0.5 * step @ normal @ step - gradient @ step <= found.fun + 1e-7
+
+
+def test_far_from_bounds_the_interval_is_symmetric() -> None:
+    normal = np.array([[4.0, 1.0], [1.0, 2.0]])
+    value = np.array([100.0, 80.0])
+    bounds = Bounds(np.zeros(2), np.full(2, np.inf))
+    sd = math.sqrt(np.linalg.inv(normal)[0, 0])
+    low, high = intervals95(value, normal, np.zeros(2), bounds, [0])[0]
+    assert (low, high) == pytest.approx((100.0 - HALF_95 * sd, 100.0 + HALF_95 * sd))
+
+
+def test_one_parameter_near_its_bound_keeps_the_upper_end() -> None:
+    """At 0.5 sd the lower end is the bound, the upper that of the free estimate."""
+    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
+    ends = intervals95(np.array([0.5]), np.eye(1), np.zeros(1), bounds, [0])
+    assert ends[0] == pytest.approx((0.0, 0.5 + HALF_95))
+
+
+def test_at_the_bound_the_slope_shortens_the_interval() -> None:
+    """Minimum at -1 outside: chi^2 = (x + 1)^2 - 1 rises by 3.84 at sqrt(4.84) - 1."""
+    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
+    ends = intervals95(np.zeros(1), np.eye(1), np.array([-1.0]), bounds, [0])
+    assert ends[0] == pytest.approx((0.0, math.sqrt(1.0 + HALF_95**2) - 1.0), abs=1e-3)
+
+
+def test_intervals_cover_the_truth_on_the_bound() -> None:
+    """c = 0 in truth, correlated with b: at least 95 % of the intervals hold both."""
+    rng = np.random.default_rng(5)
+    normal = np.array([[1.0, 0.8], [0.8, 1.0]])
+    root = np.linalg.cholesky(normal)
+    bounds = Bounds(np.array([0.0, 0.0]), np.full(2, np.inf))
+    truth = np.array([1.0, 0.0])
+    held = np.zeros(2)
+    for _ in range(1000):
+        score = root @ rng.standard_normal(2)
+        start = bounded_step(normal, score, bounds.about(truth))
+        value, gradient = truth + start, score - normal @ start
+        for j, (low, high) in enumerate(intervals95(value, normal, gradient, bounds, [0, 1])):
+            held[j] += low <= truth[j] <= high
+    assert np.all(held > 1000 * 0.95 - 3.0 * math.sqrt(1000 * 0.95 * 0.05))
+
+
+def test_what_is_held_has_no_variance() -> None:
+    normal = np.array([[4.0, 1.0], [1.0, 2.0]])
+    assert np.array_equal(covariance(normal, [1]), np.array([[0.25, 0.0], [0.0, 0.0]]))

@@ -1,0 +1,46 @@
+"""Noise and step of a recording, from what no slow motion can touch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe.analysis.noise import find_step, noise_rms, quantisation_rms, white_rms
+
+SWING = np.cos(np.arange(20000) * 0.06)
+
+
+def test_white_noise_is_measured_through_a_motion() -> None:
+    noise = 3e-4 * np.random.default_rng(1).standard_normal(20000)
+    assert white_rms(SWING + noise) == pytest.approx(3e-4, rel=0.03)
+    assert noise_rms(SWING + noise) == pytest.approx(3e-4, rel=0.05)
+
+
+def test_a_motion_alone_leaves_next_to_nothing() -> None:
+    """52 readings in a half cycle leak by (pi/52)^4/sqrt(70) of the amplitude."""
+    assert white_rms(SWING) < (math.pi / 52) ** 4 / math.sqrt(70.0)
+
+
+def test_glitches_are_no_noise() -> None:
+    values = 3e-4 * np.random.default_rng(1).standard_normal(20000)
+    values[::997] += 5.0
+    assert noise_rms(values) == pytest.approx(3e-4, rel=0.1)
+
+
+@given(step=st.floats(1e-6, 1e-2), offset=st.floats(-1.0, 1.0))
+def test_the_step_of_a_converter_is_found(step: float, offset: float) -> None:
+    codes = np.round(40.0 * SWING + np.random.default_rng(2).standard_normal(20000))
+    assert find_step(codes * step + offset) == pytest.approx(step, rel=1e-3)
+
+
+def test_readings_off_a_lattice_have_no_step() -> None:
+    assert find_step(np.random.default_rng(3).standard_normal(20000)) is None
+
+
+def test_noise_is_never_below_the_rounding() -> None:
+    assert noise_rms(np.zeros(1000), 0.1) == quantisation_rms(0.1) == 0.1 / math.sqrt(12.0)
+    assert quantisation_rms(None) == 0.0

@@ -1,0 +1,212 @@
+"""The page is whole, safe, self-contained, and holds every record."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pendpipe.cli import main
+from pendpipe.report.page import BUDGET_BYTES, render
+
+VOID = {"meta", "link", "br", "hr", "img", "input", "path", "use", "rect", "image", "line"}
+
+
+class Outline(HTMLParser):
+    """Reads a page strictly: tags must close in order; keeps what the tests ask for."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.tags.append((tag, values))
+        if values.get("id"):
+            self.ids.append(str(values["id"]))
+        self.references += [str(values[key]) for key in ("href", "src") if values.get(key)]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in VOID:
+            return
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag, f"</{tag}> closes another element"
+
+
+def rendered(example: Any, content: dict[str, Any], **configuration: Any) -> str:
+    return render(configuration, content, {}, example.folder, example.folder / "figures")
+
+
+def test_the_page_is_well_formed_and_its_names_are_unique(page: str) -> None:
+    outline = Outline(page)
+    assert len(outline.ids) == len(set(outline.ids))
+    targets = [ref[1:] for ref in outline.references if ref.startswith("#")]
+    assert targets
+    assert set(targets) <= set(outline.ids)
+
+
+def test_the_page_refers_to_nothing_outside_itself(page: str) -> None:
+    outline = Outline(page)
+    assert all(ref.startswith(("#", "data:")) for ref in outline.references)
+    assert not re.findall(r"url\((?!#)", page)
+    assert not re.findall(r"@import|<link|<iframe|<object|<form", page)
+    # The only addresses are the names of XML's namespaces, which nobody fetches.
+    assert set(re.findall(r"https?://[^\s\"'<)]+", page)) <= {"http://www.w3.org/2000/svg"}
+
+
+def test_the_policy_forbids_all_but_the_page_s_own_script(page: str) -> None:
+    policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page)
+    assert policy is not None
+    assert "default-src 'none'" in policy.group(1)
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert len(scripts) == 1
+    digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy.group(1)
+    assert not re.findall(r"<[^>]* on[a-z]+=", page)
+
+
+def test_every_record_has_a_row_and_a_section(page: str, example: Any) -> None:
+    for number, entry in enumerate(example.content["records"], start=1):
+        assert f'<a href="#record-{number}">{entry["record"]}</a>' in page
+        assert f'id="record-{number}"' in page
+    table = page[page.index('<table id="table"') :]
+    assert table[: table.index("</table>")].count("<tr>") == 1 + len(example.content["records"])
+
+
+def test_the_page_keeps_its_budget(page: str, example: Any) -> None:
+    assert len(page.encode()) < BUDGET_BYTES
+    script = re.search(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert script is not None
+    assert len(script.group(1)) < 6000
+
+
+def test_figures_that_would_break_the_budget_are_named_instead(
+    example: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pendpipe.report.page.BUDGET_BYTES", 600_000)
+    text = rendered(example, example.content)
+    assert "would make this page too large" in text
+
+
+def test_headline_has_campaign_paper_and_hidden_truth(page: str) -> None:
+    assert "(3938.0 ± 6.0) s²" in page
+    assert "3940 s²" in page
+    row = re.search(r"<tr><th[^>]*>Drag measured over Eq. 16.*?</tr>", page, re.DOTALL)
+    assert row is not None
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group())
+    # (1.1165 - 1.117)/0.0062 rounds to -0.1.
+    assert cells == ["1.1165 ± 0.0062", "1.13 (176/156)", "−1.0 %", "1.117", "−0.1"]
+
+
+def test_a_simulated_campaign_says_so_and_a_real_one_does_not(example: Any, page: str) -> None:
+    assert "27 of 27 records come from the simulated instrument" in page
+    content = copy.deepcopy(example.content)
+    for entry in content["records"]:
+        entry["source"] = "run.csv"
+    assert "simulated instrument" not in rendered(example, content)
+
+
+def test_refused_records_stand_with_their_line_and_without_folders(example: Any) -> None:
+    content = copy.deepcopy(example.content)
+    content["records"][3] = {
+        "record": "water-high-4", "source": "run.csv", "fluid": "", "branch": "", "geometry": "",
+        "temperature_c": None,
+        "refused": "/home/someone/lab/run.csv, line 7: 'x' is no number; mend the row",
+    }  # fmt: skip
+    text = rendered(example, content)
+    assert "run.csv, line 7: &#39;x&#39; is no number; mend the row" in text
+    assert "someone" not in text
+    assert re.search(r'class="light none"><span aria-hidden="true">○</span> not run', text)
+    Outline(text)
+
+
+def test_hostile_names_stay_text(example: Any) -> None:
+    content = copy.deepcopy(example.content)
+    evil = '</title><script>alert(1)</script><img src=x onerror="alert(2)">'
+    content["title"] = evil
+    content["records"][0]["record"] = evil
+    content["records"][1]["warnings"] = [evil]
+    content["records"][2]["cuts"] = [{"start_s": 0.0, "stop_s": 1.0, "reason": evil}]
+    content["provenance"]["packages"] = {evil: evil}
+    text = rendered(example, content)
+    outline = Outline(text)
+    assert "<script>alert" not in text
+    assert not [tag for tag, values in outline.tags if tag == "img" or "onerror" in values]
+    assert text.count("<script>") == 1
+
+
+def test_without_theory_only_the_records_are_told(example: Any, tmp_path: Path) -> None:
+    bare = {
+        "title": "Others", "has_theory": False, "typical_record": None, "calibration": None,
+        "records": example.content["records"][:2], "curves": {}, "tail": [],
+        "provenance": example.content["provenance"],
+        **dict.fromkeys(("hysteretic_coefficient", "viscous_exponents", "theory_factor", "budget",
+                         "history_coefficient", "steady_stokes_percent", "checks")),
+    }  # fmt: skip
+    text = render({}, bare, {}, example.folder, tmp_path / "none")
+    Outline(text)
+    assert 'id="figures"' not in text
+    assert "Linear misfit" in text
+    assert "1.90 mrad" in text
+
+
+def test_svgs_speak(page: str) -> None:
+    drawings = [values for tag, values in Outline(page).tags if tag == "svg"]
+    assert len(drawings) == 4
+    ids = set(Outline(page).ids)
+    for values in drawings:
+        assert values["role"] == "img"
+        assert set(str(values["aria-labelledby"]).split()) <= ids
+
+
+def test_all_numbers_can_be_saved_without_a_script(page: str) -> None:
+    found = re.search(r'download="records.csv" href="data:text/csv;base64,([^"]+)"', page)
+    assert found is not None
+    lines = base64.b64decode(found.group(1)).decode().splitlines()
+    assert len(lines) == 28
+    assert lines[0].startswith("record,fit,fluid,branch,f (Hz),sd of f (Hz)")
+
+
+def test_the_same_results_make_the_same_page(page: str, example: Any) -> None:
+    configuration = json.loads(example.campaign.read_text())
+    again = render(configuration, example.content, {"schema_version": 1}, example.folder,
+                   example.folder / "figures")  # fmt: skip
+    assert again == page
+
+
+def test_no_folder_of_this_machine_is_told(page: str, example: Any) -> None:
+    assert str(example.folder) not in page
+    assert str(Path.home()) + "/" not in page
+
+
+def test_the_command_writes_the_page_whole_or_not_at_all(
+    example: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "report.html"
+    words = ["report", "--campaign", str(example.campaign), "--comparison",
+             str(example.comparison), "--out", str(out), "--summary"]  # fmt: skip
+    assert main([*words, str(tmp_path / "missing.json")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not out.exists()
+    assert main([*words, str(example.summary)]) == 0
+    Outline(out.read_text(encoding="utf-8"))

@@ -1,0 +1,132 @@
+"""The parts of the page: the traffic light, names of files, SVG inside HTML, remarks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pendpipe.report.findings import findings
+from pendpipe.report.health import STATES, health
+from pendpipe.report.records import table_of_records, without_folders
+from pendpipe.report.remarks import budget_rows, grouped_warnings
+from pendpipe.report.vector import inline_svg
+
+
+def entry(**changes: Any) -> dict[str, Any]:
+    value = {"value": 1.0, "sd": 0.1, "unit": "", "at_bound": False}
+    names = ("frequency", "a", "b", "c", "amplitude", "quality_factor_limit")
+    return {"record": "r", "refused": None, "chi2_per_dof": 1.0, "turning_points": 9,
+            **dict.fromkeys(names, value), **changes}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({}, "ok"),
+        ({"chi2_per_dof": 113.0}, "look"),
+        ({"chi2_per_dof": 0.1}, "look"),
+        ({"chi2_per_dof": None}, "look"),
+        ({"quality_factor_limit": None}, "look"),
+        ({"b": {"value": None, "sd": None}}, "failed"),
+        ({"refused": "no decay"}, "not run"),
+    ],
+)
+def test_a_fit_that_was_not_run_is_never_called_ok(changes: dict[str, Any], word: str) -> None:
+    found = health(entry(**changes))
+    assert found.word == word
+    assert (found.symbol, found.colour) == STATES[word]
+    assert found.reason
+
+
+def test_states_differ_in_word_symbol_and_colour() -> None:
+    assert len({symbol for symbol, _ in STATES.values()}) == len(STATES)
+    assert len({colour for _, colour in STATES.values()}) == len(STATES)
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("/home/rdp/data/a.csv, line 3: bad", "a.csv, line 3: bad"),
+        (r"C:\lab\a.csv: bad", "a.csv: bad"),
+        ("../shared/recordings/x/a.mat: bad", "a.mat: bad"),
+        ("3.85 V/rad and 1/(rad s)", "3.85 V/rad and 1/(rad s)"),
+        ("a.csv: volts and/or angle_rad", "a.csv: volts and/or angle_rad"),
+    ],
+)
+def test_folders_are_left_out_and_units_are_not(text: str, kept: str) -> None:
+    assert without_folders(text) == kept
+
+
+def test_a_rate_at_its_bound_is_shown_as_a_limit() -> None:
+    bound = {"value": 0.0, "sd": 0.1, "unit": "rad/s", "at_bound": True, "interval95": [0.0, 0.196]}
+    table = table_of_records([entry(c=bound)], {}, has_theory=True)
+    column = [c.quantity for c in table.columns].index("c")
+    assert table.lines[0].cells[column].text == "< 0.2"
+
+
+def test_angles_and_lengths_in_one_table_carry_their_own_units() -> None:
+    lengths = {"value": 1.0, "sd": 0.1, "unit": "m/s"}
+    angles = {"value": 2.0, "sd": 0.1, "unit": "rad/s"}
+    table = table_of_records([entry(c=lengths), entry(c=angles)], {}, has_theory=True)
+    column = [c.quantity for c in table.columns].index("c")
+    assert table.columns[column].unit == ""
+    assert [line.cells[column].text for line in table.lines] == ["1.00(10) m/s", "2.00(10) rad/s"]
+
+
+def test_what_eq_17_leaves_of_nothing_is_not_printed() -> None:
+    noise = {"value": 1e6, "sd": 9e5, "unit": ""}
+    columns = table_of_records([entry(quality_factor_viscous=noise)], {}, has_theory=True).columns
+    assert "quality_factor_viscous" not in [column.quantity for column in columns]
+
+
+def test_two_figures_in_a_page_share_no_name_and_numbers_in_words_stay_whole() -> None:
+    text = (
+        '<?xml version="1.0"?><!DOCTYPE svg><svg xmlns:xlink="x" viewBox="0 0 9 9" width="9pt">'
+        '<metadata>http://somewhere</metadata><defs><style type="text/css">*{}</style>'
+        '<clipPath id="p"><path d="M 1.23456 2"/></clipPath></defs>'
+        '<use xlink:href="#p" clip-path="url(#p)"/><text>3.84950</text></svg>'
+    )
+    one, two = (str(inline_svg(text, prefix, "A & B", "<what>")) for prefix in ("x", "y"))
+    assert 'id="x-p"' in one
+    assert 'href="#x-p"' in one
+    assert "url(#x-p)" in one
+    assert 'id="y-p"' in two
+    assert "somewhere" not in one
+    assert "<style" not in one
+    assert "3.84950" in one
+    assert 'd="M 1.23 2"' in one
+    assert "A &amp; B" in one
+    assert "&lt;what&gt;" in one
+
+
+def test_warnings_that_differ_in_numbers_are_told_once() -> None:
+    records = [
+        entry(record=str(n), warnings=[f"chi^2 is {n}.5e+03 times the noise"]) for n in range(3)
+    ]
+    (group,) = grouped_warnings(records)
+    assert group.records == ["0", "1", "2"]
+
+
+def test_shares_of_the_budget_are_of_the_variance() -> None:
+    parts = [{"source": "small", "relative_sd": 0.03}, {"source": "large", "relative_sd": 0.04}]
+    assert [(name, round(share)) for name, _, share in budget_rows({"budget": parts})] == [
+        ("large", 64),
+        ("small", 36),
+    ]
+
+
+def test_findings_follow_the_numbers() -> None:
+    exponent = {"value": 2.001, "sd": 0.001}
+    factor = {"value": 1.002, "sd": 0.004, "unit": ""}
+    comparison = {
+        "hysteretic_coefficient": {"value": 1.0, "free_exponent": exponent},
+        "theory_factor": factor,
+    }
+    air, water = findings(comparison)
+    assert "internal friction of the structure gives" in air
+    assert "is that of Eq. 16" in water
+    exponent["value"], factor["value"] = 1.9, 1.12
+    air, water = findings(comparison)
+    assert "standard deviations from the square" in air
+    assert "30 standard deviations from 1" in water
