@@ -38,7 +38,19 @@ def code_version(module: str) -> str:
     digest = hashlib.sha256()
     for name in sorted(seen):
         digest.update(_content(name))
+        for data in _data_of(name):
+            digest.update(data.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def _data_of(module: str) -> list[Path]:
+    """The data files (templates) beside a package's ``__init__``, in a folder of their own."""
+    path = _file(module)
+    assert path is not None
+    if path.name != "__init__.py":
+        return []
+    kept = path.parent.glob("templates/*")
+    return sorted(file for file in kept if file.is_file())
 
 
 def _file(module: str) -> Path | None:

@@ -101,8 +101,10 @@ def test_another_model_is_refused(script: Any) -> None:
         (b"stop\r", b"stop\r"),
         (b"info 0\r", b"info 0 DATAQ\r"),
         (b"info 1\r", b"info 1 1100\r"),
+        (b"info 2\r", b"info 2 101\r"),
+        (b"info 6\r", b"info 6 1\r"),
     )
-    with pytest.raises(InputError, match="this is a DATAQ 1100, no DI-2108"):
+    with pytest.raises(InputError, match="this is a DI-1100, no DI-2108"):
         DI2108(line, FAST).identify()
 
 

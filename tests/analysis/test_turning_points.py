@@ -81,7 +81,7 @@ def test_precision_is_that_of_every_reading_used() -> None:
 @given(
     quality=st.floats(30.0, 1000.0),
     quadratic=st.floats(0.0, 1.0),
-    coulomb=st.floats(0.0, 0.1),
+    coulomb=st.floats(0.0, 0.03),
     share=st.floats(0.0, 1.0),
     frequency=st.floats(0.05, 1.1),
     phase=st.floats(0.0, 0.9),
@@ -216,7 +216,7 @@ def test_ends_with_the_motion() -> None:
     assert len(truth.time_s) - 4 <= points.half_cycle[-1] + 1 <= len(truth.time_s)
 
 
-@pytest.mark.parametrize(("amplitude", "allowed"), [(0.3, 1e-4), (1.0, 2e-4), (2.5, 4e-3)])
+@pytest.mark.parametrize(("amplitude", "allowed"), [(0.3, 1e-4), (1.0, 2e-4), (2.5, 3e-3)])
 def test_circular_error(amplitude: float, allowed: float) -> None:
     """A real pendulum's half cycle is no cosine (7 % of third harmonic at 2.6 rad)."""
     scipy_integrate = pytest.importorskip("scipy.integrate")
@@ -233,9 +233,10 @@ def test_circular_error(amplitude: float, allowed: float) -> None:
     nearest = np.abs(turned[:, None] - points.time_s).argmin(axis=0)
     truth = np.abs(run.y_events[0][nearest, 0])
     assert len(points) >= 30
-    # The period at 2.5 rad changes by 9 % a half cycle: the first two suffer from it.
-    allowances = np.where(np.arange(len(truth)) < 2, 3.0, 1.0) * allowed * truth
-    assert np.all(np.abs(points.amplitude_rad - truth) < allowances + 4e-4)
+    error = np.abs(points.amplitude_rad - truth)
+    assert np.all(error[1:] < (allowed * truth + 4e-4)[1:])
+    # Of the first, only the second half is there, and its place is extrapolated.
+    assert error[0] < max(3.0 * points.angle_sd_rad[0], 1e-4)
 
 
 def test_one_row_a_count() -> None:

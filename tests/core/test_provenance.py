@@ -33,3 +33,14 @@ def test_the_version_follows_the_imports(library: Path, edited: str, changes: bo
     before = version()
     (library / f"{edited}.py").write_text("x = y = 2\n")
     assert (version() != before) == changes
+
+
+def test_a_template_counts_as_code_of_its_package(library: Path) -> None:
+    (library / "stage.py").write_text("from pendpipe.page import draw\n")
+    (library / "page/templates").mkdir(parents=True)
+    (library / "page/__init__.py").write_text("draw = 1\n")
+    template = library / "page/templates/page.html"
+    template.write_text("before")
+    before = version()
+    template.write_text("after")
+    assert version() != before

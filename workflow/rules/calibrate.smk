@@ -9,7 +9,8 @@ rule caliper:
     params:
         arm=jobs.caliper_arm(CAMPAIGN),
         depends=jobs.caliper(CAMPAIGN),
-        code=code_version("pendpipe.stages.caliper") + code_version("pendpipe.commands.calibrate"),
+        code=code_version("pendpipe.stages.caliper")
+        + code_version("pendpipe.commands.calibrate"),
     message:
         "the sensor against a caliper"
     shell:

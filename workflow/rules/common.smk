@@ -11,10 +11,11 @@ from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
 from pendpipe.provenance import code_version
 
-
 # The jobs find `pendpipe` beside the Python that runs Snakemake, activated or not, and
 # leave threads to Snakemake, which runs them side by side.
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+os.environ["PATH"] = os.pathsep.join(
+    [str(Path(sys.executable).parent), os.environ["PATH"]]
+)
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
@@ -31,6 +32,7 @@ def checked_campaign():
 CAMPAIGN = checked_campaign()
 RESULTS = CAMPAIGN.configuration.results
 RECORDS = [record.record for record in CAMPAIGN.records]
+FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
 CONFIGURATION = jobs.store(config, ".snakemake/pendpipe")
 
@@ -55,9 +57,7 @@ def figure_files():
     """The figures of the paper, where the campaign has an apparatus to compare with."""
     if CAMPAIGN.configuration.apparatus is None:
         return []
+    names = [f"fig{number:02d}" for number in range(3, 11)]
     return expand(
-        "{results}/figures/fig{number:02d}.{form}",
-        results=RESULTS,
-        number=range(3, 11),
-        form=["svg", "png"],
+        "{results}/figures/{name}.{form}", results=RESULTS, name=names, form=FORMS
     )

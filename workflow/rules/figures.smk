@@ -3,12 +3,15 @@ rule figures:
         comparison=f"{RESULTS}/comparison.json",
         turning_points=of_all_records("turning_points.csv"),
         fits=of_all_records("fit.json"),
+        recordings=of_all_records("recording.csv"),
     output:
-        report(
+        figures=report(
             figure_files(),
             category="Figures",
             caption="../report/figure.rst",
         ),
+        # What was drawn beside these: a figure for every record that was not refused.
+        drawn=f"{RESULTS}/figures/drawn.json",
     log:
         f"{RESULTS}/logs/figures.log",
     conda:

@@ -2,7 +2,7 @@ rule report:
     input:
         comparison=f"{RESULTS}/comparison.json",
         campaign=f"{RESULTS}/campaign.json",
-        figures=figure_files(),
+        figures=rules.figures.output.drawn,
     output:
         report(
             f"{RESULTS}/report.html",

@@ -15,6 +15,11 @@ from typing import Final, Self
 
 import serial
 
+try:
+    from termios import error as termios_error
+except ImportError:  # not on Windows
+    termios_error = OSError  # type: ignore[misc,assignment]
+
 from pendpipe.errors import InputError
 
 _PERMISSION: Final = {
@@ -71,9 +76,17 @@ class Line:
     ) -> None:
         self.close()
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it was not closed; a broken line is open until then."""
+        return bool(self._serial.is_open)
+
     def set_baudrate(self, baudrate: int) -> None:
         """Change the speed of the open line."""
-        self._serial.baudrate = baudrate
+        try:
+            self._serial.baudrate = baudrate
+        except (OSError, termios_error) as fault:
+            raise self._lost(fault) from None
 
     def write(self, data: bytes) -> None:
         """Send all of `data`."""

@@ -38,7 +38,7 @@ class RawWriter:
     Parameters
     ----------
     stream
-        The file; `BytesIO` for a recording kept in memory.
+        The file, unbuffered; `BytesIO` for a recording kept in memory.
     header
         The description: JSON's types only.
     sync_s
@@ -55,7 +55,7 @@ class RawWriter:
         self._synced = time.monotonic()
         self._on_disk = hasattr(stream, "fileno") and not hasattr(stream, "getbuffer")
         line = json.dumps({"format": _FORMAT, "version": 1, **header}, ensure_ascii=True)
-        self._stream.write(line.encode("ascii") + b"\n")
+        self._write(line.encode("ascii") + b"\n")
         self.sync()
 
     def data(self, time_s: float, content: bytes) -> None:
@@ -76,10 +76,15 @@ class RawWriter:
 
     def _frame(self, kind: bytes, time_s: float, content: bytes) -> None:
         check = zlib.crc32(content, zlib.crc32(_CHECKED.pack(kind, len(content), time_s)))
-        self._stream.write(_FRAME.pack(kind, len(content), time_s, check) + content)
-        self._stream.flush()
+        self._write(_FRAME.pack(kind, len(content), time_s, check) + content)
         if time.monotonic() - self._synced > self._sync_s:
             self.sync()
+
+    def _write(self, content: bytes) -> None:
+        """Hand all of it to the system; a disk that takes a part only is full."""
+        left = memoryview(content)
+        while left:
+            left = left[self._stream.write(left) :]
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ class RawRecording:
     arrival_s, arrived_bytes
         By ``arrival_s[i]`` the first ``arrived_bytes[i]`` of them had arrived.
     events
-        The events, each with its ``time_s``.
+        The events, each with its ``time_s`` and the bytes that had arrived (``at_byte``).
     damaged_bytes
         Bytes at the end of the file that are no whole frame.
     """
@@ -138,7 +143,7 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
             pieces.append(body)
             stamps.append((time_s, total))
         elif kind == b"E":
-            events.append({**json.loads(body), "time_s": time_s})
+            events.append({**json.loads(body), "time_s": time_s, "at_byte": total})
     return RawRecording(
         header,
         b"".join(pieces),

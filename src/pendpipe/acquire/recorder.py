@@ -2,72 +2,22 @@
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, closing, nullcontext
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Final, Protocol
+from typing import IO, cast
 
 from pendpipe.acquire.clock import Clock, ScaledClock
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.drivers.base import Driver, Identity, Setup
-from pendpipe.acquire.line import Line, LineLostError
-from pendpipe.acquire.raw import RawWriter
+from pendpipe.acquire.drivers.base import Identity, Setup
+from pendpipe.acquire.line import Line
+from pendpipe.acquire.raw import RawWriter, read_raw
+from pendpipe.acquire.session import Progress, Session, Wish
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
-
-_POLLS: Final = 256
-"""Time stamps of a recording, at least, so that its rate can be measured."""
-_SHORTEST_POLL_S, _LONGEST_POLL_S = 0.001, 0.02
-_BACKLOG: Final = 2048
-"""So many bytes at once say that more wait: a pseudo-terminal hands out 4 kB at a time."""
-_SILENCE_S: Final = 3.0
-"""Seconds of the host without a byte (beyond the time of a few scans) that end a session."""
-_PATIENCE_S: Final = 5.0
-"""Seconds of the host, beyond a tenth more than asked, that a slow device is waited for."""
-
-
-class Progress(Protocol):
-    """Somebody who wants to see how a recording goes on."""
-
-    def begin(self, driver: type[Driver], setup: Setup) -> None:
-        """Take notice of what is recorded."""
-
-    def update(self, elapsed_s: float, data: bytes) -> None:
-        """Take notice of further bytes, by `elapsed_s` of the recorder's clock."""
-
-    def end(self) -> None:
-        """Take leave."""
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What is to be recorded.
-
-    Parameters
-    ----------
-    channels
-        Channels as printed on the box, from 1.
-    rate_hz
-        Scans a second; the nearest that the device can do is taken.
-    duration_s
-        Seconds of the recorder's clock.
-    """
-
-    channels: tuple[int, ...]
-    rate_hz: float
-    duration_s: float
-
-    def __post_init__(self) -> None:
-        for name in ("rate_hz", "duration_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(name, f"{value:g} is no positive number", "give one above 0")
 
 
 def record(
@@ -82,6 +32,9 @@ def record(
     volts_per_radian: float | None = None,
     source: str | None = None,
     progress: Progress | None = None,
+    range_volts: float | None = None,
+    until_noise: bool = False,
+    reconnect_s: float = 30.0,
 ) -> Recording:
     """Record from the device on a port, and decode.
 
@@ -109,6 +62,14 @@ def record(
         What to call the source in the metadata; model and port by default.
     progress
         Somebody to keep informed.
+    range_volts
+        The signal stays within plus and minus it: the smallest range that holds it is taken.
+    until_noise
+        End also when the amplitude of the first channel has reached the noise, see
+        `noise.NoiseWatch`.
+    reconnect_s
+        For so many seconds of the host a device that was unplugged, fell silent or
+        overflowed is looked for again; what was missed is a gap.
 
     Returns
     -------
@@ -119,95 +80,66 @@ def record(
     ------
     InputError
         If the port can't be opened, the device is silent or another one, the setting is
-        impossible, or nothing was received.
+        impossible, nothing was received, or the raw file can't be written: what it holds by
+        then is good.
     """
-    wish = Wish(tuple(channels), rate_hz, duration_s)
+    wish = Wish(
+        tuple(channels), rate_hz, duration_s, range_volts, until_noise, max(0.0, reconnect_s)
+    )
     clock = clock or ScaledClock()
     kind = find_driver(driver)
-    with Line(port, kind.baudrate) as line:
-        instrument = kind(line, clock)
-        identity = instrument.identify()
-        setup = instrument.configure(wish.channels, wish.rate_hz)
-        with _opened(raw_path) as stream:
-            header = _header(port, identity, setup, wish, clock)
-            header |= {"volts_per_radian": volts_per_radian, "source": source}
-            writer = RawWriter(stream, {key: v for key, v in header.items() if v is not None})
-            if progress:
-                progress.begin(kind, setup)
-            try:
-                _stream(instrument, setup, wish, clock, writer, progress)
-            except OSError as fault:
-                raise _cannot_write(raw_path or "memory", fault) from None
-            content = stream.getvalue() if isinstance(stream, BytesIO) else None
-    return decode_recording(content if content is not None else Path(raw_path or ""))
-
-
-def _stream(
-    instrument: Driver,
-    setup: Setup,
-    wish: Wish,
-    clock: Clock,
-    writer: RawWriter,
-    progress: Progress | None,
-) -> None:
-    """Keep everything from start to stop, with its time."""
-    scans = max(1, round(wish.duration_s * setup.rate_hz))
-    wanted = scans * type(instrument).decoder(len(setup.channels)).bytes_per_scan
-    poll_s = wish.duration_s / clock.scale / _POLLS
-    poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, poll_s))
-    latest_s = 1.1 * wish.duration_s + _PATIENCE_S * clock.scale
-    # A packet may gather many scans before it is sent.
-    silence_s = _SILENCE_S + 64 / setup.rate_hz / clock.scale
-    received, reason, fast = 0, "", False
-    # Taken before the start, so that a device can only seem late, never early.
-    origin_s = clock.now()
-    instrument.start()
+    line = Line(port, kind.baudrate)
     try:
-        while not reason:
-            data = instrument.receive(silence_s)
-            elapsed_s = clock.now() - origin_s
-            if data:
-                writer.data(elapsed_s, data)
-                received += len(data)
-            if progress:
-                progress.update(elapsed_s, data)
-            enough = received >= wanted
-            fast = fast or (enough and elapsed_s < 0.9 * (scans - 1) / setup.rate_hz)
-            if not data:
-                reason = f"the device fell silent after {elapsed_s:.6g} s"
-            elif enough and not fast:
-                reason = "scans"
-            elif elapsed_s >= (wish.duration_s if fast else latest_s):
-                reason = "time"
-            elif len(data) < _BACKLOG:
-                time.sleep(poll_s)
-        instrument.stop()
-    except LineLostError as fault:
-        reason = fault.problem
-    except KeyboardInterrupt:
-        reason = "interrupted by the user"
-        instrument.stop()
-    finally:
-        if progress:
-            progress.end()
-    keep = {"keep_scans": scans} if reason == "scans" else {}
-    writer.event(clock.now() - origin_s, event="stopped", reason=reason, **keep)
+        session = Session(line, kind, wish, clock, progress)
+    except BaseException:
+        line.close()
+        raise
+    with closing(session), _opened(raw_path) as stream:
+        header = _header(port, session.identity, session.setup, wish, clock)
+        header |= {"volts_per_radian": volts_per_radian, "source": source}
+        kept = {key: value for key, value in header.items() if value is not None}
+        try:
+            session.run(RawWriter(stream, kept))
+        except OSError as fault:
+            raise _cannot_write(raw_path or "memory", fault) from None
+        content = stream.getvalue() if isinstance(stream, BytesIO) else None
+    return decode_recording(content if content is not None else Path(raw_path or ""))
 
 
 def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
     """Open the raw file, which is appended to in its place so that a crash leaves it."""
     if raw_path is None:
         return nullcontext(BytesIO())
+    path = Path(raw_path)
     try:
-        Path(raw_path).parent.mkdir(parents=True, exist_ok=True)
-        return Path(raw_path).open("wb")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_file() and _is_unfinished(path):
+            raise InputError(
+                path,
+                "it holds a recording that was cut short",
+                f"save it with pendpipe acquire --recover {path} --out FILE.csv, then remove it",
+            )
+        # Without a buffer of our own: what was written is the system's at once.
+        return cast("IO[bytes]", path.open("wb", buffering=0))
     except OSError as fault:
         raise _cannot_write(raw_path, fault) from None
 
 
+def _is_unfinished(path: Path) -> bool:
+    """Whether a file is a raw recording that nobody ended, with data in it."""
+    try:
+        raw = read_raw(path)
+    except InputError:
+        return False
+    return bool(raw.data) and not raw.event("stopped")
+
+
 def _cannot_write(place: str | Path, fault: OSError) -> InputError:
     return InputError(
-        place, f"can't be written ({fault.strerror})", "make room, or give another file"
+        place,
+        f"can't be written ({fault.strerror})",
+        "make room, or give another file; what was kept till then is opened with "
+        "pendpipe acquire --recover",
     )
 
 
@@ -223,7 +155,7 @@ def _header(
         "port": port,
         "channels": list(setup.channels),
         "bits": kind.bits,
-        "range_volts": kind.range_volts,
+        "range_volts": setup.range_volts,
         "rate_hz": setup.rate_hz,
         "requested_rate_hz": wish.rate_hz,
         "duration_s": wish.duration_s,

@@ -30,11 +30,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
     from pendpipe.figures.campaign import draw_all
+    from pendpipe.files import write_json
     from pendpipe.figures.inputs import read_comparison, read_content, results_folder
 
     folder = results_folder(read_content(arguments.campaign))
     drawn = draw_all(read_comparison(arguments.comparison), folder, arguments.out)
     for name, reason in drawn.left_out.items():
         print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
+    names = [Path(file).relative_to(folder).as_posix() for file in drawn.files]
+    write_json(
+        arguments.out / "drawn.json",
+        {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)},
+    )
     print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
     return 0

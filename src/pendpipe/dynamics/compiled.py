@@ -44,7 +44,10 @@ def _folders() -> Iterator[Path]:
     yield Path(__file__).parent / "__pycache__"
     with contextlib.suppress(RuntimeError):  # there is no home
         home = Path.home() / ".cache"
-        yield Path(os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or home) / "pendpipe"
+        yield (
+            Path(os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or home)
+            / "pendpipe"
+        )
 
 
 def _compile() -> tuple[int, Any]:

@@ -12,7 +12,7 @@ from pendpipe.dynamics.views import matrix, vector
 
 _march = njit(inline="always")(marching.march)
 _inputs_size = njit(_nrt=False)(inputs_size)  # type: ignore[call-overload]
-_POINTER = types.CPointer(types.float64)
+_POINTER: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _STATES = OVERDAMPED + 1
 
 
@@ -42,4 +42,4 @@ def compiled_entry() -> Any:
         _POINTER, integer, integer, number, integer, integer, number,
         _POINTER, integer, _POINTER, _POINTER, _POINTER, integer,
     )  # fmt: skip
-    return cfunc(signature, _nrt=False, error_model="numpy")(_entry)
+    return cfunc(signature, _nrt=False, error_model="numpy")(_entry)  # type: ignore[call-arg]

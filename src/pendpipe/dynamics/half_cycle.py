@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT
 from pendpipe.dynamics.emission import emit
+from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT
 from pendpipe.dynamics.panel import (
     COS,
     EXCESS,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pendpipe.dynamics.workspace import Work
 
 LOSS_TOLERANCE = 5e-9
-"""Bound of `solve`'s estimate, which is a thousand times the error: 5e-12 of a half cycle's loss."""
+"""Bound of `solve`'s estimate, a thousand times the error: that is 5e-12 of a half cycle's loss."""
 WAVEFORM_TOLERANCE = 1e-12
 """Of the polynomial in time, relative to the amplitude."""
 FINEST = 30

@@ -13,8 +13,8 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
-import llvmlite
-import llvmlite.binding as llvm
+import llvmlite  # type: ignore[import-untyped]
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,7 +26,9 @@ _LIBRARY = ("ceil", "cos", "exp", "log", "memcpy", "memmove", "memset", "sin")
 def platform() -> str:
     """Return what the code depends on besides its source."""
     features = llvm.get_host_cpu_features().flatten()
-    return f"{llvmlite.__version__} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+    return (
+        f"{llvmlite.__version__} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+    )
 
 
 def _target_machine() -> Any:
@@ -89,9 +91,7 @@ def _provide(name: str) -> None:
     if llvm.address_of_symbol(name) is not None:
         return
     library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
-    if name.startswith(("numba_", "NRT_", "Py")):
-        # Ways to raise exceptions: the engine never does, though its entry declares them.
-        name_there = "abort"
-    else:
-        name_there = name
-    llvm.add_symbol(name, ctypes.cast(getattr(library, name_there), ctypes.c_void_p).value)
+    # Numba's ways to raise exceptions: the engine never does, though its entry declares them.
+    raising = name.startswith(("numba_", "NRT_", "Py"))
+    function = getattr(library, "abort" if raising else name)
+    llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit, rest
 from pendpipe.dynamics.half_cycle import direct_half_cycle
+from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, STOPPED
 from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.table import (
     DONE,
@@ -22,19 +23,19 @@ from pendpipe.dynamics.table import (
     look_up_turning_point,
     points_for,
 )
-from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, STOPPED
 from pendpipe.dynamics.workspace import carve, panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.workspace import Work
 
+
 @kernel
 def sticks(shape: FloatArray, y: float) -> bool:
     """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y."""
     m, h, q = shape[0], shape[1], shape[2]
     # The friction less the restoring torque is q (y - m)(y - larger root).
-    return y <= m or q * (y + m) >= 1.0 - h
+    return bool(y <= m or q * (y + m) >= 1.0 - h)
 
 
 @part
@@ -121,8 +122,8 @@ def _emit_row(
 
 def march(
     constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
-    most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray, turning: FloatArray,
-    buffer: FloatArray,
+    most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray,
+    turning: FloatArray, buffer: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the pendulum from its release.
 

@@ -20,7 +20,8 @@ delta itself has dropped out: the difference to m is taken analytically.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import njit
 
@@ -29,6 +30,8 @@ from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
@@ -45,10 +48,16 @@ _OPTIONS: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
-kernel = njit(**_OPTIONS)
-"""How every function of the engine is compiled."""
-part = njit(**_OPTIONS, forceinline=True)
-"""How those are that take the whole workspace, which is too much to hand over at each call."""
+
+
+def kernel(function: _F) -> _F:
+    """Compile a function of the engine."""
+    return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def part(function: _F) -> _F:
+    """Compile a function that takes the whole workspace, too much to hand over, into its caller."""
+    return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -128,8 +137,9 @@ def solve(
     ----------
     node
         The workspace: cos and sin as `place` left them. LOSS, BEFORE and EARLIER hold the
-        solutions of the last three half cycles on this panel, from which the first guess is extrapolated.
-        On return LOSS holds r/radius - 1, SLOPE its derivative by psi, SLIP 1/(1 - nu cos psi), and EXCESS tau - psi since the start of the panel.
+        solutions of the last three half cycles on this panel: the first guess extrapolates them.
+        On return LOSS holds r/radius - 1, SLOPE its derivative by psi,
+        SLIP 1/(1 - nu cos psi), and EXCESS tau - psi since the start of the panel.
     shape
         m, h, q, g.
     radius
@@ -181,7 +191,7 @@ def _finish(
         node[EXCESS + j] *= half_width
     error = max(unresolved(node, SLOPE), unresolved(node, SCRATCH))
     strength = max(abs(node[SLOPE + DEGREE // 2]), abs(node[SCRATCH]), abs(node[SCRATCH + DEGREE]))
-    return error * half_width <= tolerance * strength
+    return bool(error * half_width <= tolerance * strength)
 
 
 @kernel
@@ -213,7 +223,7 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
         if worst < 1e-8:  # quadratic convergence: the next step would be below 1e-15
             break
     _tabulate_chebyshev(node, chebyshev)
-    return duration
+    return float(duration)
 
 
 @kernel

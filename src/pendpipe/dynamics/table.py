@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.chebyshev import powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
-from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.layout import HEAD, MOST_POINTS
+from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.workspace import panel_width, row_width
 
 if TYPE_CHECKING:

@@ -6,15 +6,18 @@ from typing import Any
 
 from numba import types
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
+from numba.np import arrayobj
+
+# Numba gives these no types.
+make_array: Any = arrayobj.make_array
+populate_array: Any = arrayobj.populate_array
 
 _ITEM = 8
 _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
 
 
-@intrinsic
-def vector(_typing: Any, pointer: Any, size: Any) -> Any:
+def _vector(_typing: Any, pointer: Any, size: Any) -> Any:
     """Return the array of `size` numbers at `pointer`."""
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -29,8 +32,7 @@ def vector(_typing: Any, pointer: Any, size: Any) -> Any:
     return _VECTOR(pointer, size), generate
 
 
-@intrinsic
-def matrix(_typing: Any, numbers: Any, rows: Any, columns: Any) -> Any:
+def _matrix(_typing: Any, numbers: Any, rows: Any, columns: Any) -> Any:
     """Return the (rows, columns) array that begins where the array `numbers` begins."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -44,3 +46,7 @@ def matrix(_typing: Any, numbers: Any, rows: Any, columns: Any) -> Any:
         return result._getvalue()
 
     return _MATRIX(numbers, rows, columns), generate
+
+
+vector: Any = intrinsic(_vector)
+matrix: Any = intrinsic(_matrix)

@@ -5,12 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from pendpipe.dynamics import layout
-from pendpipe.dynamics.layout import DESCRIPTION, MOST_PANELS, MOST_POINTS, NODE_SIZE, THETA
-from pendpipe.dynamics.panel import NODE_COUNT, kernel
+from pendpipe.dynamics.layout import (
+    DESCRIPTION,
+    MOST_PANELS,
+    MOST_POINTS,
+    NODE_COUNT,
+    NODE_SIZE,
+    THETA,
+)
+from pendpipe.dynamics.panel import kernel
 from pendpipe.dynamics.views import matrix
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+
 
 class Work(NamedTuple):
     """Workspace and constants of a march; S sensitivities (the amplitude and S - 1 rates)."""

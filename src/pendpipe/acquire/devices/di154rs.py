@@ -1,4 +1,4 @@
-"""A simulated DI-154RS (dataq-facts A1)."""
+"""A simulated DI-154RS and DI-194RS (dataq-facts A1)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class SimulatedDI154RS:
 
     model: ClassVar[str] = "DI-154RS"
     bits: ClassVar[int] = 12
-    range_volts: ClassVar[float] = 10.0
+    range_volts: float = 10.0
     packet_bytes: ClassVar[int] = 1
     answer_to_identify: ClassVar[bytes] = b"0000000001"
 
@@ -84,5 +84,22 @@ class SimulatedDI154RS:
         out = np.empty((*offset.shape, 2), dtype=np.uint8)
         out[..., 0] = (offset % 32) * 8 + 1
         out[..., 1] = (offset // 32) * 2 + 1
+        out[:, 0, 0] -= 1
+        return out.tobytes()
+
+
+class SimulatedDI194RS(SimulatedDI154RS):
+    """The same box with 10 bits: three in the first byte, of which bit 4 means nothing."""
+
+    model: ClassVar[str] = "DI-194RS"
+    bits: ClassVar[int] = 10
+    answer_to_identify: ClassVar[bytes] = b"0000000000"
+
+    def encode(self, codes: IntArray) -> bytes:
+        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
+        offset = (np.asarray(codes) + 512).astype(np.uint16)
+        out = np.empty((*offset.shape, 2), dtype=np.uint8)
+        out[..., 0] = (offset % 8) * 32 + 1
+        out[..., 1] = (offset // 8) * 2 + 1
         out[:, 0, 0] -= 1
         return out.tobytes()

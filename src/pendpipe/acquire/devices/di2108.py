@@ -1,4 +1,4 @@
-"""A simulated DI-2108 in CDC mode (dataq-facts A8)."""
+"""Simulated DI-1100 to DI-4108 in CDC mode (dataq-facts A8)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class SimulatedDI2108:
 
     model: ClassVar[str] = "DI-2108"
     bits: ClassVar[int] = 16
-    range_volts: ClassVar[float] = 10.0
-    information: ClassVar[dict[str, str]] = {
-        "0": "DATAQ",
-        "1": "2108",
-        "2": "0.141",
-        "6": "5F2A9C01",
-        "9": "60000000",
+    full_scales: ClassVar[tuple[float, ...]] = (10.0,)
+    limits: ClassVar[dict[str, tuple[int, int]]] = {
+        "srate": (375, 65535),
+        "dec": (1, 512),
+        "deca": (1, 40000),
+        "ps": (0, 7),
+        "encode": (0, 1),
     }
 
     def __init__(self) -> None:
@@ -40,6 +40,17 @@ class SimulatedDI2108:
     def channels(self) -> tuple[int, ...]:
         """The enabled channels, from 1, in the order of the scan."""
         return tuple((self._list[place] & 0x0F) + 1 for place in sorted(self._list))
+
+    @property
+    def range_volts(self) -> float:
+        """Full scale, by the range code of the first word of the list."""
+        return self.full_scales[min(len(self.full_scales) - 1, self._list[0] >> 8 & 0x0F)]
+
+    @property
+    def information(self) -> dict[str, str]:
+        """The answers to ``info``."""
+        number = self.model.split("-")[1]
+        return {"0": "DATAQ", "1": number, "2": "0.141", "6": "5F2A9C01", "9": "60000000"}
 
     @property
     def scan_rate_hz(self) -> float:
@@ -79,21 +90,51 @@ class SimulatedDI2108:
             kept = {key: word for key, word in self._list.items() if key < place}
             self._list = {**kept, place: int(arguments[1])}
         elif name in self._setting and arguments:
-            low, high = {
-                "srate": (375, 65535),
-                "dec": (1, 512),
-                "deca": (1, 40000),
-                "ps": (0, 7),
-                "encode": (0, 1),
-            }[name]
+            low, high = self.limits[name]
             self._setting[name] = min(high, max(low, int(arguments[0])))
         elif name not in ("filter", "eol", "led", "din", "reset"):
             return b"Command not found\r"
         return f"{text}\r".encode()
 
     def encode(self, codes: IntArray) -> bytes:
-        """One signed 16-bit word a sample, low byte first."""
-        words = np.asarray(codes).ravel().astype(np.int16)
+        """One signed 16-bit word a sample, low byte first, its bits at the top."""
+        scale: int = 1 << (16 - self.bits)
+        words = (np.asarray(codes).ravel() * scale).astype(np.int16)
         if words.size < 32:
             return struct.pack(f"<{words.size}h", *words.tolist())
         return (words if sys.byteorder == "little" else words.byteswap()).tobytes()
+
+
+class SimulatedDI1100(SimulatedDI2108):
+    """Four channels of 12 bits; no ``dec``."""
+
+    model: ClassVar[str] = "DI-1100"
+    bits: ClassVar[int] = 12
+    limits: ClassVar[dict[str, tuple[int, int]]] = {
+        **SimulatedDI2108.limits,
+        "srate": (1500, 65535),
+        "dec": (1, 1),
+    }
+
+
+class SimulatedDI1110(SimulatedDI2108):
+    """Eight channels of 12 bits; no ``dec``."""
+
+    model: ClassVar[str] = "DI-1110"
+    bits: ClassVar[int] = 12
+    limits: ClassVar[dict[str, tuple[int, int]]] = {**SimulatedDI2108.limits, "dec": (1, 1)}
+
+
+class SimulatedDI1120(SimulatedDI2108):
+    """Four channels of 14 bits in six ranges."""
+
+    model: ClassVar[str] = "DI-1120"
+    bits: ClassVar[int] = 14
+    full_scales: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class SimulatedDI4108(SimulatedDI2108):
+    """Eight channels of 16 bits in six ranges."""
+
+    model: ClassVar[str] = "DI-4108"
+    full_scales: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)

@@ -12,15 +12,14 @@ class Dialect(Protocol):
 
     model: ClassVar[str]
     bits: ClassVar[int]
-    range_volts: ClassVar[float]
+    starts: int
+    """How often the stream was started: a change means that it begins anew."""
+    streaming: bool
+    """Whether data flow."""
 
     @property
-    def starts(self) -> int:
-        """How often the stream was started: a change means that it begins anew."""
-
-    @property
-    def streaming(self) -> bool:
-        """Whether data flow."""
+    def range_volts(self) -> float:
+        """Full scale, as the host has chosen it."""
 
     @property
     def channels(self) -> tuple[int, ...]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import select
 import socket
+import tempfile
 from contextlib import suppress
+from pathlib import Path
 from typing import Protocol
 
 
@@ -26,8 +28,14 @@ class Link(Protocol):
     def send(self, data: memoryview) -> int:
         """Send what there is room for; return how many bytes that was."""
 
-    def close(self) -> None:
+    def unplug(self) -> None:
         """Pull the plug: the host's next read fails."""
+
+    def replug(self) -> None:
+        """Put it in again, under the same name."""
+
+    def close(self) -> None:
+        """End the line for good."""
 
 
 class _Waking:
@@ -55,16 +63,28 @@ class _Waking:
 class PseudoTerminal(_Waking):
     """A pseudo-terminal, which the driver opens as it opens any serial port."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, replaceable: bool = False) -> None:
+        super().__init__()
+        self._connected = False
+        # The system numbers its terminals; a link keeps the name over a replug.
+        self._folder = tempfile.mkdtemp(prefix="pendpipe-") if replaceable else None
+        self.port = f"{self._folder}/ttySIMULATED"
+        self.replug()
+
+    def replug(self) -> None:
+        """Put the plug in (again), under the same name."""
         import tty
 
-        super().__init__()
         self._device, self._host = os.openpty()
         # Raw before anyone opens it, else the terminal itself echoes and translates. The
         # host's end stays open here: were it closed between two drivers, reads would fail.
         tty.setraw(self._host)
         os.set_blocking(self._device, False)
-        self.port = os.ttyname(self._host)
+        self._connected = True
+        if self._folder is None:
+            self.port = os.ttyname(self._host)
+        else:
+            Path(self.port).symlink_to(os.ttyname(self._host))
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Wait until there is something to read (or room to write), or `wake` is called."""
@@ -84,10 +104,20 @@ class PseudoTerminal(_Waking):
         except BlockingIOError:
             return 0
 
-    def close(self) -> None:
+    def unplug(self) -> None:
         """Pull the plug: the host's next read fails."""
-        os.close(self._device)
-        os.close(self._host)
+        if self._connected:
+            self._connected = False
+            os.close(self._device)
+            os.close(self._host)
+            if self._folder is not None:
+                Path(self.port).unlink()
+
+    def close(self) -> None:
+        """End the line for good."""
+        self.unplug()
+        if self._folder is not None:
+            Path(self._folder).rmdir()
         self._close()
 
 
@@ -137,16 +167,30 @@ class LoopbackSocket(_Waking):
         except OSError:
             return len(data)
 
-    def close(self) -> None:
+    def unplug(self) -> None:
         """Pull the plug: the host's next read fails."""
         if self._host is not None:
             self._host.close()
+            self._host = None
         self._listener.close()
+
+    def replug(self) -> None:
+        """Put it in again, under the same name."""
+        port = int(self.port.rpartition(":")[2])
+        self._listener = socket.create_server(("127.0.0.1", port))
+        self._listener.setblocking(False)
+
+    def close(self) -> None:
+        """End the line for good."""
+        self.unplug()
         self._close()
 
 
-def open_link(kind: str | None = None) -> Link:
-    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them."""
+def open_link(kind: str | None = None, *, replaceable: bool = False) -> Link:
+    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them.
+
+    A pseudo-terminal keeps its name over a replug only if it is `replaceable`.
+    """
     if kind is None:
         kind = "pty" if hasattr(os, "openpty") else "socket"
-    return PseudoTerminal() if kind == "pty" else LoopbackSocket()
+    return PseudoTerminal(replaceable=replaceable) if kind == "pty" else LoopbackSocket()

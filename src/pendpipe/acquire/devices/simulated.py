@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from types import TracebackType
-from typing import Final, Self, TypeAlias
+from typing import Self
 
-import numpy as np
-
-from pendpipe.acquire.clock import Clock, SimulatedClock
-from pendpipe.acquire.devices.converter import convert
-from pendpipe.acquire.devices.di154rs import SimulatedDI154RS
-from pendpipe.acquire.devices.di2108 import SimulatedDI2108
-from pendpipe.acquire.devices.dialect import Dialect
+from pendpipe.acquire.clock import SimulatedClock
+from pendpipe.acquire.devices.faults import Fault, FaultyPath
 from pendpipe.acquire.devices.links import open_link
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices.stream import Signal, Stream
 from pendpipe.errors import InputError
 
-Signal: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Times in s since the start of the stream to volts at the terminals, noise included."""
-
-DEVICES: Final[Mapping[str, Callable[[], Dialect]]] = {
-    "di154": SimulatedDI154RS,
-    "di154rs": SimulatedDI154RS,
-    "di2108": SimulatedDI2108,
-}
-_BLOCKS: Final = (1 << 10, 1 << 14)
-"""Scans computed at a time, ahead of their hour: few at first, then more and more, so that
-neither a short nor a long recording pays for the signal twice."""
-_REST_S: Final = 0.002
-"""The shortest time between two pieces of data, in seconds of the host."""
+__all__ = ["DEVICES", "Signal", "SimulatedDevice"]
 
 
 class SimulatedDevice:
@@ -40,7 +23,7 @@ class SimulatedDevice:
     Parameters
     ----------
     kind
-        ``"di154"`` or ``"di2108"``.
+        A key of `DEVICES`.
     signal
         Times to volts, for every enabled channel, or a mapping from channel number; a
         channel without one reads 0 V. It is called with rising times, block after block, so
@@ -52,6 +35,9 @@ class SimulatedDevice:
     rate_error
         The device's clock is fast by this fraction: scans come ``1 + rate_error`` times as
         often as it says.
+    faults
+        What is to go wrong, see `faults.FAULTS`. With any, the signal runs on from the
+        first stream to the next ones; else every start of a stream is its time 0.
 
     Examples
     --------
@@ -72,6 +58,7 @@ class SimulatedDevice:
         clock_scale: float = 1.0,
         link: str | None = None,
         rate_error: float = 0.0,
+        faults: Iterable[Fault] = (),
     ) -> None:
         if kind not in DEVICES:
             raise InputError(
@@ -79,12 +66,19 @@ class SimulatedDevice:
                 "there is no such simulated device",
                 f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
             )
+        self._kind = kind
         self.dialect = DEVICES[kind]()
         self.clock = SimulatedClock(clock_scale)
         self.failure: BaseException | None = None
         self._signal = signal
-        self._rate_error = rate_error
-        self._link = open_link(link)
+        self._path = FaultyPath(faults := tuple(faults))
+        self._runs_on = bool(faults)
+        self._rate_error = (1.0 + rate_error) * self._path.rate_factor - 1.0
+        self._link = open_link(link, replaceable=self._path.may_unplug)
+        self._stream: Stream | None = None
+        self._first_start_s: float | None = None
+        self._until_s = 0.0  # the end of a stall or a silence
+        self._condition = ""
         self._ending = threading.Event()
         self._outbox = bytearray()
         self._thread = threading.Thread(target=self._live, name=f"simulated {kind}", daemon=True)
@@ -124,25 +118,76 @@ class SimulatedDevice:
     def _live(self) -> None:
         """Serve the line until the end; a fault of the signal silences the device."""
         try:
-            stream: _Stream | None = None
+            if self._path.stale:
+                self.dialect.streaming = True
+                self._begin()
             starts = self.dialect.starts
             while not self._ending.is_set():
-                self._link.wait(
-                    stream.rest_s(self.clock) if stream else 60.0, sending=bool(self._outbox)
-                )
-                if data := self._link.receive():
-                    self._outbox += self.dialect.respond(data)
+                self._link.wait(self._rest_s(), sending=bool(self._outbox))
+                data = self._link.receive()
+                self._suffer()
+                if self._condition == "silence":
+                    continue
+                if data:
+                    reply = self.dialect.respond(data)
+                    self._outbox += self._path.answer(reply, self.clock.now())
+                self._outbox += self._path.due(self.clock.now())
                 if self.dialect.starts != starts:
                     starts = self.dialect.starts
-                    stream = _Stream(self.dialect, self._signal, self._rate_error)
-                    stream.begin(self.clock)
+                    self._begin()
                 if not self.dialect.streaming:
-                    stream = None
-                elif stream and not self._outbox:
-                    self._outbox += stream.due(self.clock)
+                    self._stream = None
+                elif self._stream and not self._outbox and not self._condition:
+                    due = self._stream.due(self.clock)
+                    self._outbox += self._path.stream(due, self._stream.scan_bytes)
                 self._send()
         except BaseException as fault:
             self.failure = fault
+
+    def _begin(self) -> None:
+        """Begin a stream."""
+        now_s = self.clock.now()
+        first_s = now_s if self._first_start_s is None else self._first_start_s
+        self._first_start_s = first_s
+        offset_s = now_s - first_s if self._runs_on else 0.0
+        self._stream = Stream(self.dialect, self._signal, self._rate_error, offset_s)
+        self._stream.begin(self.clock)
+
+    def _rest_s(self) -> float:
+        """How long there is nothing to do, in seconds of the host, if the host is silent."""
+        if self._stream:
+            return self._stream.rest_s(self.clock)
+        return 0.005 if self._runs_on else 60.0
+
+    def _suffer(self) -> None:
+        """Enter and leave the conditions that faults bring about."""
+        condition, self._path.condition = self._path.condition, ""
+        if condition == "overflow":
+            self.dialect.streaming = False
+        elif condition == "unplug":
+            self._replug(self._path.condition_s)
+        elif condition:
+            self._condition = condition
+            self._until_s = self.clock.now() + self._path.condition_s
+        if self._condition == "silence":
+            self._outbox.clear()
+            if self._stream:
+                self._stream.due(self.clock)
+        if self.clock.now() >= self._until_s:
+            self._condition = ""
+
+    def _replug(self, duration_s: float) -> None:
+        """Be gone, and come back as if switched on."""
+        self._send()
+        self._link.unplug()
+        self.clock.release()
+        self._outbox.clear()
+        self._stream = None
+        self._ending.wait(duration_s / self.clock.scale)
+        starts = self.dialect.starts
+        self.dialect = DEVICES[self._kind]()
+        self.dialect.starts = starts
+        self._link.replug()
 
     def _send(self) -> None:
         """Send what the line takes; while it is full, simulated time stands still."""
@@ -154,57 +199,3 @@ class SimulatedDevice:
             self.clock.hold()
         else:
             self.clock.release()
-
-
-class _Stream:
-    """The data between a start and a stop, computed in blocks and released by the clock."""
-
-    def __init__(
-        self, dialect: Dialect, signal: Signal | Mapping[int, Signal], rate_error: float
-    ) -> None:
-        self._dialect = dialect
-        channels = dialect.channels
-        self._signals = [
-            signal.get(number) if isinstance(signal, Mapping) else signal for number in channels
-        ]
-        self._rate_hz = dialect.scan_rate_hz * (1.0 + rate_error)
-        self._scan_bytes = len(dialect.encode(np.zeros((1, len(channels)), dtype=np.int64)))
-        self._computed = 0  # scans
-        self._ready = b""  # bytes of scans computed, not yet released
-        self._released = 0  # bytes since the start
-        self._origin_s = 0.0
-
-    def begin(self, clock: Clock) -> None:
-        """Let scan 0 be taken now; the first block is computed before, and not late."""
-        self._compute()
-        self._origin_s = clock.now()
-
-    def due(self, clock: Clock) -> bytes:
-        """Return the whole packets that are complete by now."""
-        elapsed = clock.now() - self._origin_s
-        taken = math.floor(elapsed * self._rate_hz) + 1
-        packet = self._dialect.packet_bytes
-        size = max(0, taken * self._scan_bytes // packet * packet - self._released)
-        while len(self._ready) < size:
-            self._compute()
-        piece, self._ready = self._ready[:size], self._ready[size:]
-        self._released += size
-        return piece
-
-    def rest_s(self, clock: Clock) -> float:
-        """How long, in seconds of the host, until the next packet is complete."""
-        following = math.ceil((self._released + self._dialect.packet_bytes) / self._scan_bytes)
-        complete_s = self._origin_s + (following - 1) / self._rate_hz
-        return max(_REST_S, (complete_s - clock.now()) / clock.scale)
-
-    def _compute(self) -> None:
-        """Sample, convert and encode the next block."""
-        block = min(_BLOCKS[1], max(_BLOCKS[0], self._computed))
-        time_s = np.arange(self._computed, self._computed + block) / self._rate_hz
-        codes: IntArray = np.zeros((block, len(self._signals)), dtype=np.int64)
-        for column, signal in enumerate(self._signals):
-            if signal is not None:
-                volts = signal(time_s)
-                codes[:, column] = convert(volts, self._dialect.bits, self._dialect.range_volts)
-        self._ready += self._dialect.encode(codes)
-        self._computed += block

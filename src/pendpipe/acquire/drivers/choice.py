@@ -8,9 +8,7 @@ from pendpipe.acquire.drivers.base import Identity
 from pendpipe.errors import InputError
 
 
-def choose_channels(
-    port: str, model: str, channels: Sequence[int], last: int
-) -> tuple[int, ...]:
+def choose_channels(port: str, model: str, channels: Sequence[int], last: int) -> tuple[int, ...]:
     """Put the channels in the order of the scan.
 
     Raises

@@ -139,7 +139,9 @@ def _shaped(
     measured = measure(samples, places, level, shape, amplitude=amplitude)
     size = np.abs(np.nan_to_num(measured.amplitude))
     relative, _ = shape_error(size, places.angular_frequency, rates)
-    shape, measured = odd_harmonics(samples, places, level, shape, measured, relative * size)
+    shape, measured, places = odd_harmonics(
+        samples, places, level, shape, measured, relative * size
+    )
     return places, measured, shape
 
 
@@ -170,6 +172,9 @@ def _finish(state: _State, keep: BoolArray) -> TurningPoints:
     turned = (amplitude + _late(amplitude, sine, sd, sine_sd)) * height
     clear = np.maximum(np.abs(amplitude), sd)
     relative, phase = shape_error(clear, rate, state.rates)
+    # A period that changes from one half cycle to the next skews the wave about its turning.
+    skew = np.where(measured.single | measured.lopsided, places.unsteady_phase, 0.0)[keep]
+    relative, phase = np.hypot(relative, 0.1 * skew**2), np.hypot(phase, 0.1 * skew**2)
     return TurningPoints(
         half_cycle=places.number[keep] - places.number[keep][0],
         time_s=places.centre_s[keep] + measured.phase(noise)[keep] / rate,

@@ -29,7 +29,7 @@ _CIRCULAR: Final = 1.0 / 192.0
 def odd_harmonics(
     samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
     open_error: FloatArray,
-) -> tuple[FloatArray, Measured]:  # fmt: skip
+) -> tuple[FloatArray, Measured, Places]:  # fmt: skip
     """Add odd harmonics to the shape where the readings ask for them.
 
     Where even these don't fit (beyond 1.5 rad, where the period changes from one half
@@ -45,13 +45,13 @@ def odd_harmonics(
 
     Returns
     -------
-    shape, measured
+    shape, measured, places
         As given, where a cosine with its losses is enough.
     """
     noise = _white(samples, places)
     before = _misfit(measured)
     if before < (1.0 + _CLEARLY) * noise**2 and not _expected(samples, measured, noise):
-        return shape, measured
+        return shape, measured, places
     count = float(np.nansum(measured.count))
     for free in range(1, kernels.HARMONICS + 1):
         amplitude = measured.amplitude
@@ -80,16 +80,21 @@ def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
 def _narrowed(
     samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
     noise: FloatArray,
-) -> tuple[FloatArray, Measured]:  # fmt: skip
+) -> tuple[FloatArray, Measured, Places]:  # fmt: skip
     """Replace the half cycles that no shape fits by fits of their middle halves."""
     bare = shape.copy()
     bare[:, 4:] = 0.0
-    middle = measure(
-        samples, places, level, bare, window=_NARROW, free=1, amplitude=measured.amplitude
-    )
+    options = {"window": _NARROW, "free": 1, "amplitude": measured.amplitude}
+    first = measure(samples, places, level, bare, **options)
+    # Where the wave turns: the curvature there is that of both harmonics.
+    curvature = first.amplitude + 9.0 * first.harmonics[:, 0]
+    late = np.where(curvature > 0.1 * first.amplitude, first.sine / curvature, 0.0)
+    late = np.nan_to_num(np.clip(late, -0.5, 0.5))
+    moved = places._replace(centre_s=places.centre_s + late / places.angular_frequency)
+    middle = measure(samples, moved, level, bare, **options)
     poor = _even_misfit(samples, places, level, shape, measured, noise) & (middle.count > 8)
     if not poor.any():
-        return shape, measured
+        return shape, measured, places
     # What even the middle half does not fit counts as error, not as precision.
     enlarged = np.maximum(_ratio(middle, noise), 1.0)
     information, score = _level_of_peaks(places, middle, enlarged)
@@ -104,7 +109,10 @@ def _narrowed(
         np.where(poor.reshape(-1, *[1] * (new.ndim - 1)), new, old)
         for new, old in zip(single, measured, strict=True)
     ]
-    return np.where(poor[:, None], bare, shape), Measured(*chosen)
+    centre = np.where(poor, moved.centre_s, places.centre_s)
+    return (
+        np.where(poor[:, None], bare, shape), Measured(*chosen), places._replace(centre_s=centre),
+    )  # fmt: skip
 
 
 def _level_of_peaks(

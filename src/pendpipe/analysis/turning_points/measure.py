@@ -11,7 +11,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 _LOPSIDED: Final = 0.3
-_PHASE_PRIOR: Final = 0.05
+_PHASE_PRIOR: Final = 0.02
 
 
 class Places(NamedTuple):
@@ -27,6 +27,11 @@ class Places(NamedTuple):
     def angular_frequency(self) -> FloatArray:
         """Phase per second."""
         return np.pi / self.half_period_s
+
+    @property
+    def unsteady_phase(self) -> FloatArray:
+        """Phase by which a period that changes may misplace an extrapolated half cycle."""
+        return np.pi * np.abs(np.gradient(self.half_period_s)) / self.half_period_s
 
 
 class Measured(NamedTuple):
@@ -134,7 +139,7 @@ def measure(
     lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:
         size = np.maximum(smoothed(amplitude), 1e-12)
-        held = (samples.noise_rms / (size * _PHASE_PRIOR)) ** 2
+        held = (samples.noise_rms / (size * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(lopsided, held, 0.0)
     solution, inverse = kernels.solve_half_cycles(gram, right, prior)
     flat = gram[:, 1:, 0]

@@ -1,0 +1,174 @@
+"""The faults that a simulated device can have on demand: one declared list.
+
+A fault of the stream is set off once, when its place is reached; places count the bytes
+of data that the device has made since it was switched on, over all its streams. A fault
+of the answers meets the first answers that hold its `command`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+FAULTS: Final[Mapping[str, str]] = {
+    "junk": "bytes FF FE 7F of a rising supply before the first answer",
+    "no echo": "an answer is lost",
+    "wrong echo": "the first byte of an answer is another one",
+    "late echo": "an answer comes `duration_s` late",
+    "padded echo": "`count` NULs follow an answer",
+    "stale stream": "data of an earlier run flow before the host has said a word",
+    "drop": "`count` bytes of the stream are lost",
+    "duplicate": "`count` bytes of the stream come twice",
+    "flip": "bit `bit` of a byte of the stream is wrong",
+    "lost scans": "`count` whole scans are lost from the given byte on",
+    "overflow": "the text 'stop 0`code`' stands in the stream, and nothing follows",
+    "stall": "the stream pauses for `duration_s`, then what was kept comes at once",
+    "unplug": "the line is gone for `duration_s`; the device then starts anew, idle",
+    "wrong rate": "scans come `factor` times as often as the device says",
+    "silence": "no byte comes for `duration_s`, neither data nor answers",
+}
+"""What a `Fault` may be, by its kind."""
+
+Condition = Literal["", "overflow", "stall", "unplug", "silence"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault.
+
+    Parameters
+    ----------
+    kind
+        A key of `FAULTS`.
+    at
+        The byte of the stream at which it happens; for ``"silence"`` a negative one means
+        from the beginning.
+    count
+        How many bytes, scans or NULs.
+    bit
+        Which bit is flipped, 0 to 7.
+    code
+        What a device says when it overflows: 1, 2 or 3.
+    duration_s
+        How long it lasts, in seconds of the device's clock.
+    command
+        A piece of the answers that are to be spoilt; empty for any.
+    times
+        How many answers.
+    factor
+        Of the rate.
+    """
+
+    kind: str
+    at: int = 0
+    count: int = 1
+    bit: int = 0
+    code: int = 1
+    duration_s: float = 1e9
+    command: bytes = b""
+    times: int = 1
+    factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in FAULTS:
+            raise ValueError(f"no fault is called {self.kind!r}; choose from {', '.join(FAULTS)}")
+
+
+class FaultyPath:
+    """What stands between a device and its line, and does the harm.
+
+    Parameters
+    ----------
+    faults
+        Those to be set off.
+    """
+
+    def __init__(self, faults: Iterable[Fault] = ()) -> None:
+        every = tuple(faults)
+        self.rate_factor = 1.0
+        for fault in every:
+            if fault.kind == "wrong rate":
+                self.rate_factor *= fault.factor
+        self.stale = any(fault.kind == "stale stream" for fault in every)
+        self.may_unplug = any(fault.kind == "unplug" for fault in every)
+        self.condition: Condition = ""
+        self.condition_s = 0.0  # how long the condition lasts
+        echoes = {"no echo", "wrong echo", "late echo", "padded echo", "junk"}
+        self._answers = [[fault, fault.times] for fault in every if fault.kind in echoes]
+        self._stream = [
+            fault
+            for fault in sorted(every, key=lambda fault: fault.at)
+            if fault.kind not in echoes | {"wrong rate", "stale stream"}
+        ]
+        self._late: list[tuple[float, bytes]] = []
+        self._passed = 0  # bytes of the stream
+        self._skip = 0  # bytes still to be lost
+        if self._stream and self._stream[0].at < 0:
+            self._set(self._stream.pop(0))
+
+    def answer(self, reply: bytes, now_s: float) -> bytes:
+        """Return what comes of an answer; what comes late is kept for `due`."""
+        for entry in self._answers:
+            fault, left = entry
+            if not (isinstance(fault, Fault) and isinstance(left, int)):
+                continue
+            if not reply or left <= 0 or fault.command not in reply:
+                continue
+            entry[1] = left - 1
+            if fault.kind == "junk":
+                reply = b"\xff\xfe\x7f" + reply
+            elif fault.kind == "no echo":
+                reply = b""
+            elif fault.kind == "wrong echo":
+                reply = bytes([reply[0] ^ 0x04]) + reply[1:]
+            elif fault.kind == "padded echo":
+                reply += b"\0" * fault.count
+            else:
+                self._late.append((now_s + fault.duration_s, reply))
+                reply = b""
+        return reply
+
+    def due(self, now_s: float) -> bytes:
+        """Return the late answers whose hour has come."""
+        ready = b"".join(reply for hour, reply in self._late if hour <= now_s)
+        self._late = [(hour, reply) for hour, reply in self._late if hour > now_s]
+        return ready
+
+    def stream(self, data: bytes, scan_bytes: int) -> bytes:
+        """Return what comes of the next bytes of the stream.
+
+        After a fault that ends or delays the stream, `condition` says which: the rest of
+        these bytes is lost with it (but for a stall).
+        """
+        out = bytearray()
+        done = min(self._skip, len(data))
+        self._skip -= done
+        while self._stream and self._stream[0].at < self._passed + len(data):
+            fault = self._stream.pop(0)
+            here = min(len(data), max(done, fault.at - self._passed))
+            out += data[done:here]
+            done = here
+            if fault.kind in ("drop", "lost scans"):
+                self._skip += fault.count * (scan_bytes if fault.kind == "lost scans" else 1)
+                gone = min(self._skip, len(data) - done)
+                self._skip -= gone
+                done += gone
+            elif fault.kind == "duplicate":
+                out += data[done : done + fault.count]
+            elif fault.kind == "flip":
+                out += bytes([value ^ 1 << fault.bit for value in data[done : done + 1]])
+                done = min(len(data), done + 1)
+            else:
+                self._set(fault)
+                if fault.kind == "overflow":
+                    out += b"stop 0%d\r" % fault.code
+                if fault.kind != "stall":
+                    done = len(data)
+        self._passed += len(data)
+        return bytes(out + data[done:])
+
+    def _set(self, fault: Fault) -> None:
+        if fault.kind in ("overflow", "stall", "unplug", "silence"):
+            self.condition = fault.kind  # type: ignore[assignment]
+            self.condition_s = fault.duration_s

@@ -1,0 +1,34 @@
+"""The simulated instruments by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from pendpipe.acquire.devices.dialect import Dialect
+from pendpipe.acquire.devices.di149 import SimulatedDI149, SimulatedDI155
+from pendpipe.acquire.devices.di154rs import SimulatedDI154RS, SimulatedDI194RS
+from pendpipe.acquire.devices.di245 import SimulatedDI245
+from pendpipe.acquire.devices.di2108 import (
+    SimulatedDI1100,
+    SimulatedDI1110,
+    SimulatedDI1120,
+    SimulatedDI2108,
+    SimulatedDI4108,
+)
+
+DEVICES: Final[Mapping[str, Callable[[], Dialect]]] = {
+    "di154": SimulatedDI154RS,
+    "di154rs": SimulatedDI154RS,
+    "di194": SimulatedDI194RS,
+    "di194rs": SimulatedDI194RS,
+    "di149": SimulatedDI149,
+    "di155": SimulatedDI155,
+    "di245": SimulatedDI245,
+    "di1100": SimulatedDI1100,
+    "di1110": SimulatedDI1110,
+    "di1120": SimulatedDI1120,
+    "di2108": SimulatedDI2108,
+    "di4108": SimulatedDI4108,
+}
+"""What may follow ``simulated:``."""

@@ -1,0 +1,201 @@
+"""Eq. 8 by two slow and trusted ways, which share nothing with the engine.
+
+`MpmathPendulum` solves half cycles to 40 digits by collocation in the phase about the
+Coulomb-shifted centre (the engine has another centre), and checks itself by Taylor series in
+time. `heyoka_turning_points` integrates in time and searches for the zeros of the velocity.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from pendpipe.dynamics import Eq8
+
+DIGITS = 40
+NODES = 36
+
+
+@functools.cache
+def collocation() -> tuple[list[Any], list[list[Any]]]:
+    """Return the cosines' angles pi (1 + z)/2 of Chebyshev nodes, and the integration matrix."""
+    with mp.workdps(DIGITS + 10):
+        n = NODES
+        z = [-mp.cos(mp.pi * j / n) for j in range(n + 1)]
+        rows = []
+        for i in range(n + 1):
+            # The integral of T_k from -1 to z_i, then the values' Chebyshev coefficients.
+            integral = []
+            for k in range(n + 1):
+                if k == 0:
+                    integral.append(z[i] + 1)
+                elif k == 1:
+                    integral.append((z[i] ** 2 - 1) / 2)
+                else:
+                    turn = mp.acos(z[i])
+                    upper = mp.cos((k + 1) * turn) / (2 * (k + 1)) - mp.cos((k - 1) * turn) / (
+                        2 * (k - 1)
+                    )
+                    lower = mpf((-1) ** (k + 1)) / (2 * (k + 1)) - mpf((-1) ** (k - 1)) / (
+                        2 * (k - 1)
+                    )
+                    integral.append(upper - lower)
+            row = []
+            for j in range(n + 1):
+                weight = mpf(0)
+                for k in range(n + 1):
+                    end = (mpf("0.5") if k in (0, n) else 1) * (mpf("0.5") if j in (0, n) else 1)
+                    weight += integral[k] * end * (-1) ** k * mp.cos(mp.pi * k * j / n) * mpf(2) / n
+                row.append(weight)
+            rows.append(row)
+        return [mp.pi * (1 + node) / 2 for node in z], rows
+
+
+@dataclass
+class MpmathPendulum:
+    """Eq. 8 to 40 digits; the numbers are taken as they stand (`mpf` of the floats, or `mpf`)."""
+
+    omega: Any
+    quadratic: Any = 0
+    hysteretic: Any = 0
+    viscous: Any = 0
+    coulomb: Any = 0
+
+    @classmethod
+    def of(cls, model: Eq8) -> MpmathPendulum:
+        """Return the same pendulum."""
+        numbers = (
+            model.angular_frequency, model.quadratic, model.hysteretic, model.viscous,
+            model.coulomb,
+        )  # fmt: skip
+        return cls(*(mpf(number) for number in numbers))
+
+    def forces(self) -> tuple[Any, Any, Any, Any]:
+        """Return f_c, f_h, f_q and 2 b_v of Eq. 8."""
+        return (
+            mp.pi * self.omega * self.coulomb / 2,
+            mp.pi * self.hysteretic / 2,
+            mp.pi * self.quadratic / (2 * self.omega),
+            2 * self.viscous,
+        )
+
+    def half_cycle(self, y: Any) -> tuple[Any, Any]:
+        """Return the next amplitude and the duration in s."""
+        with mp.workdps(DIGITS):
+            f_c, f_h, f_q, damping = self.forces()
+            w = self.omega
+            shift = f_c / w**2
+            psi, matrix = collocation()
+            cos, sin = [mp.cos(p) for p in psi], [mp.sin(p) for p in psi]
+            start = y - shift
+            r = [start] * len(psi)
+            for _ in range(60):
+                slope, clock = [], []
+                for radius, c, s in zip(r, cos, sin, strict=True):
+                    x, u = shift + radius * c, -radius * s
+                    square = x * x + u * u
+                    push = (
+                        f_h * w * mp.sqrt(square) + f_q * w**2 * square - damping * w * u
+                    ) / w**2
+                    turning = 1 - push * c / radius
+                    slope.append(-push * s / turning)
+                    clock.append(1 / turning)
+                new = [
+                    start + mp.pi / 2 * mp.fsum(a * b for a, b in zip(row, slope, strict=True))
+                    for row in matrix
+                ]
+                change = max(abs(a - b) for a, b in zip(new, r, strict=True))
+                r = new
+                if change < mpf(10) ** (4 - DIGITS) * start:
+                    break
+            duration = mp.pi / 2 * mp.fsum(a * b for a, b in zip(matrix[-1], clock, strict=True))
+            return r[-1] - shift, duration / w
+
+    def turning_points(self, y: Any, count: int) -> tuple[list[Any], list[Any]]:
+        """Return the times and the signed angles of `count` turning points."""
+        times, angles, sign = [mpf(0)], [mpf(y)], 1
+        y = mpf(y)
+        while len(times) < count:
+            y, duration = self.half_cycle(y)
+            sign = -sign
+            times.append(times[-1] + duration)
+            angles.append(sign * y)
+        return times, angles
+
+    def after(self, angle: Any, seconds: Any) -> tuple[Any, Any]:
+        """Return angle and velocity some time after a turning point, within its half cycle."""
+        f_c, f_h, f_q, damping = self.forces()
+        w, side = self.omega, mp.sign(angle)
+
+        def rates(_t: Any, state: Any) -> list[Any]:
+            x, v = state
+            square = w**2 * x**2 + v**2
+            friction = f_c + f_h * mp.sqrt(square) + f_q * square
+            return [v, side * friction - damping * v - w**2 * x]
+
+        x, v = mpmath.odefun(rates, 0, [mpf(angle), mpf(0)])(seconds)
+        return x, v
+
+    def angle_at(self, y: Any, seconds: Any) -> Any:
+        """Return the angle at a time since the release."""
+        times, angles = [mpf(0)], [mpf(y)]
+        while True:
+            amplitude, duration = self.half_cycle(abs(angles[-1]))
+            if times[-1] + duration > seconds:
+                return self.after(angles[-1], seconds - times[-1])[0]
+            times.append(times[-1] + duration)
+            angles.append(-mp.sign(angles[-1]) * amplitude)
+
+
+@functools.cache
+def _heyoka_integrator() -> tuple[Any, list[tuple[float, float]]]:
+    heyoka = pytest.importorskip("heyoka", reason="heyoka is not installed")
+    x, v = heyoka.make_vars("x", "v")
+    side, f_c, f_h, f_q, damping, omega2 = (heyoka.par[i] for i in range(6))
+    square = omega2 * x**2 + v**2
+    friction = f_c + f_h * heyoka.sqrt(square) + f_q * square
+    log: list[tuple[float, float]] = []
+
+    def turned(integrator: Any, slope: int) -> bool:
+        log.append((integrator.time, float(integrator.state[0])))
+        return False  # stop: the half cycle is over
+
+    event = heyoka.t_event(v, callback=turned, direction=heyoka.event_direction.any)
+    integrator = heyoka.taylor_adaptive(
+        [(x, v), (v, -omega2 * x - friction * side - damping * v)], [1.0, 0.0], pars=[0.0] * 6,
+        tol=1e-16, t_events=[event],
+    )  # fmt: skip
+    return integrator, log
+
+
+def heyoka_turning_points(
+    model: Eq8, y: float, count: int, moves: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return turning points by heyoka; `moves(angle)` says whether the pendulum leaves one."""
+    integrator, log = _heyoka_integrator()
+    w = model.angular_frequency
+    times, angles = [0.0], [y]
+    while len(times) < count and moves(abs(angles[-1])):
+        side = -math.copysign(1.0, angles[-1])
+        integrator.pars[:] = [
+            side, math.pi * w * model.coulomb / 2, math.pi * model.hysteretic / 2,
+            math.pi * model.quadratic / (2 * w), 2 * model.viscous, w**2,
+        ]  # fmt: skip
+        integrator.time, integrator.state[:] = 0.0, [angles[-1], 0.0]
+        integrator.reset_cooldowns()
+        log.clear()
+        # The release is a zero of the velocity as well: go a little way before the event counts.
+        while not log or log[-1][0] < 0.1 / w:
+            integrator.propagate_until(20.0 * math.pi / w)
+            if integrator.time >= 20.0 * math.pi / w:
+                raise AssertionError("heyoka found no turning point")
+        times.append(times[-1] + log[-1][0])
+        angles.append(log[-1][1])
+    return np.array(times), np.array(angles)
