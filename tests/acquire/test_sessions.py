@@ -181,11 +181,16 @@ def test_a_wrong_model_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_device_that_falls_silent_ends_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendpipe.acquire.recorder._SILENCE_S", 0.2)
+    monkeypatch.setattr("pendpipe.acquire.session._SILENCE_S", 0.2)
     with SimulatedDevice("di2108", swing, clock_scale=100.0) as device:
         threading.Timer(0.4, device.dialect.respond, [b"stop\r"]).start()
         recording = record(
-            device.port, "di2108", rate_hz=100.0, duration_s=1e4, clock=ScaledClock(100.0)
+            device.port,
+            "di2108",
+            rate_hz=100.0,
+            duration_s=1e4,
+            clock=ScaledClock(100.0),
+            reconnect_s=0.0,
         )
     assert 0 < len(recording) < 1e6
     assert any("fell silent" in note for note in recording.notes)
@@ -196,13 +201,18 @@ def test_a_pulled_plug_keeps_what_had_arrived(link: str) -> None:
     with SimulatedDevice("di2108", swing, clock_scale=100.0, link=link) as device:
         threading.Timer(0.4, device.unplug).start()
         recording = record(
-            device.port, "di2108", rate_hz=100.0, duration_s=1e4, clock=ScaledClock(100.0)
+            device.port,
+            "di2108",
+            rate_hz=100.0,
+            duration_s=1e4,
+            clock=ScaledClock(100.0),
+            reconnect_s=0.0,
         )
     assert any("the line was lost" in note for note in recording.notes)
 
 
 def test_a_failing_signal_is_not_called_a_silent_device(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendpipe.acquire.recorder._SILENCE_S", 0.2)
+    monkeypatch.setattr("pendpipe.acquire.session._SILENCE_S", 0.2)
 
     def failing(time_s: FloatArray) -> FloatArray:
         raise ZeroDivisionError("the signal's own fault")

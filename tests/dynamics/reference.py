@@ -156,20 +156,22 @@ class MpmathPendulum:
 
 @functools.cache
 def _heyoka_integrator() -> tuple[Any, list[tuple[float, float]]]:
+    """Return an integrator of the half cycle from the right to the left, and the log of its end."""
     heyoka = pytest.importorskip("heyoka", reason="heyoka is not installed")
     x, v = heyoka.make_vars("x", "v")
-    side, f_c, f_h, f_q, damping, omega2 = (heyoka.par[i] for i in range(6))
+    f_c, f_h, f_q, damping, omega2 = (heyoka.par[i] for i in range(5))
     square = omega2 * x**2 + v**2
     friction = f_c + f_h * heyoka.sqrt(square) + f_q * square
     log: list[tuple[float, float]] = []
 
-    def turned(integrator: Any, slope: int) -> bool:
+    def turned(integrator: Any, _slope: int) -> bool:
         log.append((integrator.time, float(integrator.state[0])))
-        return False  # stop: the half cycle is over
+        return False
 
-    event = heyoka.t_event(v, callback=turned, direction=heyoka.event_direction.any)
+    # The velocity falls from zero at the start, and rises to zero at the end.
+    event = heyoka.t_event(v, callback=turned, direction=heyoka.event_direction.positive)
     integrator = heyoka.taylor_adaptive(
-        [(x, v), (v, -omega2 * x - friction * side - damping * v)], [1.0, 0.0], pars=[0.0] * 6,
+        [(x, v), (v, friction - omega2 * x - damping * v)], [1.0, 0.0], pars=[0.0] * 5,
         tol=1e-16, t_events=[event],
     )  # fmt: skip
     return integrator, log
@@ -178,24 +180,20 @@ def _heyoka_integrator() -> tuple[Any, list[tuple[float, float]]]:
 def heyoka_turning_points(
     model: Eq8, y: float, count: int, moves: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return turning points by heyoka; `moves(angle)` says whether the pendulum leaves one."""
+    """Return turning points by heyoka; `moves(amplitude)` says if the pendulum leaves one."""
     integrator, log = _heyoka_integrator()
     w = model.angular_frequency
     times, angles = [0.0], [y]
     while len(times) < count and moves(abs(angles[-1])):
-        side = -math.copysign(1.0, angles[-1])
         integrator.pars[:] = [
-            side, math.pi * w * model.coulomb / 2, math.pi * model.hysteretic / 2,
+            math.pi * w * model.coulomb / 2, math.pi * model.hysteretic / 2,
             math.pi * model.quadratic / (2 * w), 2 * model.viscous, w**2,
         ]  # fmt: skip
-        integrator.time, integrator.state[:] = 0.0, [angles[-1], 0.0]
+        integrator.time, integrator.state[:] = 0.0, [abs(angles[-1]), 0.0]
         integrator.reset_cooldowns()
         log.clear()
-        # The release is a zero of the velocity as well: go a little way before the event counts.
-        while not log or log[-1][0] < 0.1 / w:
-            integrator.propagate_until(20.0 * math.pi / w)
-            if integrator.time >= 20.0 * math.pi / w:
-                raise AssertionError("heyoka found no turning point")
-        times.append(times[-1] + log[-1][0])
-        angles.append(log[-1][1])
+        integrator.propagate_until(100.0 * math.pi / w)
+        ((duration, angle),) = log
+        times.append(times[-1] + duration)
+        angles.append(math.copysign(1.0, angles[-1]) * angle)
     return np.array(times), np.array(angles)

@@ -102,10 +102,8 @@ def test_friction_at_rest_decides_about_the_stop(
     friction = math.pi / 2 * (W * c + b_h * W * y + a / W * (W * y) ** 2)
     if abs(friction / (W**2 * y) - 1.0) < 1e-12:
         return
-    assert turning_points(model, Release(0.0, y), count=2).stopped == (friction >= W**2 * y) or (
-        # it moved, and stopped at its first turning point
-        turning_points(model, Release(0.0, y), count=2).angle_rad.size == 2
-    )
+    turned = turning_points(model, Release(0.0, y), count=2).angle_rad.size
+    assert turned == (1 if friction >= W**2 * y else 2)
 
 
 @given(
@@ -131,6 +129,13 @@ def test_the_motion_has_the_symmetries_of_equation_8(
     np.testing.assert_allclose(sample(other, Release(0.0, 4 * y), time), 4 * angle, atol=1e-13 * y)
 
 
+def test_an_amplitude_beyond_measure_does_no_harm() -> None:
+    time = np.linspace(0.0, 3e4, 301)
+    for method in METHODS:
+        angle = sample(Eq8(W, viscous=W / 10), Release(0.0, 0.1), time, method=method)
+        assert np.all(np.abs(angle) <= 0.1 * np.exp(-W / 10.1 * time) + 1e-119)
+
+
 def test_an_overdamped_pendulum_is_refused() -> None:
     with pytest.raises(ValueError, match="overdamped"):
         turning_points(Eq8(W, viscous=1.01 * W), Release(0.0, 0.1), count=3)
@@ -148,7 +153,9 @@ def test_uneven_times_give_the_same_as_even_ones(method: Method) -> None:
     # Also when several samples share an instant, and for none or one.
     twice = np.repeat(time[:50], 2)
     np.testing.assert_allclose(
-        sample(model, release, twice, method=method), np.repeat(whole[:50], 2), rtol=1e-13
+        sample(model, release, twice, method=method),
+        np.repeat(whole[:50], 2),
+        atol=0.07 * 1e-11,  # another stretch of time has another table
     )
     assert sample(model, release, np.empty(0), method=method).size == 0
     assert sample(model, release, np.array([0.0]), method=method) == pytest.approx(0.07, rel=1e-13)

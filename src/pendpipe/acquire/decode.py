@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.drivers.base import Loss
 from pendpipe.acquire.raw import RawRecording, read_raw
+from pendpipe.acquire.segments import Segment, cut, offsets_s, split
 from pendpipe.acquire.timebase import TimeBase, measure_rate
 from pendpipe.arrays import ByteArray, FloatArray, IntArray
 from pendpipe.errors import InputError
@@ -33,7 +35,9 @@ def decode_recording(
     -------
     Recording
         Volts on an even grid of times, the first scan at 0 s. Lost scans are rows of
-        quality 2, one each; a scan next to bytes out of step has quality 1.
+        quality 2, one each; a scan next to bytes out of step has quality 1. After a break
+        (unplugged, silent, overflowed) the grid begins anew at the time that the
+        recorder's clock tells, and rows of quality 2 fill the gap.
 
     Raises
     ------
@@ -48,46 +52,58 @@ def decode_recording(
         listed = ", ".join(map(str, channels))
         raise InputError(place, f"channel {chosen} was not recorded", f"choose from {listed}")
     driver = find_driver(raw.header["model"])
-    decoder = driver.decoder(len(channels))
-    scans, end = decoder.feed(raw.data), decoder.finish()
-    kept = raw.event("stopped").get("keep_scans", len(scans))
-    counts = scans.counts[:kept, channels.index(chosen)]
-    if not len(counts):
+    segments = split(raw, driver)
+    kept = raw.event("stopped").get("keep_scans")
+    if kept is not None and len(segments) == 1:
+        segments = [cut(segments[0], int(kept))]
+    if not segments:
         raise InputError(place, "no scan was recorded", "check the device, and record again")
-    losses = (*scans.losses, *end.losses)
+    longest = max(segments, key=lambda segment: len(segment.arrival_s))
     time_base = measure_rate(
-        raw.arrival_s,
-        _scans_arrived(raw.arrived_bytes, losses, decoder.bytes_per_scan),
+        longest.arrival_s,
+        longest.scans_made,
         float(raw.header["rate_hz"]),
         float(raw.header.get("clock_scale", 1.0)),
     )
-    step = driver.range_volts / 2 ** (driver.bits - 1)
-    grid = _place(len(counts), [loss for loss in losses if 0 < loss.after_scan < len(counts)])
-    values = np.full(grid.length, np.nan)
-    values[grid.index] = counts * step
+    high = float(raw.header.get("range_volts", driver.range_volts))
+    step = high / 2 ** (driver.bits - 1)
+    time_s, values, quality = _join(segments, time_base.rate_hz, channels.index(chosen), step)
     return Recording(
-        time_s=np.arange(grid.length) / time_base.rate_hz,
+        time_s=time_s,
         values=values,
         quantity="volts",
-        quality=grid.quality if grid.quality.any() else None,
-        metadata=_metadata(raw, chosen, time_base),
+        quality=quality if quality.any() else None,
+        metadata=_metadata(raw, chosen, time_base, high, segments),
         resolution=step,
-        notes=_notes(raw, losses, time_base),
+        notes=_notes(raw, segments, time_base, time_s),
     )
 
 
-def _scans_arrived(
-    arrived_bytes: IntArray, losses: Sequence[Loss], bytes_per_scan: int
-) -> FloatArray:
-    """Turn bytes arrived into scans the device has made; a lost scan is one made."""
-    scans = arrived_bytes / bytes_per_scan
-    discarded = 0
-    for loss in losses:
-        discarded += loss.discarded_bytes
-        place = loss.after_scan * bytes_per_scan + discarded
-        made = loss.lost_scans if loss.after_scan else 0
-        scans[arrived_bytes >= place] += made - loss.discarded_bytes / bytes_per_scan
-    return scans
+def _join(
+    segments: Sequence[Segment], rate_hz: float, column: int, step: float
+) -> tuple[FloatArray, FloatArray, ByteArray]:
+    """Put the streams one after the other, with rows for what is missing between them."""
+    times: list[FloatArray] = []
+    values: list[FloatArray] = []
+    qualities: list[ByteArray] = []
+    for segment, offset_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
+        length = len(segment.counts)
+        grid = _place(length, [loss for loss in segment.losses if 0 < loss.after_scan < length])
+        begin_s = offset_s
+        if times:
+            last_s = float(times[-1][-1])
+            # Late stamps must not make time stand still.
+            begin_s = max(offset_s, last_s + 1.0 / rate_hz)
+            rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
+            times.append(last_s + np.arange(1, rows + 1) / rate_hz)
+            values.append(np.full(rows, np.nan))
+            qualities.append(np.full(rows, MISSING, dtype=np.uint8))
+        reading = np.full(grid.length, np.nan)
+        reading[grid.index] = segment.counts[:, column] * step
+        times.append(begin_s + np.arange(grid.length) / rate_hz)
+        values.append(reading)
+        qualities.append(grid.quality)
+    return np.concatenate(times), np.concatenate(values), np.concatenate(qualities)
 
 
 @dataclass(frozen=True)
@@ -114,7 +130,13 @@ def _place(scans: int, losses: Sequence[Loss]) -> _Grid:
     return _Grid(length, index, quality)
 
 
-def _metadata(raw: RawRecording, channel: int, time_base: TimeBase) -> dict[str, str]:
+def _metadata(
+    raw: RawRecording,
+    channel: int,
+    time_base: TimeBase,
+    range_volts: float,
+    segments: Sequence[Segment],
+) -> dict[str, str]:
     """Say where the recording comes from, as text."""
     header = raw.header
     driver = find_driver(header["model"])
@@ -123,12 +145,13 @@ def _metadata(raw: RawRecording, channel: int, time_base: TimeBase) -> dict[str,
         "model": str(header["model"]),
         "channel": str(channel),
         "bits": str(driver.bits),
-        "range_volts": repr(driver.range_volts),
+        "range_volts": repr(range_volts),
         "sample_rate_hz": repr(time_base.rate_hz),
         "sample_rate_nominal_hz": repr(time_base.nominal_hz),
         "sample_rate_measured_hz": repr(time_base.measured_hz),
         "sample_rate_measured_sd_hz": repr(time_base.measured_sd_hz),
         "time_base": time_base.chosen,
+        "unseen_loss_below_s": f"{max(segment.limit_s for segment in segments):.4g}",
         "recorded_at": str(header["recorded_at"]),
     }
     for key in ("firmware", "serial_number", "clock_scale", "volts_per_radian"):
@@ -137,16 +160,35 @@ def _metadata(raw: RawRecording, channel: int, time_base: TimeBase) -> dict[str,
     return metadata
 
 
-def _notes(raw: RawRecording, losses: Sequence[Loss], time_base: TimeBase) -> tuple[str, ...]:
+def _notes(
+    raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
+) -> tuple[str, ...]:
     """Say what a user should know of the session, a clause each."""
     notes: list[str] = []
-    met = [loss for loss in losses if loss.after_scan]
+    losses = [loss for segment in segments for loss in segment.losses]
+    met = [loss for loss in losses if loss.after_scan and not loss.reason]
     if met:
         scans, discarded = (
             sum(loss.lost_scans for loss in met),
             sum(loss.discarded_bytes for loss in met),
         )
         notes.append(f"{scans} scans lost at {len(met)} places ({discarded} bytes out of step)")
+    if silent := [loss for loss in losses if loss.reason == "clock"]:
+        scans = sum(loss.lost_scans for loss in silent)
+        notes.append(f"{scans} scans lost at {len(silent)} places, by the recorder's clock")
+    notes += [
+        f"the device's buffer overflowed ('{loss.reason}')"
+        for loss in losses
+        if loss.reason.startswith("stop")
+    ]
+    notes += [
+        f"broken off and resumed: {event.get('reason')}"
+        for event in raw.events
+        if event.get("event") == "restarted"
+    ]
+    if len(segments) > 1:
+        steps = [f"{len(segment.counts)} scans" for segment in segments]
+        notes.append(f"{len(segments)} pieces ({', '.join(steps)}) in {time_s[-1]:.6g} s")
     if time_base.chosen == "measured":
         notes.append(
             f"the device scans at {time_base.measured_hz:.6g} Hz, "
@@ -155,7 +197,7 @@ def _notes(raw: RawRecording, losses: Sequence[Loss], time_base: TimeBase) -> tu
     stopped = raw.event("stopped")
     if not stopped:
         notes.append("the recording was cut short: what had arrived is kept")
-    elif stopped.get("reason") not in ("scans", "time"):
+    elif stopped.get("reason") not in ("scans", "time", "noise"):
         notes.append(f"ended early: {stopped.get('reason')}")
     if raw.damaged_bytes:
         notes.append(f"{raw.damaged_bytes} bytes at the end of the raw file are no whole frame")

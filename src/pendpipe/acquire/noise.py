@@ -1,4 +1,4 @@
-"""When has the motion died away into the noise?"""
+"""The end of a decay: the motion has died away into the noise."""
 
 from __future__ import annotations
 

@@ -31,15 +31,17 @@ class ProgressLine:
         self._stream = stream
         self._duration_s = duration_s
         self._shown = 0.0
-        self._scans = self._lost = 0
+        self._scans = self._lost = self._breaks = 0
         self._recent: deque[tuple[float, AnyArray]] = deque()
         self._decoder: Decoder | None = None
         self._step = 0.0
 
     def begin(self, driver: type[Driver], setup: Setup) -> None:
-        """Take notice of what is recorded."""
+        """Take notice of what is recorded; again after a break."""
+        self._breaks += self._decoder is not None
+        self._recent.clear()
         self._decoder = driver.decoder(len(setup.channels))
-        self._step = driver.range_volts / 2 ** (driver.bits - 1)
+        self._step = setup.range_volts / 2 ** (driver.bits - 1)
 
     def update(self, elapsed_s: float, data: bytes) -> None:
         """Take notice of further bytes, by `elapsed_s` of the recorder's clock."""
@@ -67,6 +69,7 @@ class ProgressLine:
         return (
             f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
             f"amplitude {amplitude:.3f} V, {self._lost} lost"
+            + (f", {self._breaks} break(s)" if self._breaks else "")
         )
 
     def end(self) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from pendpipe.acquire.devices.faults import Fault
 from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
-from pendpipe.acquire.recorder import Progress, Wish, record
+from pendpipe.acquire.recorder import record
+from pendpipe.acquire.session import Progress, Wish
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 
@@ -30,17 +32,22 @@ def acquire_simulated(
     link: str | None = None,
     rate_error: float = 0.0,
     progress: Progress | None = None,
+    range_volts: float | None = None,
+    until_noise: bool = False,
+    reconnect_s: float = 30.0,
+    faults: Iterable[Fault] = (),
 ) -> Recording:
     """Start a simulated device on a line of its own and record from it.
 
     Parameters
     ----------
     device_kind
-        ``"di154"`` (12 bits, at most 480 Hz) or ``"di2108"`` (16 bits).
+        A key of `devices.models.DEVICES`: ``"di154"`` (12 bits), ``"di2108"`` (16 bits), ...
     signal
         Times in s since the start to volts at the terminals, noise included; or a mapping
         from channel to that. See `SimulatedDevice`.
-    rate_hz, duration_s, channels, raw_path, volts_per_radian, progress
+    rate_hz, duration_s, channels, raw_path, volts_per_radian, progress, range_volts, \
+until_noise, reconnect_s
         See `recorder.record`.
     clock_scale
         How many seconds of device and recorder pass in one of the wall's. It is lowered to
@@ -50,6 +57,8 @@ def acquire_simulated(
         ``"pty"``, ``"socket"``, or ``None`` for what the system has.
     rate_error
         The device's clock is fast by this fraction.
+    faults
+        What is to go wrong, see `devices.faults.FAULTS`.
 
     Returns
     -------
@@ -68,7 +77,7 @@ def acquire_simulated(
     )
     scale = min(clock_scale, max(1.0, fastest))
     with SimulatedDevice(
-        device_kind, signal, clock_scale=scale, link=link, rate_error=rate_error
+        device_kind, signal, clock_scale=scale, link=link, rate_error=rate_error, faults=faults
     ) as device:
         try:
             return record(
@@ -82,6 +91,9 @@ def acquire_simulated(
                 volts_per_radian=volts_per_radian,
                 source=f"simulated {device.dialect.model}",
                 progress=progress,
+                range_volts=range_volts,
+                until_noise=until_noise,
+                reconnect_s=reconnect_s,
             )
         except InputError:
             # A device whose signal has failed is silent; the failure is the better answer.

@@ -3,6 +3,7 @@
 pendpipe acquire --list
 pendpipe acquire --port /dev/ttyUSB0 --model di154rs --rate 60 --duration 300 --out decay.csv
 pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --out decay.csv
+pendpipe acquire --recover decay.raw --out decay.csv
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendpipe.commands._campaign import add_campaign, add_record
@@ -26,15 +28,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--port", help="serial port of a real instrument: /dev/ttyUSB0, COM3")
     what.add_argument("--device", metavar="simulated:MODEL", help="a simulated instrument")
+    what.add_argument("--recover", metavar="RAW", help="decode kept bytes, of a crash for one")
     parser.add_argument("--list", action="store_true", help="list ports; with --port, ask it")
-    parser.add_argument("--model", help="the instrument on --port: di154rs or di2108")
-    parser.add_argument("--channel", type=int, default=1, help="as printed on the box (1)")
+    parser.add_argument("--model", help="the instrument on --port: di154rs, di2108, ...")
+    parser.add_argument("--channel", type=int, help="as printed on the box (1)")
     parser.add_argument(
         "--rate", type=float, default=60.0, metavar="HZ", help="scans a second (60)"
     )
     parser.add_argument("--duration", type=float, default=60.0, metavar="S", help="length (60)")
+    parser.add_argument("--samples", type=int, metavar="N", help="length, instead of --duration")
+    parser.add_argument(
+        "--until-noise", action="store_true", help="end when the amplitude has reached the noise"
+    )
+    parser.add_argument(
+        "--range-volts", type=float, metavar="V", help="the signal stays within +-V"
+    )
+    parser.add_argument(
+        "--reconnect",
+        type=float,
+        default=30.0,
+        metavar="S",
+        help="how long a device that was unplugged is waited for (30)",
+    )
     parser.add_argument("--out", metavar="FILE.csv", help="the recording")
-    parser.add_argument("--raw", metavar="FILE", help="keep the bytes off the wire here as well")
+    parser.add_argument("--raw", metavar="FILE", help="where the bytes off the wire go (FILE.raw)")
     parser.add_argument("--volts-per-radian", type=float, help="sensor constant, for the metadata")
     parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (0)")
     parser.add_argument(
@@ -59,8 +76,13 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.acquire.progress import ProgressLine
     from pendpipe.recording import write_plain
 
+    _complete(arguments)
     progress = ProgressLine(sys.stderr, arguments.duration)
-    if arguments.device:
+    if arguments.recover:
+        from pendpipe.acquire.decode import decode_recording
+
+        recording = decode_recording(Path(arguments.recover), arguments.channel)
+    elif arguments.device:
         recording = _simulated(arguments, progress)
     elif arguments.port:
         recording = _real(arguments, progress)
@@ -76,10 +98,20 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _complete(arguments: argparse.Namespace) -> None:
+    """Put in what follows from other arguments."""
+    if arguments.samples is not None:
+        if arguments.samples < 1:
+            raise InputError("--samples", "it must be positive", "give a whole number above 0")
+        if arguments.rate > 0:
+            arguments.duration = arguments.samples / arguments.rate
+    if not arguments.raw and not arguments.recover:
+        # Always: what a crash leaves is there.
+        arguments.raw = str(Path(arguments.out).with_suffix(".raw"))
+
+
 def _stage(arguments: argparse.Namespace) -> int:
     """Acquire one record of a campaign, or its caliper run."""
-    from pathlib import Path
-
     from pendpipe.commands._campaign import load
     from pendpipe.commands._compiled import start_numba
 
@@ -110,12 +142,15 @@ def _real(arguments: argparse.Namespace, progress: ProgressLine) -> Recording:
     return record(
         arguments.port,
         arguments.model or identify(arguments.port).model,
-        channels=(arguments.channel,),
+        channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
         raw_path=arguments.raw,
         volts_per_radian=arguments.volts_per_radian,
         progress=progress,
+        range_volts=arguments.range_volts,
+        until_noise=arguments.until_noise,
+        reconnect_s=arguments.reconnect,
     )
 
 
@@ -135,13 +170,16 @@ def _simulated(arguments: argparse.Namespace, progress: ProgressLine) -> Recordi
     return acquire_simulated(
         kind,
         _default_signal(arguments.seed, arguments.volts_per_radian or 3.85),
-        channels=(arguments.channel,),
+        channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
         clock_scale=arguments.clock_scale,
         raw_path=arguments.raw,
         volts_per_radian=arguments.volts_per_radian or 3.85,
         progress=progress,
+        range_volts=arguments.range_volts,
+        until_noise=arguments.until_noise,
+        reconnect_s=arguments.reconnect,
     )
 
 

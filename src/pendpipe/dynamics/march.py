@@ -32,10 +32,13 @@ if TYPE_CHECKING:
 
 @kernel
 def sticks(shape: FloatArray, y: float) -> bool:
-    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y."""
+    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y.
+
+    So it does, for all that could ever matter, below 1e-120 rad, where squares soon underflow.
+    """
     m, h, q = shape[0], shape[1], shape[2]
     # The friction less the restoring torque is q (y - m)(y - larger root).
-    return bool(y <= m or q * (y + m) >= 1.0 - h)
+    return bool(y <= m or q * (y + m) >= 1.0 - h or y < 1e-120)
 
 
 @part

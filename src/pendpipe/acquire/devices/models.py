@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from pendpipe.acquire.devices.dialect import Dialect
 from pendpipe.acquire.devices.di149 import SimulatedDI149, SimulatedDI155
 from pendpipe.acquire.devices.di154rs import SimulatedDI154RS, SimulatedDI194RS
 from pendpipe.acquire.devices.di245 import SimulatedDI245
@@ -16,6 +15,7 @@ from pendpipe.acquire.devices.di2108 import (
     SimulatedDI2108,
     SimulatedDI4108,
 )
+from pendpipe.acquire.devices.dialect import Dialect
 
 DEVICES: Final[Mapping[str, Callable[[], Dialect]]] = {
     "di154": SimulatedDI154RS,

@@ -139,7 +139,11 @@ def _numbers(
         [a, b, c, 0.5 * period.angular_frequency / math.pi, amplitude, phase, level]
     )
     intervals = dict(
-        zip("abc", intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held), strict=True)
+        zip(
+            "abc",
+            intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held),
+            strict=True,
+        )
     )
     at_bound = [
         name for index, name in enumerate("abc")

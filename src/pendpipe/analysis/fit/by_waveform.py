@@ -126,9 +126,7 @@ def _fit(
     while True:
         stop = span.stop if used >= len(points) else _after(samples, points, used, span)
         part = slice(span.start, stop)
-        problem = Waveform(
-            samples.time_s[part], samples.values[part], points.noise_rms_rad, parts
-        )
+        problem = Waveform(samples.time_s[part], samples.values[part], points.noise_rms_rad, parts)
         minimum = minimise(
             problem.evaluate, value, waveform.BOUNDS, held=held, chi2_only=problem.chi2
         )
@@ -173,7 +171,11 @@ def _numbers(
          value[waveform.OFFSET]]
     )  # fmt: skip
     intervals = dict(
-        zip("abc", intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held), strict=True)
+        zip(
+            "abc",
+            intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held),
+            strict=True,
+        )
     )
     at_bound = [
         name for index, name in enumerate("abc") if index not in held and value[index] <= 0.0

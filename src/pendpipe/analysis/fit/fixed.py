@@ -28,7 +28,9 @@ def parse_fixed(words: Iterable[str]) -> dict[str, float]:
         name, equals, text = word.partition("=")
         if not equals or name not in NAMES:
             raise InputError(
-                f"--fix {word}", "this names no parameter", f"use NAME=VALUE, NAME of {', '.join(NAMES)}"
+                f"--fix {word}",
+                "this names no parameter",
+                f"use NAME=VALUE, NAME of {', '.join(NAMES)}",
             )
         try:
             value = float(text)

@@ -96,6 +96,4 @@ def minimise(
 def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
     """The quadratic about a point a step further."""
     chi2 = quadratic.chi2 - 2.0 * quadratic.gradient @ step + step @ quadratic.normal @ step
-    return Quadratic(
-        float(chi2), quadratic.gradient - quadratic.normal @ step, quadratic.normal
-    )
+    return Quadratic(float(chi2), quadratic.gradient - quadratic.normal @ step, quadratic.normal)

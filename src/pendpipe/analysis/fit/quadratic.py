@@ -39,9 +39,7 @@ class Bounds(NamedTuple):
 
     def walls(self, free: Sequence[int]) -> list[tuple[int, float]]:
         """The finite bounds of the free entries: index and value."""
-        return [
-            (j, float(side[j])) for j in free for side in self if math.isfinite(side[j])
-        ]
+        return [(j, float(side[j])) for j in free for side in self if math.isfinite(side[j])]
 
     def distance(self, value: FloatArray) -> FloatArray:
         """How far each entry is from its nearer bound."""

@@ -118,9 +118,7 @@ class FitResult:
         return cls(
             method=content["method"],
             baseline=content["baseline"],
-            parameters={
-                name: _estimate(entry) for name, entry in content["parameters"].items()
-            },
+            parameters={name: _estimate(entry) for name, entry in content["parameters"].items()},
             quality_factor_limit=None if limit["value"] is None else _estimate(limit),
             covariance_order=tuple(covariance["order"]),
             covariance=np.array(covariance["matrix"], dtype=np.float64),

@@ -92,9 +92,7 @@ def _sure_part(
         count = max(4, int(0.7 * count))
         part = points.first(count)
         period = fit_period(part, amplitudes[:count], *rates)
-        late = _lateness(
-            part, amplitudes[:count], rates, period.angular_frequency, period.time_s
-        )
+        late = _lateness(part, amplitudes[:count], rates, period.angular_frequency, period.time_s)
         if np.max(np.abs(late)) < 0.5 * _SURE:
             break
     return count

@@ -16,7 +16,12 @@ from pendpipe.analysis.turning_points.level import Level, estimate_level
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
 from pendpipe.analysis.turning_points.samples import Samples, prepare
-from pendpipe.analysis.turning_points.shape import LossRates, half_cycle_shape, loss_rates, shape_error
+from pendpipe.analysis.turning_points.shape import (
+    LossRates,
+    half_cycle_shape,
+    loss_rates,
+    shape_error,
+)
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError
@@ -195,7 +200,9 @@ def _finish(state: _State, keep: BoolArray) -> TurningPoints:
     )
 
 
-def _late(amplitude: FloatArray, sine: FloatArray, sd: FloatArray, sine_sd: FloatArray) -> FloatArray:
+def _late(
+    amplitude: FloatArray, sine: FloatArray, sd: FloatArray, sine_sd: FloatArray
+) -> FloatArray:
     """What a small error of phase has taken off the amplitude; unbiased by the noise."""
     strong = amplitude > 5.0 * sd
     lost = (sine**2 - sine_sd**2) / (2.0 * np.where(strong, amplitude, 1.0))

@@ -14,9 +14,7 @@ HARMONICS = 3
 
 
 @njit(cache=True)
-def extremes(
-    values: FloatArray, stride: int, start: float, least: float
-) -> tuple[IntArray, int]:
+def extremes(values: FloatArray, stride: int, start: float, least: float) -> tuple[IntArray, int]:
     """Find alternating extremes: each is followed by a return of at least a threshold.
 
     Parameters

@@ -21,9 +21,7 @@ class Level(NamedTuple):
     wanders: bool
 
 
-def estimate_level(
-    information: FloatArray, score: FloatArray, noise: float, start: float
-) -> Level:
+def estimate_level(information: FloatArray, score: FloatArray, noise: float, start: float) -> Level:
     """Estimate the level from what each half cycle says of it beside its own amplitude.
 
     A half cycle alone hardly tells its level from its amplitude (they correlate by 0.9):
@@ -44,9 +42,7 @@ def estimate_level(
     mean = float(score.sum()) / total
     own = score / information
     sd = noise / math.sqrt(total)
-    constant = Level(
-        np.full(len(score), start + mean), np.full(len(score), sd), wanders=False
-    )
+    constant = Level(np.full(len(score), start + mean), np.full(len(score), sd), wanders=False)
     if len(score) < 3 * _WINDOWS[0]:
         return constant
     # Neighbours average out the even errors of opposite half cycles (harmonics, decay).

@@ -37,8 +37,6 @@ def measure_recording(
     points = find_turning_points(part, place)
     notes = (*decay.notes, *points.notes)
     cuts = tuple(Cut(cut.start_s, cut.stop_s, cut.reason) for cut in decay.cuts)
-    metadata = {
-        key: str(value) for key, value in (provenance or {}).items() if value is not None
-    }
+    metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}
     metadata = {**points.metadata, **metadata}
     return replace(points, cuts=cuts, metadata=metadata, notes=notes), part

@@ -1,0 +1,223 @@
+"""Eq. 8 on all readings: as precise as the readings allow, and honest about it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe import cli
+from pendpipe.analysis.fit import FitResult, fit_recording
+from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
+from pendpipe.errors import InputError
+from pendpipe.files import finite
+from pendpipe.recording import Recording, write_plain
+
+OMEGA = 2.0 * math.pi * 0.516
+FIG_8 = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
+START = Release(-0.3, 0.068, 0.003)
+TIME = np.arange(8192) * (300.0 / 8192)
+TRUTH = {"a": 0.45, "b": 0.01192, "c": 1.4e-6, "frequency": 0.516, "offset": 0.003}
+
+
+def noisy(values: FloatArray, rms: float = 1e-4, seed: int = 1) -> FloatArray:
+    return np.asarray(values + rms * np.random.default_rng(seed).standard_normal(len(values)))
+
+
+def fitted(model: Eq8 = FIG_8, seed: int = 1, rms: float = 1e-4, **options: object) -> FitResult:
+    recording = Recording(TIME, noisy(sample(model, START, TIME), rms, seed), "angle_rad")
+    return fit_recording(recording, **options)  # type: ignore[arg-type]
+
+
+def pulls(result: FitResult, truth: dict[str, float]) -> dict[str, float]:
+    return {
+        name: (result.value(name) - value) / result.parameters[name].sd
+        for name, value in truth.items()
+    }
+
+
+def test_pulls_are_standard_and_intervals_cover() -> None:
+    found = [fitted(seed=seed) for seed in range(60)]
+    pull = np.array([list(pulls(result, TRUTH).values()) for result in found])
+    assert np.all(np.abs(pull.mean(axis=0)) < 3.5 / math.sqrt(60))
+    # The share of b is told only in part, so that the frequency's sd errs upwards.
+    assert np.all(np.abs(pull.std(axis=0)[[0, 1, 2, 4]] - 1.0) < 3.5 / math.sqrt(120))
+    assert pull.std(axis=0)[3] < 1.3
+    for name in "abc":
+        ends = [result.parameters[name].interval95 or (0.0, 0.0) for result in found]
+        assert sum(low <= TRUTH[name] <= high for low, high in ends) >= 51
+
+
+def test_the_stated_precision_is_the_cramer_rao_bound() -> None:
+    """Fisher's information of the readings, with b's share known and with it free."""
+    result = fitted()
+    jacobian = sample_with_jacobian(FIG_8, START, TIME)[1]
+    known = sample_with_jacobian(FIG_8, START, TIME, hysteretic_share=0.5)[1]
+    rms = result.noise_rms_rad
+    free = rms * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    bound = rms * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))
+    assert result.parameters["a"].sd == pytest.approx(bound[0], rel=0.02)
+    assert result.parameters["b"].sd == pytest.approx(bound[1], rel=0.02)
+    assert result.parameters["c"].sd == pytest.approx(bound[2], rel=0.04)
+    assert free[0] == pytest.approx(bound[0], rel=0.01)
+    limit = result.quality_factor_limit
+    assert limit is not None
+    assert limit.sd / limit.value == pytest.approx(bound[1] / 0.01192, rel=0.02)
+
+
+def test_amplitude_and_phase_are_those_of_the_first_turning_point_kept() -> None:
+    result = fitted(rms=1e-7)
+    truth = turning_points(FIG_8, START, count=2)
+    assert result.value("amplitude") == pytest.approx(abs(truth.angle_rad[1] - 0.003), rel=1e-5)
+    phase = OMEGA * (0.0 - truth.time_s[1]) + math.pi
+    assert math.remainder(result.value("phase") - phase, 2 * math.pi) == pytest.approx(
+        0.0, abs=5.0 * result.parameters["phase"].sd + 1e-6
+    )
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_the_frequency_is_eq_8s_at_low_q(share: float) -> None:
+    """Viscous damping at Q = 10 slows the swing by 0.125 %, hysteretic by 0.31 %."""
+    b = OMEGA / 20.0
+    model = Eq8(OMEGA, hysteretic=share * b, viscous=(1.0 - share) * b)
+    time = np.arange(3000) * 0.01
+    values = noisy(sample(model, Release(-0.4, 0.1), time))
+    result = fit_recording(Recording(time, values, "angle_rad"))
+    frequency = result.parameters["frequency"]
+    assert abs(frequency.value - 0.516) < 4.0 * frequency.sd
+    assert frequency.sd < 5e-4 * 0.516
+
+
+def test_hysteretic_and_viscous_are_told_apart_only_where_the_readings_do() -> None:
+    quiet, loud = fitted(rms=1e-5), fitted(rms=1e-3)
+    hysteretic = quiet.quality_factor_hysteretic
+    assert hysteretic is not None
+    assert abs(hysteretic.value - OMEGA / 2 / 0.00596) < 4.0 * hysteretic.sd
+    assert any("given Eq. 8's form" in warning for warning in quiet.warnings)
+    assert loud.quality_factor_hysteretic is None
+    assert loud.quality_factor_viscous is None
+
+
+def test_an_absent_loss_stays_at_its_bound() -> None:
+    model = Eq8(OMEGA, quadratic=0.45, viscous=0.0119)
+    results = [fitted(model, seed) for seed in range(12)]
+    at_bound = [result.parameters["c"].at_bound for result in results]
+    assert 1 <= sum(at_bound) <= 11
+    for result in results:
+        low, high = result.parameters["c"].interval95 or (math.nan, math.nan)
+        assert low >= 0.0
+        assert 0.0 < high < 6.0 * result.parameters["c"].sd
+
+
+def test_rounding_of_a_converter_is_noise() -> None:
+    step = 1.27e-3
+    values = np.round(noisy(sample(FIG_8, START, TIME), 6e-4) / step) * step
+    result = fit_recording(Recording(TIME, values, "angle_rad", resolution=step))
+    assert result.noise_rms_rad == pytest.approx(math.hypot(6e-4, step / math.sqrt(12)), rel=0.05)
+    assert all(abs(pull) < 4.5 for pull in pulls(result, TRUTH).values())
+
+
+def test_slow_noise_widens_the_errors() -> None:
+    """A wobble at the motion's own frequency hides from differences, not from half cycles."""
+    rng = np.random.default_rng(7)
+    steps = rng.standard_normal(150)
+    slow = np.interp(TIME, np.linspace(0.0, 300.0, 150), steps)
+    values = noisy(sample(FIG_8, START, TIME)) + 3e-4 * slow * np.cos(OMEGA * TIME)
+    result, clean = fit_recording(Recording(TIME, values, "angle_rad")), fitted()
+    assert result.parameters["a"].sd > 3.0 * clean.parameters["a"].sd
+    assert any("see pendpipe diagnose" in warning for warning in result.warnings)
+    assert not any("see pendpipe diagnose" in warning for warning in clean.warnings)
+
+
+def test_a_prediction_is_compared_not_fitted() -> None:
+    result = fitted(fixed={"a": 0.45, "b": 0.0125, "c": 1.4e-6})
+    assert [result.value(name) for name in "abc"] == [0.45, 0.0125, 1.4e-6]
+    assert result.parameters["b"].sd == 0.0
+    assert result.residual_rms_rad > 1.5 * result.noise_rms_rad
+    right = fitted(
+        fixed={"amplitude": float(abs(turning_points(FIG_8, START, count=2).angle_rad[1])) + 0.003}
+    )
+    assert right.chi2_per_dof == pytest.approx(1.0, abs=0.1)
+    assert right.parameters["amplitude"].sd == 0.0
+
+
+def test_held_quality_factors_make_b() -> None:
+    result = fitted(fixed={"quality_factor_hysteretic": 272.0, "quality_factor_viscous": 272.0})
+    assert result.value("b") == pytest.approx(math.pi * 0.516 * 2 / 272.0, rel=1e-3)
+    one = fitted(fixed={"quality_factor_hysteretic": 272.0})
+    assert abs(one.value("b") - 0.01192) < 4.0 * one.parameters["b"].sd
+
+
+def test_the_viscous_baseline_has_one_loss() -> None:
+    result = fitted(Eq8(OMEGA, viscous=0.0119), baseline="viscous")
+    assert result.baseline == "viscous"
+    assert result.value("a") == result.value("c") == 0.0
+    assert abs(result.value("b") - 0.0119) < 4.0 * result.parameters["b"].sd
+
+
+def test_both_methods_agree() -> None:
+    waveform, points = fitted(), fitted(method="turning-points")
+    for name in "abc":
+        sd = waveform.parameters[name].sd
+        assert points.parameters[name].sd == pytest.approx(sd, rel=0.05)
+        assert abs(points.value(name) - waveform.value(name)) < 0.6 * sd
+
+
+def test_fit_json_is_read_as_it_was_written() -> None:
+    result = fitted()
+    content = json.loads(json.dumps(finite(result.as_json())))
+    again = FitResult.from_json(content)
+    assert finite(again.as_json()) == content
+    assert set(content) == {
+        "schema_version", "method", "baseline", "parameters", "quality_factor_limit",
+        "quality_factor_hysteretic", "quality_factor_viscous", "covariance", "noise_rms_rad",
+        "residual_rms_rad", "chi2_per_dof", "samples", "turning_points", "cuts", "provenance",
+        "warnings",
+    }  # fmt: skip
+    sd = [content["parameters"][name]["sd"] for name in content["covariance"]["order"]]
+    assert np.sqrt(np.diag(content["covariance"]["matrix"])) == pytest.approx(sd)
+
+
+@pytest.mark.parametrize("word", ["q=3", "b", "b=red", "b=-1", "frequency=0"])
+def test_a_wrong_fix_is_refused(word: str) -> None:
+    with pytest.raises(InputError, match="--fix"):
+        parse_fixed([word])
+
+
+def test_b_and_its_parts_are_not_held_together() -> None:
+    with pytest.raises(InputError, match="both held"):
+        parse_fixed(["b=0.01", "quality_factor_viscous=200"])
+
+
+def test_the_commands_write_what_the_contract_asks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, points, out = (tmp_path / name for name in ("r.csv", "tp.csv", "fit.json"))
+    volts = 3.85 * noisy(sample(FIG_8, START, TIME))
+    write_plain(recording, Recording(TIME, volts, "volts", metadata={"volts_per_radian": "3.85"}))
+    assert cli.main(["turning-points", str(recording), "--out", str(points)]) == 0
+    call = ["fit", str(recording), "--turning-points", str(points), "--out", str(out)]
+    assert cli.main([*call, "--seed", "5"]) == 0
+    assert "quality_factor_limit" in capsys.readouterr().out
+    content = json.loads(out.read_text())
+    assert content["provenance"]["volts_per_radian"] == 3.85
+    assert content["provenance"]["seed"] == 5
+    assert len(content["provenance"]["input_sha256"]) == 64
+    assert content["parameters"]["a"]["unit"] == "1/(rad s)"
+    assert cli.main(["fit", str(recording), "--method", "turning-points", "--out", str(out)]) == 0
+    assert json.loads(out.read_text())["method"] == "turning-points"
+
+
+def test_a_dead_channel_is_one_line_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = tmp_path / "dead.csv"
+    write_plain(recording, Recording(TIME, np.zeros(len(TIME)), "angle_rad"))
+    assert cli.main(["fit", str(recording), "--out", str(tmp_path / "f.json")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "f.json").exists()
