@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.optimize import minimize
 
-from pendpipe.analysis.fit.quadratic import Bounds, bounded_step, covariance, intervals95
+from pendpipe.analysis.fit.intervals import intervals95
+from pendpipe.analysis.fit.quadratic import Bounds, bounded_step, covariance
 
 HALF_95 = 1.959963984540054
 ENTRY = st.floats(-2.0, 2.0)
@@ -58,7 +59,7 @@ def test_at_the_bound_the_slope_shortens_the_interval() -> None:
 
 
 def test_intervals_cover_the_truth_on_the_bound() -> None:
-    """c = 0 in truth, correlated with b: at least 95 % of the intervals hold both."""
+    """In truth c = 0, correlated with b: at least 95 % of the intervals hold both."""
     rng = np.random.default_rng(5)
     normal = np.array([[1.0, 0.8], [0.8, 1.0]])
     root = np.linalg.cholesky(normal)

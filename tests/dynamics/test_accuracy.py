@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
@@ -97,8 +97,8 @@ def test_forty_half_cycles_of_any_pendulum_agree_with_heyoka(drawn: tuple[Eq8, f
 @given(
     st.floats(1.001, 45.0), st.floats(0.0, 0.15), st.floats(0.0, 0.15), st.floats(0.0, 0.1)
 )  # fmt: skip
-@example(3.0, 0.0, 0.0, 0.0)
-@example(1.0000001, 0.1, 0.1, 0.1)
+@example(3.5, 0.0, 0.0, 0.0)
+@example(1.001, 0.1, 0.1, 0.1)
 @example(21.0, 1e-3, 0.0, 0.0)
 @settings(max_examples=150, deadline=None)
 def test_to_the_stop(multiple: float, h: float, q: float, g: float) -> None:
@@ -108,9 +108,10 @@ def test_to_the_stop(multiple: float, h: float, q: float, g: float) -> None:
     first = Eq8(W, 0.0, 2 * W * h / math.pi, g * W, 2 * W * delta / math.pi)
     y = multiple * first.stop_rad
     model = Eq8(W, 2 * W * q / math.pi / y, first.hysteretic, first.viscous, first.coulomb)
-    if y < 1.0001 * model.stop_rad:
-        return
+    assume(y > 1.0001 * model.stop_rad)
     times, angles = heyoka_turning_points(model, y, 99, lambda angle: moves(model, angle))
+    # Whether it moves on from exactly the amplitude of the stop is a matter of rounding.
+    assume(np.all(np.abs(np.abs(angles) / model.stop_rad - 1.0) > 1e-8))
     for method in METHODS:
         points = turning_points(model, Release(0.0, y), method=method)
         assert points.stopped

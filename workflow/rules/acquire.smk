@@ -7,6 +7,8 @@ rule acquire:
         f"{RESULTS}/{{record}}/logs/acquire.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
         refusal=refusal,
         depends=lambda wildcards: jobs.acquisition(CAMPAIGN, wildcards.record),
@@ -14,5 +16,5 @@ rule acquire:
     message:
         "{wildcards.record}: acquire"
     shell:
-        "pendpipe acquire --campaign {CONFIGURATION} --record {wildcards.record}"
+        "pendpipe acquire --campaign {resources.configuration} --record {wildcards.record}"
         " --out {output} {params.refusal} 2> {log}"

@@ -6,6 +6,8 @@ rule caliper:
         f"{RESULTS}/calibration/logs/caliper.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
         arm=jobs.caliper_arm(CAMPAIGN),
         depends=jobs.caliper(CAMPAIGN),
@@ -14,7 +16,7 @@ rule caliper:
     message:
         "the sensor against a caliper"
     shell:
-        "pendpipe acquire --campaign {CONFIGURATION} --caliper --out {output.table} 2> {log}"
+        "pendpipe acquire --campaign {resources.configuration} --caliper --out {output.table} 2> {log}"
         " && pendpipe calibrate {output.table} {params.arm} --out {output.sensor} 2>> {log}"
 
 

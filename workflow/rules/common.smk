@@ -1,8 +1,5 @@
 # What the rules share: the checked configuration, and names. No rule, no physics.
-import os
 import re
-import sys
-from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
@@ -11,13 +8,7 @@ from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
 from pendpipe.provenance import code_version
 
-# The jobs find `pendpipe` beside the Python that runs Snakemake, activated or not, and
-# leave threads to Snakemake, which runs them side by side.
-os.environ["PATH"] = os.pathsep.join(
-    [str(Path(sys.executable).parent), os.environ["PATH"]]
-)
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+jobs.prepare_environment()
 
 
 def checked_campaign():
@@ -34,6 +25,8 @@ RESULTS = CAMPAIGN.configuration.results
 RECORDS = [record.record for record in CAMPAIGN.records]
 FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
+# The rules hand it on as a resource: unlike a parameter, that is nothing to rerun for. What
+# a rule takes from the configuration is digested in its own parameters.
 CONFIGURATION = jobs.store(config, ".snakemake/pendpipe")
 
 

@@ -9,11 +9,13 @@ rule compare:
         f"{RESULTS}/logs/compare.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
         code=code_version("pendpipe.commands.compare"),
     message:
         "the losses beside Eq. 16"
     shell:
-        "pendpipe compare --campaign {CONFIGURATION} --separation {input.separation}"
+        "pendpipe compare --campaign {resources.configuration} --separation {input.separation}"
         " --out {output.comparison} --summary {output.campaign} 2> {log}"

@@ -16,10 +16,13 @@ rule figures:
         f"{RESULTS}/logs/figures.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
+        folder=subpath(output.drawn, parent=True),
         code=code_version("pendpipe.commands.figures"),
     message:
         "figures 3 to 10"
     shell:
-        "pendpipe figures --campaign {CONFIGURATION} --comparison {input.comparison}"
-        " --out {RESULTS}/figures 2> {log}"
+        "pendpipe figures --campaign {resources.configuration} --comparison {input.comparison}"
+        " --out {params.folder} 2> {log}"

@@ -13,10 +13,12 @@ rule report:
         f"{RESULTS}/logs/report.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
         code=code_version("pendpipe.commands.report"),
     message:
         "the page about the campaign"
     shell:
-        "pendpipe report --campaign {CONFIGURATION} --comparison {input.comparison}"
+        "pendpipe report --campaign {resources.configuration} --comparison {input.comparison}"
         " --summary {input.campaign} --out {output} 2> {log}"

@@ -7,10 +7,12 @@ rule separate:
         f"{RESULTS}/logs/separate.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
         code=code_version("pendpipe.commands.separate"),
     message:
         "hysteretic and viscous losses"
     shell:
-        "pendpipe separate --campaign {CONFIGURATION} --out {output} 2> {log}"
+        "pendpipe separate --campaign {resources.configuration} --out {output} 2> {log}"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +13,18 @@ from typing import Any
 
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import replaced
+
+
+def prepare_environment() -> None:
+    """Let the jobs find `pendpipe`, and leave threads to Snakemake.
+
+    The command stands beside the Python that runs Snakemake, whether its environment is
+    activated or not; Snakemake runs the jobs side by side, so each keeps to one thread.
+    """
+    folder = str(Path(sys.executable).parent)
+    os.environ["PATH"] = os.pathsep.join([folder, os.environ.get("PATH", "")])
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
 
 
 def digest(content: Any) -> str:

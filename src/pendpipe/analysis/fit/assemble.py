@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.quadratic import CHI2_95
+from pendpipe.analysis.fit.intervals import CHI2_95
 from pendpipe.analysis.fit.result import PARAMETERS, FitResult, units
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,8 +13,9 @@ from pendpipe.analysis.fit.assemble import Numbers, estimates, misfit, quality_f
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
+from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.period import Period, fit_period
-from pendpipe.analysis.fit.quadratic import covariance, intervals95
+from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -93,13 +95,16 @@ def fit_points(
         chi2_per_dof=envelope.chi2_per_dof,
         samples=points.samples,
         turning_points=len(points),
-        **{
-            f"quality_factor_{part}": Estimate(fixed[f"quality_factor_{part}"], 0.0, "")
-            for part in parts
-        },
+        quality_factor_hysteretic=_held(fixed, "quality_factor_hysteretic"),
+        quality_factor_viscous=_held(fixed, "quality_factor_viscous"),
     )
     said = [*points.notes, *warnings_of(result, stretched), *_said(envelope, period)]
-    return FitResult(**{**result.__dict__, "warnings": tuple(said)})
+    return replace(result, warnings=tuple(said))
+
+
+def _held(fixed: Mapping[str, float], name: str) -> Estimate | None:
+    """A quality factor that the user holds."""
+    return Estimate(fixed[name], 0.0, "") if name in fixed else None
 
 
 def _said(envelope: EnvelopeFit, period: Period) -> list[str]:
@@ -109,7 +114,8 @@ def _said(envelope: EnvelopeFit, period: Period) -> list[str]:
     if period.chi2_per_dof > _LATE:
         said.append(
             "the period changes along the record as Eq. 8's does not"
-            f" (chi^2 of the times is {period.chi2_per_dof:.3g} per point): the frequency is a mean"
+            f" (chi^2 of the times is {period.chi2_per_dof:.3g} per point):"
+            " the frequency is a mean"
         )
     return said
 

@@ -20,9 +20,10 @@ from pendpipe.analysis.fit.assemble import (
 )
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
-from pendpipe.analysis.fit.quadratic import covariance, intervals95
+from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
@@ -85,7 +86,7 @@ def fit_waveform(
     stretched = max(misfit(chi2_per_dof, dof), noise.slow)
     # The search weighed the readings by its own first guess of the noise.
     scale = (fitted.problem.noise_rms / noise.rms) ** 2 / stretched
-    numbers, normal = _numbers(fitted, scale, points, samples)
+    numbers, normal = _numbers(fitted, scale, samples)
     parameters = estimates(numbers, points.unit)
     result = FitResult(
         method="waveform",
@@ -139,7 +140,7 @@ def _fit(
 def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> int:
     """The reading after the `used`-th turning point."""
     found = int(np.searchsorted(samples.time_s, points.time_s[used - 1], side="right"))
-    return min(max(found, span.start + 4 * len(NAMES)), span.stop)
+    return int(min(max(found, span.start + 4 * len(NAMES)), span.stop))
 
 
 def _held(
@@ -156,9 +157,7 @@ def _held(
     return tuple(held)
 
 
-def _numbers(
-    fitted: _Fitted, scale: float, points: TurningPoints, samples: Samples
-) -> tuple[Numbers, FloatArray]:
+def _numbers(fitted: _Fitted, scale: float, samples: Samples) -> tuple[Numbers, FloatArray]:
     """The seven parameters, with covariance; and the normal matrix at the right noise."""
     value, held = fitted.minimum.value, fitted.held
     quadratic = fitted.minimum.quadratic

@@ -1,20 +1,15 @@
-"""Small quadratic problems with bounds: steps that stay inside, intervals that are honest there."""
+"""Small quadratic problems with bounds: steps that stay inside, and variances."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-
-CHI2_95: Final = 3.841458820694124
-"""95 % point of chi^2 with one degree of freedom."""
-_FAR: Final = 8.0
-"""Standard deviations from which a bound is out of sight."""
 
 
 class Bounds(NamedTuple):
@@ -77,12 +72,12 @@ def bounded_step(
             step[on] = [wall for _, wall in active]
             rest = [index for index in free if index not in on]
             block = normal[rest]
-            step[rest] = _solve(block[:, rest], gradient[rest] - block[:, on] @ step[on])
+            step[rest] = solved(block[:, rest], gradient[rest] - block[:, on] @ step[on])
             if bounds.hold(step) and _best(normal[on] @ step - gradient[on], step[on], bounds, on):
                 return bounds.clip(step)
     # Rounding has hidden the answer: the free step, put within the bounds, will do.
     step = np.zeros(len(gradient))
-    step[free] = _solve(normal[np.ix_(free, free)], gradient[free])
+    step[free] = solved(normal[np.ix_(free, free)], gradient[free])
     return bounds.clip(step)
 
 
@@ -92,7 +87,7 @@ def _best(slope: FloatArray, wall: FloatArray, bounds: Bounds, on: list[int]) ->
     return bool(np.all(np.where(upper, slope <= 0.0, slope >= 0.0)))
 
 
-def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Solve a positive definite system whose parameters differ by many orders of size."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix * scale[:, None] * scale
@@ -115,120 +110,3 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     result = np.zeros_like(normal)
     result[np.ix_(free, free)] = inverse * scale[:, None] * scale
     return result
-
-
-def intervals95(
-    value: FloatArray,
-    normal: FloatArray,
-    gradient: FloatArray,
-    bounds: Bounds,
-    indices: Sequence[int],
-    held: Sequence[int] = (),
-) -> list[tuple[float, float]]:
-    """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
-
-    Parameters
-    ----------
-    value
-        The bounded optimum, shape (n,).
-    normal, gradient
-        Of chi^2/2 there; the gradient (-d chi^2/2) is not zero at a bound that is met.
-    bounds
-        Of the parameters.
-    indices
-        The parameters whose intervals are wanted.
-    held
-        Parameters that are not fitted.
-
-    Notes
-    -----
-    chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
-    least 95 % of the cases (97.5 % with one bound), never less.
-    """
-    matrix = covariance(normal, held)
-    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    fitted = [j for j in range(len(value)) if j not in held]
-    at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))
-    result = []
-    for index in indices:
-        sd = float(deviations[index])
-        half = math.sqrt(CHI2_95) * sd
-        ends = [float(value[index]) - half, float(value[index]) + half]
-        if sd > 0.0:
-            follow = matrix[:, index] / matrix[index, index]
-            for k, step in enumerate((-half, half)):
-                if not (at_rest and bounds.hold(value + step * follow)):
-                    ends[k] = _profiled_end(
-                        value, normal, gradient, bounds, index, held, math.copysign(_FAR * sd, step)
-                    )
-        result.append((ends[0], ends[1]))
-    return result
-
-
-def _profiled_end(
-    value: FloatArray, normal: FloatArray, gradient: FloatArray, bounds: Bounds, index: int,
-    held: Sequence[int], reach: float,
-) -> float:  # fmt: skip
-    """One end of an interval that a bound takes part in."""
-    normal, gradient, bounds, value, index = _bounded_part(
-        normal, gradient, bounds, value, index, held
-    )
-
-    def rise(distance: float) -> float:
-        """Rise of chi^2 when the parameter is moved and the others follow."""
-        pulled = gradient - normal[:, index] * distance
-        step = bounded_step(normal, pulled, bounds.about(value), (index,))
-        step[index] = distance
-        return float(step @ normal @ step - 2.0 * gradient @ step)
-
-    low, high = float(bounds.lower[index]), float(bounds.upper[index])
-    reach = min(max(reach, low - float(value[index])), high - float(value[index]))
-    return float(value[index]) + _crossing(rise, reach)
-
-
-def _bounded_part(
-    normal: FloatArray, gradient: FloatArray, bounds: Bounds, value: FloatArray, index: int,
-    held: Sequence[int],
-) -> tuple[FloatArray, FloatArray, Bounds, FloatArray, int]:  # fmt: skip
-    """Eliminate what has no bounds (it follows freely), and drop what is held."""
-    free = [j for j in range(len(value)) if j not in held]
-    walled = [j for j, _ in bounds.walls(free)]
-    kept = [j for j in free if j == index or j in walled]
-    gone = [j for j in free if j not in kept]
-    block, cross = normal[np.ix_(kept, kept)], normal[np.ix_(gone, kept)]
-    if gone:
-        both = np.concatenate([cross, gradient[gone][:, None]], axis=1)
-        carried = np.stack([_solve(normal[np.ix_(gone, gone)], each) for each in both.T], axis=1)
-        block = block - cross.T @ carried[:, :-1]
-        gradient = gradient[kept] - cross.T @ carried[:, -1]
-    else:
-        gradient = gradient[kept]
-    part = Bounds(bounds.lower[kept], bounds.upper[kept])
-    return block, gradient, part, value[kept], kept.index(index)
-
-
-def _crossing(rise: Callable[[float], float], reach: float) -> float:
-    """Where the rise comes to the 95 % point between 0 and `reach`; `reach` if it does not.
-
-    By the rule of false position on its root, which is nearly a straight line.
-    """
-    goal = math.sqrt(CHI2_95)
-    low, below = 0.0, -goal
-    high, above = reach, math.sqrt(max(rise(reach), 0.0)) - goal
-    if above <= 0.0:
-        return reach
-    side = 0
-    for _ in range(40):
-        middle = low - below * (high - low) / (above - below)
-        now = math.sqrt(max(rise(middle), 0.0)) - goal
-        if abs(now) < 1e-4:
-            return middle
-        if now > 0.0:
-            high, above = middle, now
-            below *= 0.5 if side > 0 else 1.0
-            side = 1
-        else:
-            low, below = middle, now
-            above *= 0.5 if side < 0 else 1.0
-            side = -1
-    return 0.5 * (low + high)

@@ -10,6 +10,7 @@ from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.sums import HARMONICS
 from pendpipe.arrays import FloatArray
 
 _PHASE_WANTED: Final = 0.01
@@ -96,12 +97,14 @@ def follow_tail(
         if count < 1:
             return places, measured
         new = _further(places, measured, samples.noise_rms, count)
-        shape = np.zeros((count, 4 + kernels.HARMONICS))
+        shape = np.zeros((count, 4 + HARMONICS))
         tried = measure(samples, new, level, shape)
         if not _visible(tried, samples.noise_rms):
             return places, measured
-        places = Places(*map(np.concatenate, zip(places, new, strict=True)))
-        measured = Measured(*map(np.concatenate, zip(measured, tried, strict=True)))
+        places = Places._make(np.concatenate(pair) for pair in zip(places, new, strict=True))
+        measured = Measured._make(
+            np.concatenate(pair) for pair in zip(measured, tried, strict=True)
+        )
 
 
 def _visible(measured: Measured, noise: float) -> bool:

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import white_rms
-from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.measure import Measured, Places, edges, measure
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.sums import HARMONICS
 from pendpipe.arrays import BoolArray, FloatArray
 
 _CLEARLY: Final = 0.02
@@ -52,8 +52,8 @@ def odd_harmonics(
     before = _misfit(measured)
     if before < (1.0 + _CLEARLY) * noise**2 and not _expected(samples, measured, noise):
         return shape, measured, places
-    count = float(np.nansum(measured.count))
-    for free in range(1, kernels.HARMONICS + 1):
+    count = float(np.nansum(measured.readings))
+    for free in range(1, HARMONICS + 1):
         amplitude = measured.amplitude
         tried = measure(samples, places, level, shape, free=free, amplitude=amplitude)
         longer = shape.copy()
@@ -84,15 +84,15 @@ def _narrowed(
     """Replace the half cycles that no shape fits by fits of their middle halves."""
     bare = shape.copy()
     bare[:, 4:] = 0.0
-    options = {"window": _NARROW, "free": 1, "amplitude": measured.amplitude}
-    first = measure(samples, places, level, bare, **options)
+    known = measured.amplitude
+    first = measure(samples, places, level, bare, window=_NARROW, free=1, amplitude=known)
     # Where the wave turns: the curvature there is that of both harmonics.
     curvature = first.amplitude + 9.0 * first.harmonics[:, 0]
     late = np.where(curvature > 0.1 * first.amplitude, first.sine / curvature, 0.0)
     late = np.nan_to_num(np.clip(late, -0.5, 0.5))
     moved = places._replace(centre_s=places.centre_s + late / places.angular_frequency)
-    middle = measure(samples, moved, level, bare, **options)
-    poor = _even_misfit(samples, places, level, shape, measured, noise) & (middle.count > 8)
+    middle = measure(samples, moved, level, bare, window=_NARROW, free=1, amplitude=known)
+    poor = _even_misfit(samples, places, level, shape, measured, noise) & (middle.readings > 8)
     if not poor.any():
         return shape, measured, places
     # What even the middle half does not fit counts as error, not as precision.
@@ -119,7 +119,7 @@ def _level_of_peaks(
     places: Places, middle: Measured, enlarged: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """What neighbouring peaks say of the level, (p + 2 p' + p'')/4, whatever the wave's form."""
-    seen = np.isfinite(middle.peak[:, 0]) & (middle.count > 8)
+    seen = np.isfinite(middle.peak[:, 0]) & (middle.readings > 8)
     peak = np.where(seen, middle.peak[:, 0], 0.0) * places.side
     level = np.convolve(peak, [0.25, 0.5, 0.25], "same")
     between = np.convolve(seen.astype(np.float64), np.ones(3), "same") > 2.5
@@ -138,7 +138,7 @@ def _even_misfit(
     Odd terms (of the unknown share of b) do no harm to the amplitude and are not asked for.
     """
     freer = measure(samples, places, level, shape, free=2, amplitude=measured.amplitude)
-    known = np.isfinite(freer.amplitude) & (freer.count > 8)
+    known = np.isfinite(freer.amplitude) & (freer.readings > 8)
     gain = np.where(known, own_square(measured) - own_square(freer), 0.0) / noise**2
     total, half_cycles = _around(gain), np.maximum(_around(known.astype(np.float64)), 1.0)
     return np.asarray(total > 2.0 * half_cycles + 5.0 * np.sqrt(4.0 * half_cycles))
@@ -152,9 +152,9 @@ def _around(values: FloatArray) -> FloatArray:
 
 def _ratio(measured: Measured, noise: FloatArray) -> FloatArray:
     """Misfit of half cycles over the noise's, with that of their neighbours."""
-    known = np.isfinite(measured.amplitude) & (measured.count > 4)
+    known = np.isfinite(measured.amplitude) & (measured.readings > 4)
     square = np.where(known, own_square(measured), 0.0) / noise**2
-    freedom = np.where(known, np.maximum(measured.count - 3.0, 1.0), 0.0)
+    freedom = np.where(known, np.maximum(measured.readings - 3.0, 1.0), 0.0)
     return _around(square) / np.maximum(_around(freedom), 1.0)
 
 
@@ -173,9 +173,9 @@ def _white(samples: Samples, places: Places) -> float:
 
 def _misfit(measured: Measured) -> float:
     """Mean square of the readings about the fitted half cycles, each at its own level."""
-    known = np.isfinite(measured.amplitude) & (measured.count > 8)
+    known = np.isfinite(measured.amplitude) & (measured.readings > 8)
     square = own_square(measured)[known]
-    freedom = (measured.count - measured.harmonics.shape[1] - 3)[known]
+    freedom = (measured.readings - measured.harmonics.shape[1] - 3)[known]
     return float(np.sum(square) / max(float(np.sum(freedom)), 1.0))
 
 

@@ -121,4 +121,5 @@ def _box(column: FloatArray, window: int) -> FloatArray:
     """Sum over the neighbours within `window` of each entry (fewer at the ends)."""
     running = np.concatenate([[0.0], np.cumsum(column)])
     k = np.arange(len(column))
-    return running[np.minimum(k + window + 1, len(column))] - running[np.maximum(k - window, 0)]
+    upper, lower = np.minimum(k + window + 1, len(column)), np.maximum(k - window, 0)
+    return np.asarray(running[upper] - running[lower])

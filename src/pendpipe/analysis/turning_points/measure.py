@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import kernels
+from pendpipe.analysis.turning_points import sums
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
@@ -54,7 +54,8 @@ class Measured(NamedTuple):
     information: FloatArray
     score: FloatArray
     residual_square: FloatArray
-    count: FloatArray
+    readings: FloatArray
+    """How many there are."""
     coverage: FloatArray
     """Sum of the squared shape over the readings: what the amplitude rests on."""
     lopsided: BoolArray
@@ -132,16 +133,16 @@ def measure(
         places.centre_s, places.angular_frequency, level, shape,
     )  # fmt: skip
     if free or shape[:, 4:].any():
-        gram, right, square = kernels.half_cycle_sums(*arguments, free)
+        gram, right, square = sums.half_cycle_sums(*arguments, free)
     else:
-        gram, right, square = kernels.plain_sums(*arguments)
+        gram, right, square = sums.plain_sums(*arguments)
     prior = np.zeros(number)
     lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:
         size = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (size * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(lopsided, held, 0.0)
-    solution, inverse = kernels.solve_half_cycles(gram, right, prior)
+    solution, inverse = sums.solve_half_cycles(gram, right, prior)
     flat = gram[:, 1:, 0]
     best = solution[:, :, 0]
     return Measured(
@@ -155,7 +156,7 @@ def measure(
         information=gram[:, 0, 0] - np.sum(flat * solution[:, :, 1], axis=1),
         score=right[:, 0] - np.sum(flat * best, axis=1),
         residual_square=square - np.sum(best * right[:, 1:], axis=1),
-        count=gram[:, 0, 0],
+        readings=gram[:, 0, 0],
         coverage=gram[:, 1, 1],
         lopsided=lopsided,
         single=np.zeros(number, dtype=bool),

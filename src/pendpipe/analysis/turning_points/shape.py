@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.kernels import HARMONICS
+from pendpipe.analysis.turning_points.sums import HARMONICS
 from pendpipe.arrays import FloatArray
 
 HALF_PI = 0.5 * np.pi
@@ -36,7 +36,7 @@ class LossRates(NamedTuple):
 def half_cycle_shape(
     amplitude: FloatArray, angular_frequency: FloatArray, rates: LossRates
 ) -> FloatArray:
-    """Coefficients of the half cycles' shapes, for `kernels.half_cycle_sums`.
+    """Coefficients of the half cycles' shapes, for `sums.half_cycle_sums`.
 
     Parameters
     ----------

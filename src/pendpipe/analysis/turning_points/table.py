@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
 
@@ -97,12 +98,16 @@ class TurningPoints:
     def side(self) -> FloatArray:
         """+1 for the half cycles above the level, -1 for those below; shape (k,)."""
         alternating = 1.0 - 2.0 * ((self.half_cycle - self.half_cycle[0]) % 2)
-        return np.copysign(alternating, alternating * float(np.sum(alternating * self.angle_rad)))
+        first = float(np.sum(alternating * self.angle_rad))
+        return np.asarray(alternating * math.copysign(1.0, first))
 
     def first(self, count: int) -> TurningPoints:
         """The first `count` of them."""
-        names = ("half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad")
-        return replace(self, **{name: getattr(self, name)[:count] for name in names})
+        return self.chosen(np.arange(len(self)) < count)
+
+    def chosen(self, keep: BoolArray) -> TurningPoints:
+        """Some of them, with all that they share."""
+        return replace(self, **{name: getattr(self, name)[keep] for name in COLUMNS})
 
     def covariance(self) -> FloatArray:
         """Covariance of the signed angles, shape (k, k): independent and shared parts."""
@@ -168,8 +173,17 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     metadata.pop("frequency_hz", None)
     return TurningPoints(
         table[:, 0].astype(np.int64),
-        *(np.ascontiguousarray(table[:, j]) for j in range(1, len(COLUMNS))),
-        **numbers,
+        table[:, 1].copy(),
+        table[:, 2].copy(),
+        table[:, 3].copy(),
+        table[:, 4].copy(),
+        table[:, 5].copy(),
+        level_sd_rad=numbers["level_sd_rad"],
+        level_coupling=numbers["level_coupling"],
+        noise_rms_rad=numbers["noise_rms_rad"],
+        step_rad=numbers["step_rad"],
+        start_s=numbers["start_s"],
+        stop_s=numbers["stop_s"],
         samples=int(metadata.pop("samples", "0")),
         unit=metadata.pop("unit", "rad"),
         wanders=metadata.pop("level", "constant") == "wanders",

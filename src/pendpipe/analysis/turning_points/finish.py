@@ -1,0 +1,124 @@
+"""From measured half cycles to the table: which are kept, and with what errors."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.level import Level, estimate_level
+from pendpipe.analysis.turning_points.measure import Measured, Places
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.shape import LossRates, shape_error
+from pendpipe.analysis.turning_points.table import TurningPoints
+from pendpipe.arrays import BoolArray, FloatArray
+
+_LEAST_SHARE: Final = 0.3
+"""Of the readings that its neighbours have; a half cycle with fewer is not kept."""
+_SEEN: Final = 3.0
+"""Standard deviations by which the last half cycle must stand out, with its neighbours."""
+
+
+class State(NamedTuple):
+    """All that is known before the table is made."""
+
+    samples: Samples
+    places: Places
+    measured: Measured
+    shape: FloatArray
+    rates: LossRates
+    start: float
+    """The level that the half cycles were measured at."""
+
+
+def finished(state: State, keep: BoolArray) -> TurningPoints:
+    """Put level, amplitude and time together."""
+    samples, places, measured = state.samples, state.places, state.measured
+    noise = samples.noise_rms
+    level = estimate_level(measured.information[keep], measured.score[keep], noise, state.start)
+    side, rate = places.side[keep], places.angular_frequency[keep]
+    coupling, sine = measured.coupling[keep], measured.sine[keep]
+    amplitude = measured.amplitude[keep] - side * coupling * (level.value - state.start)
+    sd = noise * np.sqrt(measured.variance[keep])
+    sine_sd = noise * np.sqrt(measured.sine_variance[keep])
+    height = 1.0 + state.shape[keep, 4:].sum(axis=1)
+    turned = (amplitude + _late(amplitude, sine, sd, sine_sd)) * height
+    clear = np.maximum(np.abs(amplitude), sd)
+    relative, phase = shape_error(clear, rate, state.rates)
+    # A period that changes from one half cycle to the next skews the wave about its turning.
+    skew = np.where(measured.single | measured.lopsided, places.unsteady_phase, 0.0)[keep]
+    relative, phase = np.hypot(relative, 0.1 * skew**2), np.hypot(phase, 0.1 * skew**2)
+    return TurningPoints(
+        half_cycle=places.number[keep] - places.number[keep][0],
+        time_s=places.centre_s[keep] + measured.phase(noise)[keep] / rate,
+        time_sd_s=np.hypot(np.minimum(sine_sd / clear, 1.0), phase) / rate,
+        angle_rad=side * turned,
+        angle_sd_rad=np.hypot(sd * height, relative * clear),
+        level_rad=level.value,
+        level_sd_rad=float(np.mean(level.sd)),
+        level_coupling=float(np.mean(coupling * height)),
+        noise_rms_rad=noise,
+        step_rad=samples.step or 0.0,
+        start_s=float(samples.time_s[0]),
+        stop_s=float(samples.time_s[-1]),
+        samples=len(samples),
+        unit=samples.unit,
+        wanders=level.wanders,
+        notes=_notes(samples, keep, level),
+    )
+
+
+def _late(
+    amplitude: FloatArray, sine: FloatArray, sd: FloatArray, sine_sd: FloatArray
+) -> FloatArray:
+    """What a small error of phase has taken off the amplitude; unbiased by the noise."""
+    strong = amplitude > 5.0 * sd
+    lost = (sine**2 - sine_sd**2) / (2.0 * np.where(strong, amplitude, 1.0))
+    return np.where(strong, lost, 0.0)
+
+
+def kept(state: State) -> BoolArray:
+    """Half cycles that hold enough readings, and whose turning lies among the readings.
+
+    A record that ends at rest ends here with the last half cycle that is seen.
+    """
+    samples, places, measured = state.samples, state.places, state.measured
+    turning = places.centre_s
+    slack = 0.02 * places.half_period_s
+    inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
+    keep = inside & (measured.coverage > _LEAST_SHARE * _usual(measured.coverage))
+    keep[last_seen(measured, samples.noise_rms) + 1 :] = False
+    return np.asarray(keep)
+
+
+def last_seen(measured: Measured, noise: float) -> int:
+    """The last half cycle that stands out of the noise, with its neighbours; -1 if none.
+
+    Neighbours are on opposite sides: together they cancel an error of the level.
+    """
+    amplitude = np.nan_to_num(measured.amplitude)
+    around = np.convolve(amplitude, [0.25, 0.5, 0.25], "same")
+    sd = noise * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
+    seen = around > np.maximum(_SEEN * sd, 1e-6 * float(np.max(amplitude)))
+    return int(np.max(np.flatnonzero(seen), initial=-1))
+
+
+def _usual(coverage: FloatArray) -> FloatArray:
+    """What is usual among the five neighbours to each side."""
+    if len(coverage) < 12:
+        return np.full(len(coverage), float(np.median(coverage[coverage > 0.0])))
+    padded = np.pad(coverage, 5, mode="reflect")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 11), axis=1))
+
+
+def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
+    notes = []
+    inner = keep[int(np.argmax(keep)) : len(keep) - int(np.argmax(keep[::-1]))]
+    lost = int(np.count_nonzero(~inner))
+    if lost:
+        notes.append(f"{lost} half cycle(s) are left out for lack of readings")
+    if level.wanders:
+        notes.append("the level wanders; it is followed by local lines")
+    if samples.counts:
+        notes.append("one row a count: the times of the counts are the data")
+    return tuple(notes)
