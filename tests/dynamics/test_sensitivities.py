@@ -187,11 +187,13 @@ def test_the_sign_of_the_friction_makes_no_jump_to_miss() -> None:
     release = Release(0.0, Y)
     model = Eq8(W, 0.45, 0.00596, 0.00596, 1.4e-6)
     _, jacobian = sample_with_jacobian(model, release, time)
-    step = 1e-6
+    step = 1e-5
     up, down, up2, down2 = (
         sample(replace(model, angular_frequency=W + s), release, time, method="clock")
         for s in (step, -step, 2 * step, -2 * step)
     )
     difference = (8 * (up - down) - (up2 - down2)) / (12 * step)
-    error = np.abs(difference - jacobian[:, 4]).max() / np.abs(difference).max()
-    assert error < 1e-7
+    error = np.abs(difference - jacobian[:, 4]) / np.abs(difference).max()
+    # Where a turning point lies between the differences, these are off by its kink.
+    assert np.quantile(error, 0.9) < 1e-8
+    assert error.max() < 1e-6

@@ -113,9 +113,7 @@ def _complete(arguments: argparse.Namespace) -> None:
 def _stage(arguments: argparse.Namespace) -> int:
     """Acquire one record of a campaign, or its caliper run."""
     from pendpipe.commands._campaign import load
-    from pendpipe.commands._compiled import start_numba
 
-    start_numba()
     campaign, out = load(arguments.campaign), Path(arguments.out)
     if arguments.caliper:
         from pendpipe.stages.caliper import run_caliper

@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
     from pendpipe.figures.campaign import draw_all
-    from pendpipe.files import write_json
     from pendpipe.figures.inputs import read_comparison, read_content, results_folder
+    from pendpipe.files import write_json
 
     folder = results_folder(read_content(arguments.campaign))
     drawn = draw_all(read_comparison(arguments.comparison), folder, arguments.out)

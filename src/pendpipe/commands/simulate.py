@@ -19,9 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
-    from pendpipe.commands._compiled import start_numba
-
-    start_numba()
     from pendpipe.recording import write_plain
     from pendpipe.simulation.model import read_model, simulate
 

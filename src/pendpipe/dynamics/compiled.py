@@ -15,7 +15,7 @@ from pendpipe.dynamics import machine_code
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_SOURCES = (
+SOURCES = (
     "chebyshev.py", "emission.py", "entry.py", "half_cycle.py", "layout.py", "march.py",
     "panel.py", "sensitivities.py", "table.py", "views.py", "workspace.py",
 )  # fmt: skip
@@ -27,16 +27,16 @@ _ENTRY = ctypes.CFUNCTYPE(
 )  # fmt: skip
 
 
-def _file_name() -> str:
+def file_name() -> str:
     """Return a name that changes with the engine's sources and with the machine."""
     folder = Path(__file__).parent
-    text = b"".join((folder / name).read_bytes() for name in _SOURCES)
+    text = b"".join((folder / name).read_bytes() for name in SOURCES)
     sources = hashlib.blake2b(text, digest_size=8).hexdigest()
     machine = hashlib.blake2b(machine_code.platform().encode(), digest_size=8).hexdigest()
     return f"engine-{machine}-{sources}.bin"
 
 
-def _folders() -> Iterator[Path]:
+def folders() -> Iterator[Path]:
     """Yield where the machine code may lie: as Numba's own cache, beside the source or at home."""
     if "NUMBA_CACHE_DIR" in os.environ:
         yield Path(os.environ["NUMBA_CACHE_DIR"])
@@ -55,8 +55,8 @@ def _compile() -> tuple[int, Any]:
     from pendpipe.dynamics.entry import compiled_entry
 
     entry = compiled_entry()
-    name = _file_name()
-    for folder in _folders():
+    name = file_name()
+    for folder in folders():
         try:
             machine_code.keep(folder / name, entry.inspect_llvm(), entry.native_name)
         except OSError:
@@ -75,8 +75,8 @@ def engine() -> Callable[..., int]:
     The first call in a new installation compiles for half a minute; those in later processes
     take about a tenth of a second.
     """
-    name = _file_name()
-    for folder in _folders():
+    name = file_name()
+    for folder in folders():
         loaded = machine_code.load(folder / name)
         if loaded is not None:
             break

@@ -170,6 +170,17 @@ class StreamReader:
         # How long no byte must come until a stream is held to have ended. The adapters of
         # USB keep bytes back for up to 16 ms; a simulated line does not.
         self.quiet_s = max(0.05 / clock.scale, 0.01)
+        # Whether an answer was missed: it may yet come, and must not come among the data.
+        self._doubt = False
+
+    def _clear_the_line(self, patience_s: float) -> None:
+        """Before a start: throw away padding, and wait for answers that were missed.
+
+        One byte too many before the first scan would shift every scan of a stream
+        that has no marks.
+        """
+        self.line.discard(patience_s if self._doubt else self.quiet_s, 2.0 * patience_s)
+        self._doubt = False
 
     def receive(self, limit_s: float) -> bytes:
         """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""

@@ -74,6 +74,7 @@ class DI2108(TextDriver):
             raise RuntimeError("configure() comes before start()")
         self._decoder = self.decoder(len(self.setup.channels))
         self._tail = b""
+        self._clear_the_line(self.patience_s)
         self.line.write(b"start\r")
 
     def ended(self, data: bytes) -> str:

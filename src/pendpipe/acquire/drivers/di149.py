@@ -75,6 +75,7 @@ class DI149(TextDriver):
             raise RuntimeError("configure() comes before start()")
         self._decoder = self.decoder(len(self.setup.channels))
         for _ in range(self.attempts):
+            self._clear_the_line(self.patience_s)
             self.line.write(b"start\r")
             # Byte by byte: the data behind the echo are not to be touched.
             if self.line.read_until(b"start\r", self.patience_s).endswith(b"start\r"):

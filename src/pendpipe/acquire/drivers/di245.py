@@ -112,6 +112,7 @@ class DI245(StreamReader):
         if self.setup is None:
             raise RuntimeError("configure() comes before start()")
         self._decoder = self.decoder(len(self.setup.channels))
+        self._clear_the_line(self.patience_s)
         self._short(b"S", b"1")
 
     def stop(self) -> None:
@@ -122,6 +123,7 @@ class DI245(StreamReader):
             self.line.write(b"0")
             if b"S0" in self.line.discard(self.quiet_s):
                 return
+            self._doubt = True
             self._clock.sleep(0.5)
 
     @classmethod
@@ -141,6 +143,7 @@ class DI245(StreamReader):
         for attempt in range(self.attempts):
             if attempt:
                 # It may have started although its echo was lost.
+                self._doubt = True
                 self.stop()
             self.line.write(b"\0" + letter)
             echo = self.line.read(1, self.patience_s)
@@ -156,6 +159,7 @@ class DI245(StreamReader):
         echo = b""
         for attempt in range(self.attempts):
             if attempt:
+                self._doubt = True
                 self.line.discard(self.quiet_s)
             self.line.write(text.encode("ascii") + b"\r")
             echo = self.line.read_until(b"\r", self.patience_s)

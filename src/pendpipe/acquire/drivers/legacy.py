@@ -118,6 +118,7 @@ class DI154RS(StreamReader):
         if self.setup is None:
             raise RuntimeError("configure() comes before start()")
         self._decoder = self.decoder(len(self.setup.channels))
+        self._clear_the_line(self.patience_s)
         self._command(b"S", b"1", undo=True)
 
     def stop(self) -> None:
@@ -136,6 +137,7 @@ class DI154RS(StreamReader):
             self.line.write(b"0")
             if b"S0" in self.line.discard(self.quiet_s):
                 break
+            self._doubt = True
             self._clock.sleep(0.5)
 
     @classmethod
@@ -159,6 +161,7 @@ class DI154RS(StreamReader):
         fault = "does not answer"
         for attempt in range(self.attempts):
             if attempt:
+                self._doubt = True
                 self._clock.sleep(0.5)
                 if undo:
                     self._end_stream()

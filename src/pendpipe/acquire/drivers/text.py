@@ -61,6 +61,7 @@ class TextDriver(StreamReader):
             self.line.write(b"stop\r")
             if b"stop" in self.line.discard(self.quiet_s):
                 return
+            self._doubt = True
             self._clock.sleep(0.5)
 
     def _command(self, text: str, needed: bool = True) -> str:
@@ -71,12 +72,14 @@ class TextDriver(StreamReader):
         echo = ""
         for attempt in range(self.attempts):
             if attempt:
+                self._doubt = True
                 self.line.discard(self.quiet_s)
             self.line.write(text.encode("ascii") + b"\r")
             answer = self.line.read_until(b"\r", self.patience_s)
             echo = answer.decode("ascii", "replace").strip("\0\r\n ")
             if answer.endswith(b"\r") and echo.startswith(text):
                 return echo.removeprefix(text).strip()
+        self._doubt = True
         if not needed:
             return ""
         fault = f"answers {echo[:40]!r} to '{text}'" if echo else "does not answer"

@@ -8,14 +8,25 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.shape import loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
+from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, room_for, track
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 
 BLOCK: Final = 1 << 21
 """Readings in a piece; its working memory is some MB."""
 _OVERLAP: Final = 3.0
 """Half cycles that neighbouring pieces share, so that none is cut in two."""
+_PIECEWISE: Final = "a long record: the level is one number within a piece only"
+_PLAIN: Final = 1.03
+_LARGEST: Final = 0.2
+"""Noise about the fitted half cycles over that of neighbours, and amplitude (rad or m): where
+both are small, the half cycles are cosines with their losses, and one pass will do."""
+_SLIGHT: Final = 3e-4
+"""Losses over omega below which the half cycles are cosines (Q above 1700)."""
 
 
 def in_blocks(
@@ -38,14 +49,78 @@ def in_blocks(
         As of the whole; the level is constant within a piece, so it is said to wander.
         The record ends with the last piece whose motion is seen.
     """
-    return _joined(list(_pieces(samples, measure_block, block)), samples)
+    tracked = _tracked(samples, measure_block, block)
+    if tracked is None:
+        return _joined(list(_pieces(samples, measure_block, block)), samples)
+    half_period = 0.5 / tracked.apparent_frequency_hz
+    if samples.time_s[-1] - tracked.time_s[-1] < 16.0 * half_period:
+        return replace(
+            tracked, stop_s=float(samples.time_s[-1]), samples=len(samples), wanders=True,
+            notes=(*tracked.notes, _PIECEWISE),
+        )  # fmt: skip
+    return _joined([tracked, *_pieces(samples, measure_block, block, tracked)], samples)
+
+
+def _tracked(
+    samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int
+) -> TurningPoints | None:
+    """Follow a plain, evenly sampled record in one pass; None if it isn't one."""
+    head = slice(0, block // 8)
+    first = measure_block(
+        replace(samples, time_s=samples.time_s[head], values=samples.values[head])
+    )
+    interval = _even_interval(samples.time_s)
+    plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
+    if interval is None or not plain or first.amplitude_rad[0] > _LARGEST or len(first) < 16:
+        return None
+    half_period = 0.5 / first.apparent_frequency_hz
+    rates = np.array(loss_rates(first.time_s, first.amplitude_rad, first.angle_sd_rad))
+    amplitude = float(first.amplitude_rad[0])
+    losses = float(rates @ [amplitude, 1.0, 1.0 / amplitude]) * half_period / np.pi
+    if losses > _SLIGHT:
+        return None
+    columns = room_for(samples.values, interval, half_period)
+    noise = first.noise_rms_rad
+    count, square, freedom = track(
+        samples.values, float(samples.time_s[0]), interval, float(first.time_s[1]), half_period,
+        float(first.side[1]), float(first.level_rad[0]), rates, noise, columns,
+    )  # fmt: skip
+    if count < 16:
+        return None
+    measured = max(float(np.sqrt(square / freedom)), quantisation_rms(samples.step))
+    columns[[1, 3]] *= measured / noise
+    time, time_sd, angle, angle_sd, level = columns[:, :count]
+    per_half_cycle = half_period / interval
+    # A half cycle alone tells 0.19 of what its readings would say of a level alone.
+    level_sd = measured / np.sqrt(0.19 * per_half_cycle * min(LEVEL_BLOCK, count))
+    return replace(
+        first, half_cycle=np.arange(count), time_s=time, time_sd_s=time_sd, angle_rad=angle,
+        angle_sd_rad=angle_sd, level_rad=level, level_sd_rad=float(level_sd),
+        noise_rms_rad=measured,
+    )  # fmt: skip
+
+
+def _even_interval(time_s: FloatArray) -> float | None:
+    """The interval between readings; None if they are not evenly spaced throughout."""
+    last = len(time_s) - 1
+    interval = float(time_s[-1] - time_s[0]) / last
+    at = np.linspace(0, last, 4096).astype(np.int64)
+    off = np.abs(time_s[at] - (time_s[0] + interval * at))
+    return interval if float(off.max()) < 0.01 * interval else None
 
 
 def _pieces(
-    samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int
+    samples: Samples,
+    measure_block: Callable[[Samples], TurningPoints],
+    block: int,
+    before: TurningPoints | None = None,
 ) -> Iterator[TurningPoints]:
     """Measure each piece; of the overlap, each keeps its own half."""
     start, overlap, last = 0, 0, -np.inf
+    if before is not None:
+        half_period = float(np.median(np.diff(before.time_s[-64:])))
+        last = float(before.time_s[-1]) + 0.5 * half_period
+        start = int(np.searchsorted(samples.time_s, last))
     while start < len(samples):
         stop = min(start + block, len(samples))
         piece = slice(max(start - overlap, 0), stop)
@@ -54,7 +129,7 @@ def _pieces(
                 replace(samples, time_s=samples.time_s[piece], values=samples.values[piece])
             )
         except NotAnalysableError:
-            if start == 0:
+            if start == 0 and before is None:
                 raise
             return
         half_period = float(np.median(np.diff(points.time_s)))
@@ -101,6 +176,6 @@ def _joined(pieces: list[TurningPoints], samples: Samples) -> TurningPoints:
         noise_rms_rad=mean("noise_rms_rad"),
         stop_s=float(samples.time_s[-1]),
         samples=len(samples),
-        wanders=len(pieces) > 1,
-        notes=(*pieces[0].notes, f"measured in {len(pieces)} pieces, each with its own level"),
+        wanders=True,
+        notes=(*pieces[0].notes, _PIECEWISE),
     )
