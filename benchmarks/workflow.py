@@ -44,7 +44,7 @@ def measured(command: list[str], feed: str | None = None) -> tuple[float, float,
 
 def calls_of(output: str, folder: str) -> list[list[str]]:
     """The command line's calls in the order in which Snakemake made them."""
-    found = re.findall(r"^\s*(pendpipe [^\n]*)$", output, flags=re.MULTILINE)
+    found = re.findall(r"^Shell command:\s*(pendpipe [^\n]*)$", output, flags=re.MULTILINE)
     calls = []
     for line in found:
         for part in line.split("&&"):
