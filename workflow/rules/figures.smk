@@ -16,6 +16,7 @@ rule figures:
         f"{RESULTS}/logs/figures.log",
     conda:
         "../envs/pendpipe.yaml"
+    threads: 2
     resources:
         configuration=CONFIGURATION,
     params:
@@ -25,4 +26,4 @@ rule figures:
         "figures 3 to 10"
     shell:
         "pendpipe figures --campaign {resources.configuration} --comparison {input.comparison}"
-        " --out {params.folder} 2> {log}"
+        " --out {params.folder} --processes {threads} 2> {log}"

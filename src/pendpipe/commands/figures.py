@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=Path, metavar="FOLDER",
         help="where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
     )  # fmt: skip
+    parser.add_argument(
+        "--processes", type=int, default=1, metavar="N", help="how many may draw at once (1)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -34,7 +37,9 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.files import write_json
 
     folder = results_folder(read_content(arguments.campaign))
-    drawn = draw_all(read_comparison(arguments.comparison), folder, arguments.out)
+    drawn = draw_all(
+        read_comparison(arguments.comparison), folder, arguments.out, processes=arguments.processes
+    )
     for name, reason in drawn.left_out.items():
         print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
     names = [Path(file).relative_to(folder).as_posix() for file in drawn.files]

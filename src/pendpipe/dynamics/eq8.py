@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Method = Literal["map", "clock"]
 """``"map"`` tabulates the half-cycle map and is the fast way; ``"clock"`` solves every half cycle
-by the phase clock and is the reference. They agree to 1e-10 of the amplitude, and mostly to 1e-12."""
+by the phase clock and is the reference. They agree to 1e-10 of the amplitude, mostly to 1e-12."""
 
 _NO_SAMPLES: FloatArray = np.empty(0)
 _NONE: FloatArray = np.empty((0, 0))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +46,7 @@ class Drawn:
     left_out: dict[str, str] = field(default_factory=dict)
 
 
-def draw_all(comparison: Comparison, folder: Path, out: Path) -> Drawn:
+def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int = 1) -> Drawn:
     """Draw figures 3 to 10, the tail figure and each record's decay.
 
     Parameters
@@ -55,6 +57,8 @@ def draw_all(comparison: Comparison, folder: Path, out: Path) -> Drawn:
         The campaign's results: a folder a record lies in it.
     out
         Where the campaign's figures go; a record's go to its own folder.
+    processes
+        With more than one, the records' figures are drawn beside the campaign's.
 
     Returns
     -------
@@ -62,18 +66,43 @@ def draw_all(comparison: Comparison, folder: Path, out: Path) -> Drawn:
         A campaign with theory leaves a file for each of figures 3 to 10, with the reason
         in it where there was nothing to draw; one without leaves them out.
     """
+    folders, entries = repeat(folder), comparison["records"]
+    if processes < 2:
+        of_records = list(map(draw_record, folders, entries))
+        return _together([_draw_campaign(comparison, folder, out), *of_records])
+    with ProcessPoolExecutor(processes - 1) as pool:
+        of_the_others = pool.map(draw_record, folders, entries)
+        of_the_campaign = _draw_campaign(comparison, folder, out)
+        return _together([of_the_campaign, *of_the_others])
+
+
+def draw_record(folder: Path, entry: Entry) -> Drawn:
+    """Draw one record's decay."""
+    drawn, name = Drawn(), entry["record"]
+    if entry.get("refused"):
+        drawn.left_out[f"{name}, decay"] = "the record was refused"
+        return drawn
+    stem = folder / name / "figures" / "decay"
+    _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, dpi=150)
+    return drawn
+
+
+def _draw_campaign(comparison: Comparison, folder: Path, out: Path) -> Drawn:
+    """Draw figures 3 to 10 and the tail figure."""
     drawn = Drawn()
     keep_places = bool(comparison.get("has_theory"))
     for name, draw in _campaign_figures(comparison, folder).items():
         _draw(drawn, name, draw, out / name, keep_place=keep_places and name.startswith("fig"))
-    for entry in comparison["records"]:
-        name = entry["record"]
-        if entry.get("refused"):
-            drawn.left_out[f"{name}, decay"] = "the record was refused"
-            continue
-        stem = folder / name / "figures" / "decay"
-        _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, dpi=150)
     return drawn
+
+
+def _together(parts: list[Drawn]) -> Drawn:
+    """What several have drawn, in their order."""
+    whole = Drawn()
+    for part in parts:
+        whole.files += part.files
+        whole.left_out |= part.left_out
+    return whole
 
 
 def _campaign_figures(comparison: Comparison, folder: Path) -> dict[str, Callable[[], Figure]]:

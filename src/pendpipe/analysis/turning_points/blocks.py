@@ -170,7 +170,11 @@ def _joined(pieces: list[TurningPoints], samples: Samples) -> TurningPoints:
     return replace(
         pieces[0],
         half_cycle=np.concatenate(numbers),
-        **columns,
+        time_s=columns["time_s"],
+        time_sd_s=columns["time_sd_s"],
+        angle_rad=columns["angle_rad"],
+        angle_sd_rad=columns["angle_sd_rad"],
+        level_rad=columns["level_rad"],
         level_sd_rad=mean("level_sd_rad"),
         level_coupling=mean("level_coupling"),
         noise_rms_rad=mean("noise_rms_rad"),
