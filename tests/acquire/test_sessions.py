@@ -163,7 +163,7 @@ def test_a_stale_stream_of_a_crashed_run_is_ended_first(kind: str) -> None:
 def test_a_port_tells_who_is_there(kind: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Each family is asked in its own language; the other does not answer.
     for driver in (DI154RS, DI2108):
-        monkeypatch.setattr(driver, "patience_s", 0.2)
+        monkeypatch.setattr(driver, "patience_s", 1.0)
         monkeypatch.setattr(driver, "attempts", 1)
     with SimulatedDevice(kind, swing) as device:
         assert identify(device.port).model == model
