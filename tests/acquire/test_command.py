@@ -47,6 +47,9 @@ def test_all_a_newcomer_needs(
         ("--device simulated:di2108 --clock-scale 0 --out {}", "must be positive"),
         ("--device simulated:di2108 --duration nan --out {}", "duration_s: nan"),
         ("--device simulated:di2108", "give --out"),
+        ("--device simulated:di2108 --samples 0 --out {}", "--samples: it must be positive"),
+        ("--device simulated:di2108 --range-volts 11 --out {}", "no range of +-11 V"),
+        ("--recover nowhere.raw --out {}", "can't be read"),
         ("--out {}", "no instrument is named"),
     ],
 )
@@ -64,3 +67,14 @@ def test_a_users_fault_is_one_line_and_status_two(
 def test_listing_never_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["acquire", "--list"]) == 0
     assert capsys.readouterr().out
+
+
+def test_a_length_in_samples_and_a_range(tmp_path: Path) -> None:
+    out = tmp_path / "short.csv"
+    call = "acquire --device simulated:di4108 --rate 100 --samples 250 --range-volts 1.5"
+    assert main([*call.split(), "--clock-scale", "20", "--out", str(out)]) == 0
+    recording = read_plain(out)
+    assert len(recording) == 250
+    assert recording.number("range_volts") == 2.0
+    # The bytes off the wire are kept beside, whether asked for or not.
+    assert np.array_equal(decode_recording(tmp_path / "short.raw").values, recording.values)

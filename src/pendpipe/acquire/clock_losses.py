@@ -21,6 +21,8 @@ _STRETCHES: Final = 256
 _BESIDE: Final = 3
 """Stretches on either side that must bear a step out: nearer to the ends it can't be told
 from a busy host."""
+_NEAR: Final = 5
+"""Stretches on either side whose median tells the height of a step."""
 _FEWEST_SCANS: Final = 1.5
 _STAMP_S: Final = 0.010
 """Seconds of the host below which no step is believed."""
@@ -71,7 +73,7 @@ def find_clock_losses(
     -----
     The lateness of an arrival is its time less scans/rate; of each stretch (8 arrivals or
     more, at most 256 stretches) the least counts. A loss is a step between neighbouring
-    stretches, beyond their median step (a rate that is not the nominal one), by more than
+    stretches but one, beyond their median step (a rate that is not the nominal one), by more than
     eight robust standard deviations of the steps, 10 ms of the host and 1.5 scans, which
     all later stretches keep up and no earlier one had.
     """
@@ -92,14 +94,19 @@ def find_clock_losses(
     found: list[ClockLoss] = []
     before = np.maximum.accumulate(level)
     after = np.minimum.accumulate(level[::-1])[::-1]
-    # Between stretches i and i + 2: a step inside stretch i + 1 may show in either half.
     index = _BESIDE - 1
-    while index < stretches - _BESIDE:
-        rise = float(after[index + 1] - before[index])
+    while index < stretches - _BESIDE - 1:
+        # The stretch in which it happens may show a part of the step: it is passed over.
+        rise = float(after[index + 2] - before[index])
         if rise <= limit_s:
             index += 1
             continue
-        at = _place(late, int(first[index]), int(first[index + 1]))
+        if float(after[index + 3] - before[index + 1]) > rise:
+            index += 1
+        # The detection took extremes of many levels, which exaggerate the delays.
+        near = level[max(0, index - _NEAR + 1) : index + 1]
+        rise = float(np.median(level[index + 2 : index + 2 + _NEAR]) - np.median(near))
+        at = _place(late, int(first[index]), int(first[index + 2]))
         found.append(ClockLoss(at, max(1, round(rise / interval_s))))
         index += _BESIDE
     return found, limit_s

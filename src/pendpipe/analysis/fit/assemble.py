@@ -68,9 +68,14 @@ def warn(result: FitResult, stretched: float) -> list[str]:
     if result.quality_factor_limit is None:
         said.append("quality_factor_limit has no finite value, since b = 0")
     if stretched > 1.0:
+        seen = (
+            "chi^2 of the readings is"
+            if result.chi2_per_dof > 0.9 * stretched
+            else ("the half cycles scatter, in the square,")
+        )
         said.append(
-            f"chi^2 is {stretched:.3g} times what the noise explains: the standard deviations"
-            " are enlarged by its root; see pendpipe diagnose"
+            f"{seen} {stretched:.3g} times what the noise explains: the standard deviations are"
+            " enlarged by its root; see pendpipe diagnose"
         )
     a, b, c = (result.parameters[name] for name in ("a", "b", "c"))
     y0 = result.parameters["amplitude"].value

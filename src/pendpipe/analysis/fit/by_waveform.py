@@ -25,6 +25,7 @@ from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
+from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
@@ -34,6 +35,9 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import turning_points_with_jacobian
 
 _GROWTH: Final = 1.6
+_DITHERED: Final = 0.4
+"""Noise over step from which the rounding is as good as random."""
+_ROUNDS: Final = 2
 _LOST: Final = 1.0
 """Phase in rad by which a model that has lost the oscillation is told."""
 
@@ -77,7 +81,7 @@ def fit_waveform(
     marginalised: any share from 0 to 1 is as likely beforehand.
     """
     fixed = fixed or {}
-    fitted = _fit(samples, points, baseline, fixed)
+    fitted = _refined(_fit(samples, points, baseline, fixed), samples)
     residual = fitted.problem.residual(fitted.minimum.value)
     dof = len(residual) - len(NAMES) + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
@@ -85,7 +89,8 @@ def fit_waveform(
     chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
     stretched = max(misfit(chi2_per_dof, dof), noise.slow)
     # The search weighed the readings by its own first guess of the noise.
-    scale = (fitted.problem.noise_rms / noise.rms) ** 2 / stretched
+    weighed = noise.rms if fitted.problem.step == 0.0 else fitted.problem.noise_rms
+    scale = (fitted.problem.noise_rms / weighed) ** 2 / stretched
     numbers, normal = _numbers(fitted, scale, samples)
     parameters = estimates(numbers, points.unit)
     result = FitResult(
@@ -135,6 +140,29 @@ def _fit(
             return _Fitted(problem, minimum, held, start)
         value = minimum.value
         used = min(len(points), math.ceil(_GROWTH * used))
+
+
+def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
+    """Take the rounding for what it is, where noise does not make it random.
+
+    Only where Eq. 8 describes the readings to within the step: else every misfit would be
+    blamed on the rounding.
+    """
+    step, problem, value = samples.step, fitted.problem, fitted.minimum.value
+    residual = problem.residual(value)
+    rms = math.sqrt(float(np.mean(residual**2)))
+    if step is None or not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
+        return fitted
+    for _ in range(_ROUNDS):
+        noise = best_noise(problem.residual(value), step, 0.1 * step)
+        problem = replace(problem, noise_rms=noise, step=step)
+        minimum = minimise(
+            problem.evaluate, value, waveform.BOUNDS, held=fitted.held, chi2_only=problem.chi2
+        )
+        if not math.isfinite(minimum.quadratic.chi2):
+            return fitted
+        value = minimum.value
+    return fitted._replace(problem=problem, minimum=minimum)
 
 
 def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> int:

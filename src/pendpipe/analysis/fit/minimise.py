@@ -15,8 +15,8 @@ from pendpipe.analysis.fit.quadratic import Bounds, bounded_step
 from pendpipe.arrays import FloatArray
 
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
-_SMALL: Final = 30.0
-_KEPT: Final = 1e-3
+_SMALL: Final = 1e4
+_KEPT: Final = 3e-3
 
 
 class Quadratic(NamedTuple):
@@ -61,7 +61,7 @@ def minimise(
         standard deviations. That step is still taken, on trust.
     chi2_only
         chi^2 at a point, where that costs less. A step that lowers chi^2 as promised, to
-        1e-3, has arrived within 0.03 standard deviations: it needs no new derivatives.
+        3e-3, has arrived within 0.05 standard deviations: it needs no new derivatives.
     most
         Greatest number of evaluations.
     """

@@ -10,7 +10,6 @@ import numpy as np
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 
-_SHARES: Final = (0.0, 0.5, 1.0)
 _LOUD: Final = 2.0
 
 
@@ -72,18 +71,15 @@ def fit_period(
         An angular frequency that is not to be fitted.
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
-    shares = _SHARES if share is None else (share,) * 3
-    trials = [_line(points, amplitude, a, b, c, each, omega, held) for each in shares]
-    middle = trials[1]
-    off = [trials[0][0] - middle[0], trials[2][0] - middle[0]]
-    spread = off[int(abs(off[1][0]) > abs(off[0][0]))] / math.sqrt(3.0)
+    middle = _line(points, amplitude, a, b, c, 0.5 if share is None else share, omega, held)
     matrix = middle[1] * (middle[2] if middle[2] > _LOUD else 1.0)
     if share is None:
+        ends = [_line(points, amplitude, a, b, c, end, omega, held)[0] for end in (0.0, 1.0)]
+        off = max((end - middle[0] for end in ends), key=lambda change: abs(change[0]))
+        matrix += np.outer(off, off) / 3.0
         # All times share what the unknown division of b does to the half cycles' shape.
         matrix[1, 1] += (b / (4.0 * float(middle[0][0]) ** 2)) ** 2 / 3.0
-    return Period(
-        float(middle[0][0]), float(middle[0][1]), matrix + np.outer(spread, spread), middle[2]
-    )
+    return Period(float(middle[0][0]), float(middle[0][1]), matrix, middle[2])
 
 
 def _line(

@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import share_of
 from pendpipe.analysis.fit.envelope import fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
-from pendpipe.analysis.fit.period import fit_period, period_excess
+from pendpipe.analysis.fit.period import Period, fit_period, period_excess
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
@@ -51,7 +51,9 @@ def start_values(
     parts = loss_rates_of(fixed, points.apparent_frequency_hz)
     share = share_of(parts, b, baseline)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
-    period = fit_period(points, envelope.amplitude, a, b, c, share=share, held=omega)
+    period = fit_period(
+        points, envelope.amplitude, a, b, c, share=0.5 if share is None else share, held=omega
+    )
     known, reliable, warnings = period, len(points), []
     late = _lateness(points, envelope.amplitude, (a, b, c), known.angular_frequency, known.time_s)
     if np.max(np.abs(late)) > _SURE and omega is None:
@@ -62,10 +64,13 @@ def start_values(
             "the period changes with the amplitude or the time as Eq. 8's does not:"
             f" {np.ptp(late):.2g} rad of phase along the record"
         )
-    angle, time, before = _release(points, (a, b, c, y0), known, "amplitude" in fixed)
+    middle_share = 0.5 if share is None else share
+    angle, time, before = _release(
+        points, (a, b, c, y0), middle_share, known, at_first="amplitude" in fixed
+    )
     value = np.array(
         [a, b, c, known.angular_frequency, angle, time,
-         float(np.mean(points.level_rad)) - level, 0.5 if share is None else share]
+         float(np.mean(points.level_rad)) - level, middle_share]
     )  # fmt: skip
     return Start(value, before, reliable, tuple(warnings))
 
@@ -99,21 +104,25 @@ def _sure_part(
 
 
 def _release(
-    points: TurningPoints, values: tuple[float, float, float, float], period: object,
-    at_first: bool,
+    points: TurningPoints, values: tuple[float, float, float, float], share: float,
+    period: Period, *, at_first: bool,
 ) -> tuple[float, float, int]:  # fmt: skip
     """Angle and time of the release, and half cycles from it to the first turning point."""
     a, b, c, y0 = values
-    omega, first_s = period.angular_frequency, period.time_s  # type: ignore[attr-defined]
+    omega, first_s = period.angular_frequency, period.time_s
     side = float(points.side[0])
     if at_first:
         return side * y0, first_s, 0
     half_period = math.pi / omega
     before = max(1, math.ceil((first_s - points.start_s) / half_period + 0.05))
-    back = before * half_period
-    earlier = float(amplitude(-back, y0, a, b, c))
-    if not earlier < 20.0 * y0:
-        earlier = y0 * math.exp(min((a * y0 + b + c / y0) * back, 3.0))
+    earlier, back = y0, 0.0
+    for step in range(before):
+        last = earlier
+        earlier = float(amplitude(-(step + 1.0) * half_period, y0, a, b, c))
+        if not earlier < 1.5 * last:
+            earlier = last * math.exp(min((a * last + b + c / last) * half_period, 0.4))
+        middle = np.array([0.5 * (last + earlier)])
+        back += half_period * (1.0 + float(period_excess(middle, omega, a, b, c, share)[0]))
     return side * (-1.0) ** before * earlier, first_s - back, before
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.minimise import Quadratic
 from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 
@@ -35,6 +36,9 @@ class Waveform:
         The readings, shape (n,).
     noise_rms
         Standard deviation of one.
+    step
+        The step of readings whose rounding is not random (see `rounding.py`); `noise_rms` is
+        then that before the rounding. Zero: the readings scatter as `noise_rms` says.
     split
         What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
         held fixed; empty when the share is marginalised over its prior.
@@ -44,6 +48,7 @@ class Waveform:
     values: FloatArray
     noise_rms: float
     split: Mapping[str, float]
+    step: float = 0.0
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
@@ -71,9 +76,21 @@ class Waveform:
         model, release = self.model(value)
         if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
             return np.inf
-        residual = self.residual(value)
         off = float(value[SHARE]) - PRIOR_SHARE
-        return float(residual @ residual) / self.noise_rms**2 + PRIOR_INVERSE * off**2
+        chi2, _, _ = self._weighed(self.residual(value))
+        return chi2 + PRIOR_INVERSE * off**2
+
+    def _weighed(self, residual: FloatArray) -> tuple[float, FloatArray, FloatArray | float]:
+        """chi^2 (or -2 ln likelihood), its slope by the model, and the readings' weights."""
+        if self.step == 0.0:
+            weight = self.noise_rms**-2
+            return float(residual @ residual) * weight, residual * weight, weight
+        score, weights = np.empty_like(residual), np.empty_like(residual)
+        return (
+            float(rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)),
+            score,
+            weights,
+        )
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
@@ -90,14 +107,16 @@ class Waveform:
             except ValueError:
                 # Overdamped: far from anything that turns.
                 return refused
-            residual = self.values[piece] - angle
-            chi2 += float(residual @ residual)
-            gradient += raw.T @ residual
-            normal += raw.T @ raw
+            part, slope, weight = self._weighed(self.values[piece] - angle)
+            chi2 += part
+            gradient += raw.T @ slope
+            if isinstance(weight, float):
+                normal += weight * (raw.T @ raw)
+            else:
+                normal += raw.T @ (raw * weight[:, None])
         change = self.change(value)
-        weight = self.noise_rms**-2
-        gradient, normal = change.T @ gradient * weight, change.T @ normal @ change * weight
-        return self._with_prior(value, Quadratic(chi2 * weight, gradient, normal))
+        gradient, normal = change.T @ gradient, change.T @ normal @ change
+        return self._with_prior(value, Quadratic(chi2, gradient, normal))
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Final
 
@@ -10,9 +13,9 @@ import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import loss_rates
+from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
-from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, room_for, track
+from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 
@@ -20,6 +23,7 @@ BLOCK: Final = 1 << 21
 """Readings in a piece; its working memory is some MB."""
 _OVERLAP: Final = 3.0
 """Half cycles that neighbouring pieces share, so that none is cut in two."""
+_CORES: Final = 4
 _PIECEWISE: Final = "a long record: the level is one number within a piece only"
 _PLAIN: Final = 1.03
 _LARGEST: Final = 0.2
@@ -64,40 +68,100 @@ def in_blocks(
 def _tracked(
     samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int
 ) -> TurningPoints | None:
-    """Follow a plain, evenly sampled record in one pass; None if it isn't one."""
-    head = slice(0, block // 8)
-    first = measure_block(
-        replace(samples, time_s=samples.time_s[head], values=samples.values[head])
-    )
+    """Follow a plain, evenly sampled record in one pass; None if it isn't one.
+
+    Every core takes a part of the record; all write into one table.
+    """
     interval = _even_interval(samples.time_s)
-    plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
-    if interval is None or not plain or first.amplitude_rad[0] > _LARGEST or len(first) < 16:
+    if interval is None:
         return None
-    half_period = 0.5 / first.apparent_frequency_hz
-    rates = np.array(loss_rates(first.time_s, first.amplitude_rad, first.angle_sd_rad))
-    amplitude = float(first.amplitude_rad[0])
-    losses = float(rates @ [amplitude, 1.0, 1.0 / amplitude]) * half_period / np.pi
-    if losses > _SLIGHT:
+    cores = min(os.cpu_count() or 1, _CORES, max(1, len(samples) // (2 * block)))
+    starts = [len(samples) * k // cores for k in range(cores)]
+    heads = [_start(samples, start, measure_block, block // 64) for start in starts]
+    known = [head for head in heads if head is not None]
+    if len(known) < cores:
         return None
-    columns = room_for(samples.values, interval, half_period)
-    noise = first.noise_rms_rad
-    count, square, freedom = track(
-        samples.values, float(samples.time_s[0]), interval, float(first.time_s[1]), half_period,
-        float(first.side[1]), float(first.level_rad[0]), rates, noise, columns,
-    )  # fmt: skip
+    half_period = 0.5 / known[0].apparent_frequency_hz
+    overlap = int(8.0 * half_period / interval)
+    room = int(1.02 * len(samples) * interval / half_period / cores) + 64
+    columns = np.empty((5, cores * room))
+
+    def follow(k: int) -> tuple[int, float, float]:
+        head, start = known[k], starts[k]
+        stop = (*starts, len(samples))[k + 1] + overlap
+        return track(
+            samples.values[start:stop], float(samples.time_s[start]), interval,
+            float(head.time_s[1]), 0.5 / head.apparent_frequency_hz, float(head.side[1]),
+            float(head.level_rad[0]), np.array(_rates(head)), known[0].noise_rms_rad,
+            columns[:, k * room : (k + 1) * room],
+        )  # fmt: skip
+
+    with ThreadPoolExecutor(cores) as pool:
+        parts = list(pool.map(follow, range(cores)))
+    count = _closed_up(columns, room, [part[0] for part in parts], half_period)
     if count < 16:
         return None
-    measured = max(float(np.sqrt(square / freedom)), quantisation_rms(samples.step))
-    columns[[1, 3]] *= measured / noise
+    square, freedom = (sum(part[j] for part in parts) for j in (1, 2))
+    noise = max(float(np.sqrt(square / freedom)), quantisation_rms(samples.step))
+    for row in (1, 3):
+        columns[row, :count] *= noise / known[0].noise_rms_rad
     time, time_sd, angle, angle_sd, level = columns[:, :count]
-    per_half_cycle = half_period / interval
     # A half cycle alone tells 0.19 of what its readings would say of a level alone.
-    level_sd = measured / np.sqrt(0.19 * per_half_cycle * min(LEVEL_BLOCK, count))
+    told = 0.19 * half_period / interval * min(LEVEL_BLOCK, count)
     return replace(
-        first, half_cycle=np.arange(count), time_s=time, time_sd_s=time_sd, angle_rad=angle,
-        angle_sd_rad=angle_sd, level_rad=level, level_sd_rad=float(level_sd),
-        noise_rms_rad=measured,
+        known[0], half_cycle=np.arange(count), time_s=time, time_sd_s=time_sd, angle_rad=angle,
+        angle_sd_rad=angle_sd, level_rad=level, level_sd_rad=noise / math.sqrt(told),
+        noise_rms_rad=noise,
     )  # fmt: skip
+
+
+def _start(
+    samples: Samples,
+    start: int,
+    measure_block: Callable[[Samples], TurningPoints],
+    length: int,
+) -> TurningPoints | None:
+    """The turning points from which a part is followed; None if it isn't plain there."""
+    head = slice(start, start + length)
+    try:
+        first = measure_block(
+            replace(samples, time_s=samples.time_s[head], values=samples.values[head])
+        )
+    except NotAnalysableError:
+        if start == 0:
+            raise
+        return None
+    plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
+    amplitude = float(first.amplitude_rad[0])
+    if not plain or amplitude > _LARGEST or len(first) < 16:
+        return None
+    losses = float(np.array(_rates(first)) @ [amplitude, 1.0, 1.0 / amplitude])
+    return first if losses / (2.0 * np.pi * first.apparent_frequency_hz) < _SLIGHT else None
+
+
+def _rates(points: TurningPoints) -> LossRates:
+    return loss_rates(points.time_s, points.amplitude_rad, points.angle_sd_rad)
+
+
+def _closed_up(columns: FloatArray, room: int, counts: list[int], half_period: float) -> int:
+    """Move the parts together, without what they share; return how many there are in all.
+
+    Where a part ends early (its lock is lost), the table ends.
+    """
+    total = counts[0]
+    for k in range(1, len(counts)):
+        part = columns[:, k * room : k * room + counts[k]]
+        last_s, side = columns[0, total - 1], math.copysign(1.0, columns[2, total - 1])
+        skip = int(np.searchsorted(part[0], last_s + 0.5 * half_period))
+        if skip == counts[k] or abs(part[0, skip] - last_s - half_period) > 0.2 * half_period:
+            break
+        if part[2, skip] * side > 0.0:
+            break
+        added = counts[k] - skip
+        for row in range(len(columns)):
+            columns[row, total : total + added] = part[row, skip:].copy()
+        total += added
+    return total
 
 
 def _even_interval(time_s: FloatArray) -> float | None:
@@ -160,8 +224,6 @@ def _joined(pieces: list[TurningPoints], samples: Samples) -> TurningPoints:
             own = own + last + max(step, 2 - int(odd))
         numbers.append(own)
         last = int(own[-1])
-    names = ("time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad")
-    columns = {name: np.concatenate([getattr(p, name) for p in pieces]) for name in names}
     weights = [len(piece) for piece in pieces]
 
     def mean(name: str) -> float:
@@ -170,11 +232,11 @@ def _joined(pieces: list[TurningPoints], samples: Samples) -> TurningPoints:
     return replace(
         pieces[0],
         half_cycle=np.concatenate(numbers),
-        time_s=columns["time_s"],
-        time_sd_s=columns["time_sd_s"],
-        angle_rad=columns["angle_rad"],
-        angle_sd_rad=columns["angle_sd_rad"],
-        level_rad=columns["level_rad"],
+        time_s=np.concatenate([piece.time_s for piece in pieces]),
+        time_sd_s=np.concatenate([piece.time_sd_s for piece in pieces]),
+        angle_rad=np.concatenate([piece.angle_rad for piece in pieces]),
+        angle_sd_rad=np.concatenate([piece.angle_sd_rad for piece in pieces]),
+        level_rad=np.concatenate([piece.level_rad for piece in pieces]),
         level_sd_rad=mean("level_sd_rad"),
         level_coupling=mean("level_coupling"),
         noise_rms_rad=mean("noise_rms_rad"),

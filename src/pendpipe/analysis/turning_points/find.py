@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
+
+_LOCKED: Final = 0.1
+"""Phase in rad by which rough places may be off when they are measured for the last time."""
 
 
 def find_turning_points(recording: Recording, place: str | Path = "recording") -> TurningPoints:
@@ -98,11 +102,14 @@ def _plain(number: int) -> FloatArray:
 
 def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measured]:
     """Lock on to the half cycles with a bare cosine, and follow them into the tail."""
-    places = first_places(rough)
-    for _ in range(2):
+    places, steps = first_places(rough), 3
+    while True:
         shape = _plain(len(places.number))
         measured = measure(samples, places, rough.level, shape, stride=stride)
+        late = measured.phase(samples.noise_rms)[~measured.lopsided]
         places = resmoothed(places, measured, samples.noise_rms)
+        if np.nanmax(np.abs(late), initial=0.0) < _LOCKED or (steps := steps - 1) == 0:
+            break
     return follow_tail(samples, places, measured, rough.level)
 
 

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.noise import undithered_rms
 from pendpipe.analysis.turning_points.level import Level, estimate_level
 from pendpipe.analysis.turning_points.measure import Measured, Places
 from pendpipe.analysis.turning_points.samples import Samples
@@ -48,12 +49,13 @@ def finished(state: State, keep: BoolArray) -> TurningPoints:
     # A period that changes from one half cycle to the next skews the wave about its turning.
     skew = np.where(measured.single | measured.lopsided, places.unsteady_phase, 0.0)[keep]
     relative, phase = np.hypot(relative, 0.1 * skew**2), np.hypot(phase, 0.1 * skew**2)
+    rounding = undithered_rms(clear, samples.step, noise)
     return TurningPoints(
         half_cycle=places.number[keep] - places.number[keep][0],
         time_s=places.centre_s[keep] + measured.phase(noise)[keep] / rate,
         time_sd_s=np.hypot(np.minimum(sine_sd / clear, 1.0), phase) / rate,
         angle_rad=side * turned,
-        angle_sd_rad=np.hypot(sd * height, relative * clear),
+        angle_sd_rad=np.sqrt((sd * height) ** 2 + (relative * clear) ** 2 + rounding**2),
         level_rad=level.value,
         level_sd_rad=float(np.mean(level.sd)),
         level_coupling=float(np.mean(coupling * height)),
@@ -105,8 +107,9 @@ def last_seen(measured: Measured, noise: float) -> int:
 
 def _usual(coverage: FloatArray) -> FloatArray:
     """What is usual among the five neighbours to each side."""
-    if len(coverage) < 12:
-        return np.full(len(coverage), float(np.median(coverage[coverage > 0.0])))
+    middle = float(np.median(coverage[coverage > 0.0]))
+    if len(coverage) < 12 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
+        return np.full(len(coverage), middle)
     padded = np.pad(coverage, 5, mode="reflect")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 11), axis=1))
 

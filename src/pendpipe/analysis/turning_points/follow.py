@@ -44,7 +44,8 @@ def times_and_weights(
     rate = places.angular_frequency
     time = places.centre_s + measured.phase(noise) / rate
     # Beyond what noise does, real pendulums wander in phase by about this much.
-    phase_sd = np.hypot(noise * np.sqrt(measured.sine_variance) / measured.amplitude, 1e-3)
+    size = np.maximum(measured.amplitude, 1e-12 * np.nanmax(measured.amplitude))
+    phase_sd = np.hypot(noise * np.sqrt(measured.sine_variance) / size, 1e-3)
     known = np.isfinite(time) & (measured.amplitude > noise * np.sqrt(measured.variance))
     known &= ~measured.lopsided
     weight = np.where(known, (rate / phase_sd) ** 2, 0.0)

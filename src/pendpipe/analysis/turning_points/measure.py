@@ -167,6 +167,8 @@ def _peak(
     best: FloatArray, inverse: FloatArray, by_level: FloatArray, side: FloatArray
 ) -> FloatArray:
     """Value at the turning point: the amplitude and the free harmonics add up there."""
+    if best.shape[1] == 2:
+        return np.stack([best[:, 0] * side, inverse[:, 0, 0], by_level[:, 0]], axis=1)
     even = np.ones(best.shape[1])
     even[1] = 0.0
     variance = np.einsum("kpq,p,q->k", inverse, even, even)

@@ -38,12 +38,12 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         least = 40.0 * samples.noise_rms
     piece = samples.values[:_LOOK]
     start = 0.15 * float(piece.max() - piece.min())
-    index, first = kernels.extremes(piece, 1, start, least)
     stride = 1
-    if len(index) > 2 and not samples.counts:
-        stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
-    if len(samples) > _LOOK:
-        index, first = kernels.extremes(samples.values, stride, start, least)
+    if not samples.counts:
+        index, _ = kernels.extremes(piece[: len(piece) // 8], 1, start, least)
+        if len(index) > 3:
+            stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
+    index, first = kernels.extremes(samples.values, stride, start, least)
     time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
     if len(index) < 3:

@@ -100,14 +100,15 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Los
     columns = np.stack([-_integral(t, y**2), -_integral(t, y), -t, np.ones_like(t)], axis=1)
     # Late integrals carry the errors of all before: the weights must not be sharper.
     weight = 1.0 / np.hypot(sd, 3e-4 * y[0])
-    scale = np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    weighted = columns * weight[:, None]
+    normal, right = weighted.T @ weighted, weighted.T @ (y * weight)
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    normal = normal * scale[:, None] * scale + 1e-13 * np.eye(4)
     for held in ((), (2,), (0,), (0, 2)):
         free = [j for j in range(4) if j not in held]
-        solved, *_ = np.linalg.lstsq(
-            columns[:, free] * weight[:, None] / scale[free], y * weight, rcond=1e-10
-        )
         rates = np.zeros(4)
-        rates[free] = solved / scale[free]
+        rates[free] = np.linalg.solve(normal[np.ix_(free, free)], (right * scale)[free])
+        rates *= scale
         if np.all(rates[:3] >= 0.0):
             break
     return LossRates(*(max(float(rate), 0.0) for rate in rates[:3]))
@@ -116,6 +117,8 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Los
 def _integral(t: FloatArray, f: FloatArray) -> FloatArray:
     """Running integral: trapezoids with the end correction h^2/12 f'."""
     h = np.diff(t)
-    slope = np.gradient(f, t)
+    slope = np.empty_like(f)
+    slope[1:-1] = (f[2:] - f[:-2]) / (t[2:] - t[:-2])
+    slope[0], slope[-1] = (f[1] - f[0]) / h[0], (f[-1] - f[-2]) / h[-1]
     steps = 0.5 * h * (f[1:] + f[:-1]) + h**2 / 12.0 * (slope[:-1] - slope[1:])
     return np.concatenate([[0.0], np.cumsum(steps)])

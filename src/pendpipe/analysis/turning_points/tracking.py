@@ -161,8 +161,3 @@ def track(
             break
         half_period_s = period
     return count, residual, freedom
-
-
-def room_for(values: FloatArray, interval_s: float, half_period_s: float) -> FloatArray:
-    """Columns with room for all half cycles of a record."""
-    return np.empty((5, int(1.02 * len(values) * interval_s / half_period_s) + 64))

@@ -1,0 +1,88 @@
+"""The likelihood of rounded readings: each says only between which limits the angle lay.
+
+With noise of rms s before the rounding, a reading r stands for the interval r -+ step/2, and
+its probability is Phi((r + step/2 - m)/s) - Phi((r - step/2 - m)/s) for a model m. Where s
+is half a step or more this is the usual chi^2 with variance s^2 + step^2/12; below, that
+would take the rounding for random, which it is not, least of all in the tail.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pendpipe.arrays import FloatArray
+
+ROOT_HALF = math.sqrt(0.5)
+DENSITY = 1.0 / math.sqrt(2.0 * math.pi)
+_FAR = 25.0
+"""Standard deviations beyond which the tail's probability is taken from its series."""
+
+
+@njit(cache=True, nogil=True)
+def rounded(
+    residual: FloatArray, half_step: float, noise: float, score: FloatArray, weight: FloatArray
+) -> float:
+    """Return -2 ln likelihood, and fill in its derivatives by the model.
+
+    Parameters
+    ----------
+    residual
+        Readings less model, shape (n,).
+    half_step, noise
+        Half the step of the readings; rms of the noise before the rounding.
+    score, weight
+        To be filled: d ln P/dm and -d^2 ln P/dm^2 (never negative), shape (n,).
+    """
+    total = 0.0
+    for i in range(len(residual)):
+        low, high = (residual[i] - half_step) / noise, (residual[i] + half_step) / noise
+        # By symmetry the interval lies about zero or above it.
+        sign = 1.0
+        if low + high < 0.0:
+            low, high, sign = -high, -low, -1.0
+        if low > _FAR:
+            # ln P ~ -low^2/2 - ln(low sqrt(2 pi)): the far limit adds nothing.
+            total += low * low + 2.0 * math.log(low / DENSITY)
+            score[i] = sign * (low + 1.0 / low) / noise
+            weight[i] = (1.0 - 1.0 / low**2) / noise**2
+            continue
+        if low > 0.0:
+            chance = 0.5 * (math.erfc(low * ROOT_HALF) - math.erfc(high * ROOT_HALF))
+        else:
+            chance = 0.5 * (math.erf(high * ROOT_HALF) - math.erf(low * ROOT_HALF))
+        at_low = DENSITY * math.exp(-0.5 * low * low) / chance
+        at_high = DENSITY * math.exp(-0.5 * high * high) / chance
+        slope = at_low - at_high
+        total -= 2.0 * math.log(chance)
+        score[i] = sign * slope / noise
+        weight[i] = max(slope * slope - low * at_low + high * at_high, 0.0) / noise**2
+    return total
+
+
+def best_noise(residual: FloatArray, step: float, start: float) -> float:
+    """Noise before the rounding that makes the readings likeliest, between step/25 and step.
+
+    By golden section on its logarithm.
+    """
+    score, weight = np.empty_like(residual), np.empty_like(residual)
+
+    def unlikely(logarithm: float) -> float:
+        return float(rounded(residual, 0.5 * step, math.exp(logarithm), score, weight))
+
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    low, high = math.log(0.04 * step), math.log(max(step, 2.0 * start))
+    inner, outer = high - golden * (high - low), low + golden * (high - low)
+    at_inner, at_outer = unlikely(inner), unlikely(outer)
+    while high - low > 0.02:
+        if at_inner < at_outer:
+            high, outer, at_outer = outer, inner, at_inner
+            inner = high - golden * (high - low)
+            at_inner = unlikely(inner)
+        else:
+            low, inner, at_inner = inner, outer, at_outer
+            outer = low + golden * (high - low)
+            at_outer = unlikely(outer)
+    return math.exp(0.5 * (low + high))

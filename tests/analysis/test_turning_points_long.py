@@ -1,0 +1,66 @@
+"""Long records: followed in one pass or piece by piece, with the answer of the whole."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.blocks import in_blocks
+from pendpipe.analysis.turning_points.find import turning_points_of
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.table import TurningPoints
+from pendpipe.arrays import FloatArray
+
+HALF_PERIOD = 1.0
+NOISE = 1e-4
+
+
+def long_record(quality: float, seconds: float = 3000.0) -> tuple[Samples, float]:
+    """A decay of Eq. 3, at 106 readings a half cycle, and its rate."""
+    rate = math.pi / (2.0 * quality)
+    time = np.arange(int(seconds * 106)) / 106.0
+    motion = 0.068 * np.exp(-rate * time) * np.cos(math.pi * time + 0.3)
+    noise = NOISE * np.random.default_rng(1).standard_normal(len(time))
+    return Samples(time, motion + noise + 2e-3, "rad", None, NOISE), rate
+
+
+def errors(points: TurningPoints, rate: float) -> tuple[FloatArray, FloatArray]:
+    lag = math.atan(rate / math.pi)
+    turning = (np.arange(len(points)) + 1.0) - (0.3 + lag) / math.pi
+    angle = np.cos(lag) * 0.068 * np.exp(-rate * turning) * points.side
+    return points.angle_rad - angle, points.time_s - turning
+
+
+@pytest.mark.parametrize(
+    ("quality", "half_cycles"), [(5000.0, 3000), (400.0, 1200)], ids=["one pass", "in pieces"]
+)
+def test_pieces_have_the_errors_of_the_whole(quality: float, half_cycles: int) -> None:
+    samples, rate = long_record(quality, float(half_cycles))
+    points = in_blocks(samples, turning_points_of, block=1 << 16)
+    assert np.array_equal(points.half_cycle, np.arange(half_cycles))
+    angle, late = errors(points, rate)
+    pull = angle / points.angle_sd_rad
+    assert abs(pull.mean()) < 4.0 / math.sqrt(half_cycles)
+    assert pull.std() == pytest.approx(1.0, abs=0.06)
+    assert (late / points.time_sd_s).std() == pytest.approx(1.0, abs=0.06)
+    assert abs(np.mean(angle * points.side)) < 0.015 * NOISE
+
+
+def test_one_pass_and_whole_agree() -> None:
+    samples, _ = long_record(5000.0)
+    whole = turning_points_of(samples)
+    pieces = in_blocks(samples, turning_points_of, block=1 << 16)
+    difference = (pieces.angle_rad - whole.angle_rad) / whole.angle_sd_rad
+    assert np.sqrt(np.mean(difference**2)) < 0.3
+    assert pieces.noise_rms_rad == pytest.approx(whole.noise_rms_rad, rel=0.01)
+
+
+def test_a_pause_in_a_long_record_is_counted_over() -> None:
+    samples, rate = long_record(5000.0)
+    keep = (samples.time_s < 1400.0) | (samples.time_s > 1417.5)
+    cut = Samples(samples.time_s[keep], samples.values[keep], "rad", None, NOISE)
+    points = in_blocks(cut, turning_points_of, block=1 << 16)
+    turning = points.half_cycle + 1.0 - (0.3 + math.atan(rate / math.pi)) / math.pi
+    assert np.max(np.abs(points.time_s - turning)) < 0.01
