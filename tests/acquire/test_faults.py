@@ -168,7 +168,8 @@ def test_unplugged_and_plugged_in_again_is_a_gap_of_its_true_extent(
     gap = np.flatnonzero(recording.quality == MISSING)
     assert np.all(np.diff(gap) == 1)
     assert len(gap) >= 14.0 * RATE_HZ
-    assert gap[0] == pytest.approx(2000, abs=STAMP_S * RATE_HZ)
+    # What the host had not yet read goes with the plug, and on a busy machine that is some.
+    assert gap[0] <= 2000 + STAMP_S * RATE_HZ
     # What was read behind the gap stands at the time at which it was so.
     assert error_steps(recording, late_s=STAMP_S) <= 0.51
 

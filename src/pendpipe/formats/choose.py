@@ -248,7 +248,7 @@ def _readings(channels: Sequence[Column]) -> tuple[tuple[Column, ...], tuple[str
 def _moves(column: Column) -> bool:
     """Leave out columns that stand still, or are mostly empty."""
     finite = column.values[np.isfinite(column.values)]
-    return len(finite) >= max(2, len(column.values) // 2) and bool(np.ptp(finite) > 0)
+    return len(finite) >= max(2, len(column.values) // 2) and bool(finite.max() > finite.min())
 
 
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:

@@ -22,6 +22,10 @@ _SIZES: Final = (1156, 1536, 5296)
 _HIRES, _PACKED = 1 << 1, 1 << 14
 
 
+_LARGEST_SCALE: Final = 1e30
+"""No unit makes a count worth more than this: a greater scale is a damaged one."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """A channel's scale: value = slope * count + intercept, in `unit`; its rate divisor."""
@@ -115,7 +119,8 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         wrapped=circular and state == 2,
     )
     for channel in header.channels:
-        if not (isfinite(channel.slope) and isfinite(channel.intercept) and channel.slope):
+        # (Infinities and NaN fail the comparisons as well.)
+        if not (0.0 < abs(channel.slope) < _LARGEST_SCALE > abs(channel.intercept)):
             raise InputError(
                 place,
                 f"the scale of channel {channel.number} is damaged ({channel.slope:g})",
