@@ -12,6 +12,7 @@ import pytest
 from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
 from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
 from pendpipe.errors import InputError
@@ -220,3 +221,34 @@ def test_a_dead_channel_is_one_line_and_status_2(
     assert cli.main(["fit", str(recording), "--out", str(tmp_path / "f.json")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "f.json").exists()
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.2], ids=["hardly any noise", "noise of step/5"])
+def test_rounding_that_is_not_random_is_taken_for_what_it_is(noise: float) -> None:
+    """Steps of 1.27 mrad, and a tail that ends within one: chi^2 would err by 2 sd."""
+    step, pull = 1.27e-3, []
+    for seed in range(12):
+        release = Release(-0.3, 0.060 + 0.001 * seed, 0.003 + 1.1e-4 * seed)
+        values = noisy(sample(FIG_8, release, TIME), noise * step, seed)
+        recording = Recording(TIME, np.round(values / step) * step, "angle_rad", resolution=step)
+        result = fit_recording(recording)
+        assert result.noise_rms_rad >= step / math.sqrt(12.0)
+        pull.append(list(pulls(result, {name: TRUTH[name] for name in "abc"}).values()))
+    assert np.all(np.abs(np.mean(pull, axis=0)) < 1.0)
+    assert np.all(np.sqrt(np.mean(np.square(pull), axis=0)) < 1.6)
+
+
+def test_the_likelihood_of_roundings_has_the_slope_it_says() -> None:
+    residual = np.linspace(-40.0, 40.0, 401)
+    score, weight, spare = np.empty(401), np.empty(401), np.empty(401)
+    for k in (0, 100, 199, 200, 207, 300, 400):
+        one = residual[k : k + 1]
+        rounded(one, 0.5, 1.0, score[k : k + 1], weight[k : k + 1])
+        step = 1e-3
+        up = rounded(one - step, 0.5, 1.0, spare[:1], spare[1:2])
+        down = rounded(one + step, 0.5, 1.0, spare[:1], spare[1:2])
+        here = rounded(one, 0.5, 1.0, spare[:1], spare[1:2])
+        assert score[k] == pytest.approx(-0.25 * (up - down) / step, rel=1e-3, abs=1e-5)
+        assert weight[k] == pytest.approx(0.5 * (up + down - 2 * here) / step**2, rel=2e-2)
+    wide = rounded(np.zeros(1), 50.0, 1.0, spare[:1], spare[1:2])
+    assert wide == pytest.approx(0.0, abs=1e-12)

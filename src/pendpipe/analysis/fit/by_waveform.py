@@ -87,7 +87,9 @@ def fit_waveform(
     noise = judge_noise(samples, points, residual, fitted.problem)
     rms = float(np.sqrt(np.mean(residual**2)))
     chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
-    stretched = max(misfit(chi2_per_dof, dof), noise.slow)
+    # What rounding leaves is slow by nature; its likelihood knows that already.
+    slow = noise.slow if fitted.problem.step == 0.0 else 1.0
+    stretched = max(misfit(chi2_per_dof, dof), slow)
     # The search weighed the readings by its own first guess of the noise.
     weighed = noise.rms if fitted.problem.step == 0.0 else fitted.problem.noise_rms
     scale = (fitted.problem.noise_rms / weighed) ** 2 / stretched
