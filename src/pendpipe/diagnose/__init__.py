@@ -1,0 +1,1 @@
+"""Where a model and a recording differ, and what was left out."""

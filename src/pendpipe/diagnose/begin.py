@@ -1,0 +1,102 @@
+"""From a recording to readings and start values of the baseline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.fit.start import start_values, usable_span
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data, gather
+from pendpipe.diagnose.model import OMEGA, SHARE, START, TIME, A, B, C, Model, OFFSET
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Where a diagnosis begins.
+
+    Parameters
+    ----------
+    data
+        The readings of the free decay, not those about the stop.
+    model
+        The baseline alone.
+    value
+        Its start values.
+    held
+        Indices of what is not fitted.
+    noise_rms
+        First estimate of one reading's noise.
+    points
+        The turning points.
+    """
+
+    data: Data
+    model: Model
+    value: FloatArray
+    held: tuple[int, ...]
+    noise_rms: float
+    points: TurningPoints
+
+
+def begin(
+    samples: Samples, points: TurningPoints, *, baseline: Baseline, fixed: Mapping[str, float],
+) -> Beginning:  # fmt: skip
+    """Choose the readings that are compared, and the values from which the search starts."""
+    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
+    start = start_values(points, held_rates, fixed, baseline)
+    span = usable_span(samples, points, start)
+    value = np.empty(8)
+    a, b, c, omega, angle, time, offset, share = start.value
+    value[[A, B, C, SHARE, OMEGA, START, TIME, OFFSET]] = (
+        a, b, c, min(max(share, 0.0), 1.0), omega, angle, time, offset,
+    )  # fmt: skip
+    if "offset" in fixed:
+        value[OFFSET] = fixed["offset"]
+    data = gather(
+        samples.time_s[span], samples.values[span], step=samples.step, unit=samples.unit,
+        counts=samples.counts, period_s=2.0 * math.pi / omega,
+    )  # fmt: skip
+    model = Model(data.time_s, data.interval_s, order=order_for(abs(angle), samples.unit))
+    return Beginning(
+        data, model, value, _held(held_rates, fixed, parts, baseline), points.noise_rms_rad, points
+    )
+
+
+def order_for(amplitude: float, unit: str) -> int:
+    """Nodes in a half cycle: more where sin(x) is far from x."""
+    if unit != "rad" or amplitude < 0.8:
+        return 14
+    if amplitude < 1.6:
+        return 20
+    return 28 if amplitude < 2.4 else 48
+
+
+def _held(
+    held_rates: Mapping[str, float], fixed: Mapping[str, float], parts: Mapping[str, float],
+    baseline: Baseline,
+) -> tuple[int, ...]:  # fmt: skip
+    index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
+    held = [index[name] for name in held_rates]
+    if "frequency" in fixed:
+        held.append(OMEGA)
+    if parts or baseline == "viscous" or held_rates.get("b") == 0.0:
+        held.append(SHARE)
+    return tuple(held)
+
+
+def read_samples(part: object, place: str | Path) -> Samples:
+    """Prepare the readings of a recording's free decay."""
+    from pendpipe.analysis.turning_points.samples import prepare
+    from pendpipe.recording import Recording
+
+    assert isinstance(part, Recording)
+    return prepare(part, place)

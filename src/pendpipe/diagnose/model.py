@@ -1,0 +1,294 @@
+"""The baseline and any effects of the catalogue, as one model of the readings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Clock, Motion, NoMotionError, Tangent, follow, rates
+from pendpipe.dynamics.sampling import Sampled, sample_motion
+from pendpipe.effects import Effect, Pendulum, Span
+
+BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")
+"""Eq. 13's rates; the hysteretic share of b; omega; the turning point from which the motion
+starts (about the equilibrium) and when; and the reading of the equilibrium."""
+A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
+_LOW: Final = (0.0, 0.0, 0.0, 0.0, 1e-9, -math.inf, -math.inf, -math.inf)
+_HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, math.inf)
+_SPARE: Final = 3
+"""Half cycles beyond the last reading."""
+
+
+class Evaluated(NamedTuple):
+    """A model at given values."""
+
+    reading: FloatArray
+    sampled: Sampled
+    tangent: Tangent
+    span: Span
+
+
+@dataclass(frozen=True)
+class Model:
+    """Eq. 8 with effects.
+
+    Parameters
+    ----------
+    time_s
+        When the readings were taken, shape (n,).
+    interval_s
+        Between them, usually.
+    effects
+        What is added; their values follow the baseline's in the vector of parameters.
+    """
+
+    time_s: FloatArray
+    interval_s: float
+    effects: tuple[Effect, ...] = ()
+    order: int = 14
+    _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
+
+    def adding(self, effect: Effect) -> Model:
+        """The same with one effect more."""
+        return replace(self, effects=(*self.effects, effect), _last=dict(self._last))
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(BASELINE) + sum(effect.count for effect in self.effects)
+
+    def places(self) -> list[tuple[Effect, slice]]:
+        """Each effect with the place of its values."""
+        found, first = [], len(BASELINE)
+        for effect in self.effects:
+            found.append((effect, slice(first, first + effect.count)))
+            first += effect.count
+        return found
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest values."""
+        low, high = list(_LOW), list(_HIGH)
+        for effect in self.effects:
+            low += [0.0] * effect.switch + [parameter.low for parameter in effect.parameters]
+            high += [1.0] * effect.switch + [parameter.high for parameter in effect.parameters]
+        return np.array(low), np.array(high)
+
+    def held(self) -> list[int]:
+        """Indices that are never fitted: the sizes of switches."""
+        return [place.start for effect, place in self.places() if effect.switch]
+
+    def pendulum(self, value: FloatArray) -> Pendulum:
+        """The baseline's constants."""
+        return Pendulum(
+            float(value[OMEGA]), float(value[A]), float(value[SHARE] * value[B]),
+            float((1.0 - value[SHARE]) * value[B]), float(value[C]),
+        )  # fmt: skip
+
+    def span(self, value: FloatArray, sampled: Sampled) -> Span:
+        """What the scans of effects must know."""
+        return Span(
+            float(self.time_s[0]), float(self.time_s[-1]), self.interval_s, self.pendulum(value),
+            float(sampled.amplitude[0]), float(sampled.amplitude[-1]), float(value[OFFSET]),
+        )  # fmt: skip
+
+    def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
+        """x'' + omega^2 x of the baseline and of all effects."""
+        pendulum = self.pendulum(value)
+        total = pendulum.acceleration(motion)
+        for effect, place in self.places():
+            extra = effect.acceleration(motion, pendulum, value[place])
+            if extra is not None:
+                total = total + extra
+        return total
+
+    def follow(self, value: FloatArray) -> Motion:
+        """Solve the motion.
+
+        Raises
+        ------
+        NoMotionError
+            If it stops, or runs away, before the last reading.
+        """
+        omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
+        count = self._half_cycles(omega, begin)
+        guess = self._last.get("motion")
+        if guess is None or guess.clock != Clock(count, self.order):
+            guess = _closed_form(value, Clock(count, self.order))
+        motion = follow(lambda m: self.acceleration(m, value), omega, start, begin, guess)
+        self._last["motion"] = motion
+        return self._kicked(motion, value)
+
+    def _half_cycles(self, omega: float, begin: float) -> int:
+        needed = (self.time_s[-1] - begin) * omega / math.pi
+        if not 1.0 <= needed < 2e5:
+            raise NoMotionError("the frequency is out of reach")
+        last = self._last.get("motion")
+        if last is not None and _SPARE - 2 <= last.clock.count - needed <= 4 * _SPARE + 0.1 * needed:
+            return last.clock.count
+        return math.ceil(needed) + _SPARE + int(0.02 * needed)
+
+    def _kicked(self, motion: Motion, value: FloatArray) -> Motion:
+        """Put the sudden changes of the effects in."""
+        for effect, place in self.places():
+            kick = effect.kick(value[place])
+            if kick is None:
+                continue
+            by_log, by_time = kick_change(motion, kick.time_s, kick)
+            law = lambda m: self.acceleration(m, value)  # noqa: E731
+            grown, late = Tangent(law, motion).of_reset(by_log, by_time)
+            motion = Motion(
+                motion.clock, motion.angular_frequency, motion.log_amplitude + grown,
+                motion.time_s + late, motion.upwards,
+            )  # fmt: skip
+        return motion
+
+    def evaluate(self, value: FloatArray) -> Evaluated:
+        """Return readings, and what the derivatives need."""
+        motion = self.follow(value)
+        if motion.time_s[-1, -1] < self.time_s[-1]:
+            self._last.pop("motion", None)
+            raise NoMotionError("the frequency is out of reach")
+        times = self.time_s
+        for effect, place in self.places():
+            delay = effect.delay(self.time_s, value[place])
+            if delay is not None:
+                times = times + delay
+        sampled = sample_motion(motion, times)
+        pendulum = self.pendulum(value)
+        reading = value[OFFSET] + sampled.angle
+        for effect, place in self.places():
+            extra = effect.reading(sampled, pendulum, value[place])
+            if extra is not None:
+                reading = reading + extra
+        tangent = Tangent(lambda m: self.acceleration(m, value), motion)
+        return Evaluated(reading, sampled, tangent, self.span(value, sampled))
+
+    def reading(self, value: FloatArray) -> FloatArray:
+        """Return the readings alone, shape (n,)."""
+        return self.evaluate(value).reading
+
+    def jacobian(self, value: FloatArray, at: Evaluated) -> FloatArray:
+        """Derivatives of the readings by all values, shape (n, size)."""
+        sampled, tangent = at.sampled, at.tangent
+        motion, pendulum = tangent.motion, self.pendulum(value)
+        omega = pendulum.angular_frequency
+        columns = np.empty((len(self.time_s), self.size))
+        speed = omega * motion.amplitude
+        dry = -0.5 * math.pi * motion.direction
+        by_hysteretic = dry * speed
+        by_viscous = -2.0 * motion.velocity
+        share = float(value[SHARE])
+        forces = {
+            A: dry / omega * speed * speed,
+            B: share * by_hysteretic + (1.0 - share) * by_viscous,
+            C: dry * omega * np.ones_like(motion.angle),
+            SHARE: value[B] * (by_hysteretic - by_viscous),
+        }
+        for index, force in forces.items():
+            columns[:, index] = sampled.change(*tangent.of_force(force))
+        columns[:, OMEGA] = self._by_omega(value, at)
+        by_log, by_time = tangent.of_start()
+        columns[:, START] = sampled.change(by_log, by_time) / value[START]
+        columns[:, TIME] = -sampled.velocity
+        columns[:, OFFSET] = 1.0
+        for effect, place in self.places():
+            for index in range(effect.count):
+                columns[:, place.start + index] = self.derivative(
+                    effect, value[place], index, at, pendulum
+                )
+        return columns
+
+    def _by_omega(self, value: FloatArray, at: Evaluated) -> FloatArray:
+        motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
+        moved = value.copy()
+        moved[OMEGA] += step
+        other = Motion(
+            motion.clock, float(moved[OMEGA]), motion.log_amplitude, motion.time_s, motion.upwards
+        )
+        new = rates(lambda m: self.acceleration(m, moved), other)
+        old = at.tangent.rates
+        loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
+        return at.sampled.change(*at.tangent.of_rates(loss, pace))
+
+    def derivative(
+        self, effect: Effect, values: FloatArray, index: int, at: Evaluated, pendulum: Pendulum
+    ) -> FloatArray:
+        """Derivative of the readings by one value of one effect, along the motion."""
+        low, high = values.copy(), values.copy()
+        step = self._step(effect, values, index, at.span)
+        low[index] -= step
+        high[index] += step
+        return response(effect, low, high, at, pendulum) / (2.0 * step)
+
+    def _step(self, effect: Effect, values: FloatArray, index: int, span: Span) -> float:
+        if index < effect.sizes:
+            return max(effect.small(span), 1e-4 * abs(float(values[index])))
+        return max(1e-4 * abs(float(values[index])), 1e-9)
+
+
+def response(
+    effect: Effect, low: FloatArray, high: FloatArray, at: Evaluated, pendulum: Pendulum
+) -> FloatArray:
+    """Change of the readings when the values of one effect go from `low` to `high`."""
+    sampled, tangent = at.sampled, at.tangent
+    total = np.zeros(len(sampled.time_s))
+    before = effect.acceleration(tangent.motion, pendulum, low)
+    if before is not None:
+        after = effect.acceleration(tangent.motion, pendulum, high)
+        assert after is not None
+        total += sampled.change(*tangent.of_force(after - before))
+    kick = effect.kick(high)
+    if kick is not None:
+        total += _kick_response(at, kick) - _kick_response(at, effect.kick(low))
+    added = effect.reading(sampled, pendulum, high)
+    if added is not None:
+        total += added - effect.reading(sampled, pendulum, low)
+    late = effect.delay(sampled.time_s, high)
+    if late is not None:
+        earlier = effect.delay(sampled.time_s, low)
+        assert earlier is not None
+        total += sampled.velocity * (late - earlier)
+    return total
+
+
+def _kick_response(at: Evaluated, kick: object) -> FloatArray:
+    from pendpipe.effects import Kick
+
+    assert isinstance(kick, Kick)
+    by_log, by_time = kick_change(at.tangent.motion, kick.time_s, kick)
+    return at.sampled.change(*at.tangent.of_reset(by_log, by_time))
+
+
+def kick_change(motion: Motion, time_s: float, kick: object) -> tuple[FloatArray, FloatArray]:
+    """What a kick adds to ln r and t at the nodes behind it."""
+    from pendpipe.effects import Kick
+
+    assert isinstance(kick, Kick)
+    there = sample_motion(motion, np.array([time_s]))
+    omega = motion.angular_frequency
+    x, v = float(there.angle[0]), float(there.velocity[0])
+    new_x, new_v = x + kick.angle, v + kick.velocity
+    by_log = 0.5 * math.log(
+        (new_x**2 + (new_v / omega) ** 2) / (x**2 + (v / omega) ** 2)
+    ) + kick.log_amplitude
+    turned = math.remainder(
+        math.atan2(-new_v / omega, new_x) - math.atan2(-v / omega, x), 2.0 * math.pi
+    )
+    behind = np.where(motion.time_s > time_s, 1.0, 0.0)
+    return by_log * behind, -turned / omega * behind
+
+
+def _closed_form(value: FloatArray, clock: Clock) -> Motion:
+    """The motion by Eq. 14, without ripple."""
+    from pendpipe.physics.decay import amplitude
+
+    omega = float(value[OMEGA])
+    time = value[TIME] + clock.psi / omega
+    start = abs(float(value[START]))
+    decayed = amplitude(clock.psi / omega, start, *(max(float(value[k]), 0.0) for k in (A, B, C)))
+    floor = np.maximum(decayed, 1e-3 * start)
+    return Motion(clock, omega, np.log(floor), time, math.copysign(1.0, value[START]))

@@ -1,0 +1,171 @@
+"""Maximum likelihood of a model's values, from however far away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.model import OMEGA, SHARE, Evaluated, Model
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.unwrapped import unwrapped
+from pendpipe.dynamics.any_law import NoMotionError
+
+_ROUNDS: Final = 14
+_SETTLED: Final = 0.02
+"""Of chi^2: a step that promises less is the last."""
+_SHARE_SD: Final = 0.3
+"""The hysteretic share of b is hardly seen in one record: any between 0 and 1 may be."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model at its best values.
+
+    Parameters
+    ----------
+    model, value
+        The model, and its values.
+    chi2
+        Sum of squares of the whitened residual, with the share's prior.
+    residual
+        Whitened; one entry more than there are readings (the prior), shape (n + 1,).
+    jacobian
+        Of the whitened readings by all values, with the prior's row, shape (n + 1, size).
+    at
+        The model there.
+    free
+        Indices of the values that were fitted.
+    converged
+        Whether the last step was negligible.
+    slip_rad
+        The largest phase by which model and readings differ.
+    """
+
+    model: Model
+    value: FloatArray
+    chi2: float
+    residual: FloatArray
+    jacobian: FloatArray
+    at: Evaluated
+    free: tuple[int, ...]
+    converged: bool
+    slip_rad: float
+
+    def covariance(self) -> FloatArray:
+        """Of all values; zero for those held, shape (size, size)."""
+        matrix = np.zeros((len(self.value), len(self.value)))
+        part = self.jacobian[:, self.free]
+        scale = np.linalg.norm(part, axis=0)
+        scale[scale == 0.0] = 1.0
+        inverse = np.linalg.pinv(part / scale, rcond=1e-12)
+        matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
+        return matrix
+
+
+def refine(
+    model: Model, data: Data, noise: Noise, start: FloatArray, *, held: Iterable[int] = (),
+    rounds: int = _ROUNDS,
+) -> Fit:  # fmt: skip
+    """Minimise chi^2 by Gauss and Newton, within the bounds.
+
+    Where model and readings are out of phase by much, the residual is taken along the
+    motion (amplitude and unwrapped phase, cycle by cycle), so that it stays linear.
+
+    Raises
+    ------
+    NoMotionError
+        If the model can't be evaluated at the start.
+    """
+    fixed = {*held, *model.held()}
+    free = np.array([k for k in range(model.size) if k not in fixed])
+    low, high = model.bounds()
+    value = np.clip(start, low, high)
+    at = model.evaluate(value)
+    residual, slip = _residual(data, noise, at, value)
+    converged = False
+    damping = 0.0
+    for _ in range(rounds):
+        jacobian = _jacobian(model, noise, value, at)
+        step = _step(jacobian, residual, free, value, low, high, damping)
+        promised = float(residual @ residual - np.sum((residual - jacobian @ step) ** 2))
+        accepted = False
+        for shrink in (1.0, 0.3, 0.1, 0.02):
+            trial = np.clip(value + shrink * step, low, high)
+            try:
+                there = model.evaluate(trial)
+            except NoMotionError:
+                continue
+            new, new_slip = _residual(data, noise, there, trial)
+            if new @ new < residual @ residual + 0.5 * _SETTLED:
+                accepted = True
+                break
+        if not accepted:
+            converged = promised < 10.0 * _SETTLED
+            break
+        gained = float(residual @ residual - new @ new)
+        value, at, residual, slip = trial, there, new, new_slip
+        if promised < _SETTLED or (gained < _SETTLED and promised < 1.0):
+            converged = True
+            break
+    jacobian = _jacobian(model, noise, value, at)
+    return Fit(
+        model, value, float(residual @ residual), residual, jacobian, at, tuple(free.tolist()),
+        converged, slip,
+    )  # fmt: skip
+
+
+def _residual(
+    data: Data, noise: Noise, at: Evaluated, value: FloatArray
+) -> tuple[FloatArray, float]:
+    """The whitened residual with the prior's entry, and the largest slip of the phase."""
+    plain, slip = unwrapped(data, at)
+    prior = (0.5 - value[SHARE]) / _SHARE_SD
+    return np.append(noise.whiten(plain), prior), slip
+
+
+def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:
+    columns = np.empty((len(at.reading) + 1, model.size))
+    columns[:-1] = noise.whiten(model.jacobian(value, at))
+    columns[-1] = 0.0
+    columns[-1, SHARE] = 1.0 / _SHARE_SD
+    return columns
+
+
+def _step(
+    jacobian: FloatArray, residual: FloatArray, free: FloatArray, value: FloatArray,
+    low: FloatArray, high: FloatArray, damping: float,
+) -> FloatArray:  # fmt: skip
+    """The Gauss-Newton step; values that would leave their bounds go to them and stay."""
+    step = np.zeros(len(value))
+    moving = list(free)
+    rest = residual
+    for _ in range(4):
+        if not moving:
+            break
+        part = jacobian[:, moving]
+        scale = np.linalg.norm(part, axis=0)
+        scale[scale == 0.0] = 1.0
+        solved = np.linalg.lstsq(part / scale, rest, rcond=1e-11)[0] / scale
+        target = value[moving] + solved
+        out = (target < low[moving]) | (target > high[moving])
+        step[moving] = solved
+        if not out.any():
+            break
+        for index, wrong in zip(list(moving), out, strict=True):
+            if wrong:
+                bound = low[index] if value[index] + step[index] < low[index] else high[index]
+                step[index] = bound - value[index]
+                rest = rest - jacobian[:, index] * step[index]
+                moving.remove(index)
+    limit = 0.05 * value[OMEGA]
+    if abs(step[OMEGA]) > limit:
+        step *= limit / abs(step[OMEGA])
+    return step
+
+
+__all__ = ["Fit", "refine"]

@@ -1,0 +1,108 @@
+"""A motion read at given times."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.any_law import Motion
+
+_POINTS: Final = 6
+"""Neighbouring nodes that a value is interpolated from."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A motion at given times; arrays of shape (n,).
+
+    Parameters
+    ----------
+    motion
+        What was sampled.
+    time_s, phase, amplitude
+        Times, psi and r.
+    """
+
+    motion: Motion
+    time_s: FloatArray
+    phase: FloatArray
+    amplitude: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    _first: IntArray
+    _weights: FloatArray
+
+    @property
+    def angle(self) -> FloatArray:
+        """x, rad, from the equilibrium."""
+        return self.motion.upwards * self.amplitude * self.cosine
+
+    @property
+    def velocity(self) -> FloatArray:
+        """x', rad/s."""
+        omega = self.motion.angular_frequency
+        return -self.motion.upwards * omega * self.amplitude * self.sine
+
+    @property
+    def direction(self) -> FloatArray:
+        """Sign of the velocity."""
+        return np.asarray(np.where(self.motion.upwards * self.sine > 0.0, -1.0, 1.0))
+
+    def at_nodes(self, values: FloatArray) -> FloatArray:
+        """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""
+        flat = values.reshape(*values.shape[:-2], -1)
+        total = self._weights[0] * flat[..., self._first]
+        for point in range(1, _POINTS):
+            total = total + self._weights[point] * flat[..., self._first + point]
+        return np.asarray(total)
+
+    def change(self, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
+        """Change of the angle, rad, from changes of ln r and of t at fixed phase."""
+        return np.asarray(
+            self.angle * self.at_nodes(by_log) - self.velocity * self.at_nodes(by_time)
+        )
+
+
+def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
+    """Read a motion at times within its clock.
+
+    psi - omega t and ln r are slow; each is interpolated by the polynomial through six nodes
+    of its half cycle.
+    """
+    order = motion.clock.order
+    nodes = motion.time_s
+    half = np.clip(np.searchsorted(nodes[:, 0], time_s, side="right") - 1, 0, len(nodes) - 1)
+    # Where in the half cycle, nearly: the nodes are equally spaced in the angle theta.
+    share = (time_s - nodes[half, 0]) / (nodes[half, -1] - nodes[half, 0])
+    theta = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0)) / math.pi * order
+    left = np.clip(np.rint(theta - 0.5 * (_POINTS - 1)), 0, order + 1 - _POINTS)
+    first = (half * (order + 1) + left).astype(np.intp)
+    weights = _lagrange(nodes.reshape(-1), first, time_s)
+    omega = motion.angular_frequency
+    slow = (motion.clock.psi - omega * (nodes - nodes[0, 0])).reshape(-1)
+    logs = motion.log_amplitude.reshape(-1)
+    phase = omega * (time_s - nodes[0, 0])
+    log_amplitude = np.zeros_like(phase)
+    for point in range(_POINTS):
+        phase = phase + weights[point] * slow[first + point]
+        log_amplitude = log_amplitude + weights[point] * logs[first + point]
+    return Sampled(
+        motion, time_s, phase, np.exp(log_amplitude), np.cos(phase), np.sin(phase), first, weights
+    )
+
+
+def _lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
+    """Weights of the six nodes from `first` on at each time, shape (6, n)."""
+    near = [nodes[first + point] for point in range(_POINTS)]
+    weights = np.empty((_POINTS, len(time_s)))
+    for point in range(_POINTS):
+        product = np.ones_like(time_s)
+        for other in range(_POINTS):
+            if other != point:
+                product = product * (time_s - near[other]) / (near[point] - near[other])
+        weights[point] = product
+    return weights

@@ -1,0 +1,5 @@
+"""What may have been left out: the catalogue, an effect a class."""
+
+from pendpipe.effects.effect import Effect, Kick, Parameter, Pendulum, Span
+
+__all__ = ["Effect", "Kick", "Parameter", "Pendulum", "Span"]

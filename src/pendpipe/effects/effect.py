@@ -1,0 +1,166 @@
+"""What an effect declares of itself, once: for simulation, diagnosis, report and manual."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.any_law import Motion
+    from pendpipe.dynamics.sampling import Sampled
+
+Kind = Literal["dynamics", "measurement", "parameter", "unnamed"]
+
+
+class Parameter(NamedTuple):
+    """A parameter of an effect, with the bounds within which it is believed."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+class Kick(NamedTuple):
+    """A sudden change of the motion: at `time_s` the angle and the velocity jump."""
+
+    time_s: float
+    angle: float = 0.0
+    velocity: float = 0.0
+    log_amplitude: float = 0.0
+    """Change of ln r at unchanged phase."""
+
+
+@dataclass(frozen=True)
+class Pendulum:
+    """The baseline's constants (Eq. 8 by the first-order rates of Eq. 13).
+
+    Parameters
+    ----------
+    angular_frequency
+        omega, rad/s.
+    quadratic, hysteretic, viscous, coulomb
+        a in 1/(rad s); the parts b_h and b_v of b in 1/s; c in rad/s.
+    """
+
+    angular_frequency: float
+    quadratic: float = 0.0
+    hysteretic: float = 0.0
+    viscous: float = 0.0
+    coulomb: float = 0.0
+
+    @property
+    def linear(self) -> float:
+        """b = b_h + b_v, 1/s."""
+        return self.hysteretic + self.viscous
+
+    @property
+    def fluid_acceleration(self) -> float:
+        """f_q of Eq. 8, 1/rad: pi a/(2 omega)."""
+        return 0.5 * math.pi * self.quadratic / self.angular_frequency
+
+    def acceleration(self, motion: Motion | Sampled) -> FloatArray:
+        """Return x'' + omega^2 x of Eq. 8 at the nodes, rad/s^2."""
+        omega = self.angular_frequency
+        speed = omega * motion.amplitude
+        friction = 0.5 * math.pi * (
+            omega * self.coulomb + self.hysteretic * speed + self.quadratic / omega * speed * speed
+        )  # fmt: skip
+        return -motion.direction * friction - 2.0 * self.viscous * motion.velocity
+
+
+class Span(NamedTuple):
+    """What a scan over an effect's shape must know of the recording."""
+
+    start_s: float
+    stop_s: float
+    interval_s: float
+    """Between the readings that are analysed."""
+    pendulum: Pendulum
+    first_amplitude: float
+    last_amplitude: float
+    offset: float = 0.0
+
+    @property
+    def duration_s(self) -> float:
+        """From the first reading to the last."""
+        return self.stop_s - self.start_s
+
+    @property
+    def period_s(self) -> float:
+        """2 pi/omega."""
+        return 2.0 * math.pi / self.pendulum.angular_frequency
+
+    def times(self, count: int) -> FloatArray:
+        """Instants for a scan: inside the record, one and a half periods from its ends."""
+        edge = min(1.5 * self.period_s, 0.25 * self.duration_s)
+        return np.linspace(self.start_s + edge, self.stop_s - edge, count)
+
+    def amplitudes(self, count: int) -> FloatArray:
+        """Amplitudes for a scan, in equal ratios, within those of the record."""
+        return np.geomspace(self.last_amplitude, self.first_amplitude, count + 2)[1:-1]
+
+
+class Effect:
+    """One thing that may have been left out.
+
+    A subclass sets the class variables and overrides what the effect changes: the
+    acceleration, the state (a kick), the reading, or the reading's clock. Its `values` are
+    those of `parameters` in their order: first the sizes, at zero of which the effect is
+    absent, then the shape (an exponent, an instant, a time constant ...).
+    """
+
+    identifier: ClassVar[str]
+    name: ClassVar[str]
+    kind: ClassVar[Kind]
+    equation: ClassVar[str]
+    """LaTeX."""
+    parameters: ClassVar[tuple[Parameter, ...]]
+    deciding: ClassVar[str]
+    """The one further measurement that would tell it from its rivals."""
+    sizes: ClassVar[int] = 1
+    switch: ClassVar[bool] = False
+    """True where the effect has no free size: it is there, or it is not (size 1 or 0)."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
+    local: ClassVar[bool] = False
+    """Whether it happens at an instant."""
+
+    @property
+    def count(self) -> int:
+        """How many values describe it, a switch's size included."""
+        return len(self.parameters) + (1 if self.switch else 0)
+
+    def acceleration(
+        self, motion: Motion, pendulum: Pendulum, values: FloatArray
+    ) -> FloatArray | None:
+        """Return the extra acceleration, rad/s^2, at the nodes of a motion."""
+        return None
+
+    def kick(self, values: FloatArray) -> Kick | None:
+        """Return the sudden change of the motion."""
+        return None
+
+    def reading(
+        self, sampled: Sampled, pendulum: Pendulum, values: FloatArray
+    ) -> FloatArray | None:
+        """Return what is added to the readings, rad."""
+        return None
+
+    def delay(self, time_s: FloatArray, values: FloatArray) -> FloatArray | None:
+        """Return by how much later than its stamp each reading was taken, s."""
+        return None
+
+    def shapes(self, span: Span) -> Sequence[Sequence[float]]:
+        """Return the shapes that a scan tries, each a row of the values behind the sizes."""
+        return ((),)
+
+    def small(self, span: Span) -> float:
+        """Return a size so small that the effect is linear in it."""
+        return 1e-6
