@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data, gather
 from pendpipe.diagnose.model import OMEGA, SHARE, START, TIME, A, B, C, Model, OFFSET
+from pendpipe.diagnose.unwrapped import anchored
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ def begin(
         counts=samples.counts, period_s=2.0 * math.pi / omega,
     )  # fmt: skip
     model = Model(data.time_s, data.interval_s, order=order_for(abs(angle), samples.unit))
+    data = replace(data, anchor=anchored(data, model.evaluate(value)))
     return Beginning(
         data, model, value, _held(held_rates, fixed, parts, baseline), points.noise_rms_rad, points
     )

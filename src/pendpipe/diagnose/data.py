@@ -29,6 +29,9 @@ class Data:
         ``"rad"`` or ``"m"``.
     time_noise
         Whether the error is in the times (an encoder's counts).
+    anchor
+        A time in s near the beginning, and the phase of the readings then: so that whole
+        turns are counted alike whatever the model.
     """
 
     time_s: FloatArray
@@ -39,6 +42,7 @@ class Data:
     step: float = 0.0
     unit: str = "rad"
     time_noise: bool = False
+    anchor: tuple[float, float] | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)

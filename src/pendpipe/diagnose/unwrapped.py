@@ -15,6 +15,18 @@ _SLIP: Final = 0.15
 """Phase in rad, and part of the amplitude, from which the plain difference is no longer used."""
 
 
+def anchored(data: Data, at: Evaluated) -> tuple[float, float]:
+    """Return a time near the beginning and the readings' phase then, turns counted.
+
+    The model must be in phase with the first cycles, as a start from turning points is.
+    """
+    _, phase, centre = _alignment(data, at, data.values - at.reading)
+    if not len(phase):
+        return float(at.sampled.time_s[0]), float(at.sampled.phase[0])
+    when = float(np.interp(centre[0], at.sampled.phase, at.sampled.time_s))
+    return when, float(centre[0] + phase[0])
+
+
 def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     """Return readings minus model, linear in what changes amplitude and phase.
 
@@ -83,7 +95,10 @@ def _alignment(
         return np.zeros(0), np.zeros(0), np.zeros(0)
     # y = r (cosine cos psi + sine sin psi) = r R cos(psi + phase).
     phase = np.unwrap(np.arctan2(-sine, cosine))
-    # The first cycles are in phase with a start from turning points.
-    phase -= 2.0 * math.pi * np.round(phase[0] / (2.0 * math.pi))
+    expected = 0.0
+    if data.anchor is not None:
+        when, turned = data.anchor
+        expected = turned - float(np.interp(when, sampled.time_s, sampled.phase))
+    phase -= 2.0 * math.pi * np.round((phase[0] - expected) / (2.0 * math.pi))
     ratio = np.log(np.maximum(np.hypot(cosine, sine), 1e-3))
     return ratio, phase, middle / n

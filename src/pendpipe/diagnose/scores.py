@@ -1,0 +1,140 @@
+"""All effects' scores at once: one inner product each, projected and whitened.
+
+Along the fitted motion every effect has a sensitivity: what a little of it would do to the
+readings. What the model's own parameters could do as well is projected off; the score is the
+inner product of the rest, at unit length, with the whitened residual: locally the most
+powerful test there is. Scans over an effect's shape are many such columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.model import response
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.effects import Effect
+
+_SEEN = 1e-4
+"""Part of a sensitivity that must be left by the projection for it to be told at all."""
+
+
+class Candidate(NamedTuple):
+    """An effect of one shape, and where its columns stand."""
+
+    effect: Effect
+    shape: tuple[float, ...]
+    first: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Unit columns of all candidates, orthogonal to the model's tangent space.
+
+    Parameters
+    ----------
+    basis
+        Orthonormal, of the model's tangent space, shape (n + 1, p).
+    columns
+        Shape (n + 1, k), float32: a candidate's columns are orthonormal among themselves.
+    candidates
+        Whose they are.
+    lengths
+        Length of each candidate's first column for a unit of its size: how its size is read
+        off its score, shape (candidates,).
+    """
+
+    basis: FloatArray
+    columns: FloatArray
+    candidates: tuple[Candidate, ...]
+    lengths: FloatArray
+
+    def scores(self, residual: FloatArray) -> FloatArray:
+        """Sum of squares of each candidate's inner products; shape (candidates, ...)."""
+        products = self.columns.T @ residual.astype(np.float32)
+        squares = products.astype(np.float64) ** 2
+        starts = [candidate.first for candidate in self.candidates]
+        return np.asarray(np.add.reduceat(squares, starts, axis=0))
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Degrees of freedom of each candidate."""
+        return np.array([candidate.count for candidate in self.candidates], dtype=np.float64)
+
+
+def tangent_basis(fit: Fit) -> FloatArray:
+    """Orthonormal basis of what the fitted values can do, those at a bound included."""
+    part = fit.jacobian[:, list(fit.free)]
+    scale = np.linalg.norm(part, axis=0)
+    scale[scale == 0.0] = 1.0
+    left, sizes, _ = np.linalg.svd(part / scale, full_matrices=False)
+    return np.asarray(left[:, sizes > 1e-9 * sizes[0]])
+
+
+def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
+    """Work out the columns of all effects along a fitted motion."""
+    basis = tangent_basis(fit)
+    pieces: list[tuple[Effect, tuple[float, ...], list[FloatArray]]] = []
+    pendulum = fit.model.pendulum(fit.value)
+    for effect in effects:
+        small = effect.small(fit.at.span)
+        for shape in effect.shapes(fit.at.span):
+            columns = []
+            for index in range(effect.sizes):
+                low, high = _sizes(effect, shape, index, small)
+                columns.append(response(effect, low, high, fit.at, pendulum) / small)
+            pieces.append((effect, tuple(float(number) for number in shape), columns))
+    raw = np.stack([column for _, _, columns in pieces for column in columns], axis=1)
+    usable = np.all(np.isfinite(raw), axis=0)
+    raw[:, ~usable] = 0.0
+    tall = np.zeros((len(raw) + 1, raw.shape[1]))
+    tall[:-1] = noise.whiten(raw)
+    before = np.linalg.norm(tall, axis=0)
+    tall -= basis @ (basis.T @ tall)
+    tall -= basis @ (basis.T @ tall)
+    return _gathered(pieces, tall, before, basis)
+
+
+def _sizes(
+    effect: Effect, shape: Sequence[float], index: int, small: float
+) -> tuple[FloatArray, FloatArray]:
+    low = np.concatenate([np.zeros(effect.sizes), np.asarray(shape, dtype=np.float64)])
+    high = low.copy()
+    high[index] = small
+    return low, high
+
+
+def _gathered(
+    pieces: list[tuple[Effect, tuple[float, ...], list[FloatArray]]], tall: FloatArray,
+    before: FloatArray, basis: FloatArray,
+) -> Bank:  # fmt: skip
+    """Keep what can be told, at unit length."""
+    kept, candidates, lengths, place, found = [], [], [], 0, 0
+    for effect, shape, columns in pieces:
+        part = tall[:, place : place + len(columns)]
+        whole = before[place : place + len(columns)]
+        place += len(columns)
+        length = np.linalg.norm(part, axis=0)
+        if not np.all(length > _SEEN * np.maximum(whole, 1e-300)) or not np.all(length > 0.0):
+            continue
+        unit = np.linalg.qr(part)[0] if len(columns) > 1 else part / length
+        kept.append(unit)
+        candidates.append(Candidate(effect, shape, found, len(columns)))
+        lengths.append(float(length[0]))
+        found += len(columns)
+    stacked = np.concatenate(kept, axis=1) if kept else np.zeros((len(tall), 0))
+    return Bank(basis, stacked.astype(np.float32), tuple(candidates), np.array(lengths))
+
+
+def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
+    """How often chance alone does better, of each candidate by itself."""
+    from scipy.special import gammaincc
+
+    shaped = freedom.reshape(-1, *([1] * (scores.ndim - 1)))
+    return np.asarray(gammaincc(0.5 * shaped, 0.5 * scores))

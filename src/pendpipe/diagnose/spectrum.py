@@ -1,0 +1,96 @@
+"""Tones of any frequency, steady or dying, in what a model leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise
+
+_FINER: Final = 2
+"""Frequencies in 1/(duration)."""
+_SEEN: Final = 0.02
+"""Part of a tone's square that the model's own parameters must leave."""
+
+
+@dataclass(frozen=True)
+class ToneScan:
+    """The lines of a scan over frequency, of one envelope.
+
+    Parameters
+    ----------
+    envelope
+        What multiplies the tone, shape (n,).
+    frequency_hz
+        Shape (m,).
+    inverse
+        Of the 2x2 matrices of what the projection leaves of cosine and sine, shape (m, 3):
+        entries 11, 12, 22; zero where nothing is left.
+    """
+
+    envelope: FloatArray
+    noise: Noise
+    frequency_hz: FloatArray
+    inverse: FloatArray
+    size: int
+
+    def scores(self, residual: FloatArray) -> FloatArray:
+        """chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
+
+        `residual` is whitened and projected, with the prior's entry, shape (n + 1, ...).
+        """
+        weights = self.noise.adjoint(residual[:-1])
+        envelope = self.envelope if weights.ndim == 1 else self.envelope[:, None]
+        lines = np.fft.rfft(weights * envelope, n=self.size, axis=0)[1 : len(self.inverse) + 1]
+        real, imaginary = lines.real, -lines.imag
+        first, mixed, second = (
+            column.reshape(-1, *([1] * (real.ndim - 1))) for column in self.inverse.T
+        )
+        return np.asarray(
+            first * real**2 + 2.0 * mixed * real * imaginary + second * imaginary**2
+        )
+
+
+def tone_scan(
+    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, above_hz: float = 0.0
+) -> ToneScan:
+    """Prepare a scan: what the model's tangent space leaves of a tone at each frequency."""
+    count = len(data)
+    size = int(2 ** np.ceil(np.log2(_FINER * count)))
+    frequency = np.fft.rfftfreq(size, data.interval_s)[1:]
+    keep = slice(1, len(frequency) + 1)
+    variance = _variance_at(noise, frequency, data)
+    # Tones are white noise's own basis: their squares are sums of the envelope's.
+    square = noise.weight * envelope**2
+    double = np.fft.rfft(square, n=size)
+    total = float(np.sum(square))
+    index = 2 * np.arange(1, len(frequency) + 1)
+    folded = np.where(index <= size // 2, index, size - index)
+    lines = np.where(index <= size // 2, double[folded], np.conj(double[folded]))
+    g11 = 0.5 * (total + lines.real) / variance
+    g22 = 0.5 * (total - lines.real) / variance
+    g12 = -0.5 * lines.imag / variance
+    weights = noise.adjoint(basis[:-1]) * envelope[:, None]
+    known = np.fft.rfft(weights, n=size, axis=0)[keep]
+    real, imaginary = known.real, -known.imag
+    h11 = g11 - np.sum(real**2, axis=1)
+    h22 = g22 - np.sum(imaginary**2, axis=1)
+    h12 = g12 - np.sum(real * imaginary, axis=1)
+    determinant = h11 * h22 - h12**2
+    seen = (
+        (determinant > (_SEEN * 0.25 * (g11 + g22) ** 2))
+        & (frequency > above_hz)
+        & (frequency < 0.98 * frequency[-1])
+    )
+    safe = np.where(seen, determinant, 1.0)
+    inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
+    return ToneScan(envelope, noise, frequency, inverse, size)
+
+
+def _variance_at(noise: Noise, frequency: FloatArray, data: Data) -> FloatArray:
+    cosines = np.arange(len(data)) / (2.0 * len(data) * data.interval_s)
+    return np.interp(frequency, cosines, noise.variance)
