@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,6 +16,9 @@ from pendpipe.diagnose.spectrum import ToneScan
 _DRAWS: Final = 256
 _TAIL: Final = 0.4
 """Part of the draws from whose smallest p-values the number of trials is read."""
+_GROWTH: Final = 0.05
+"""A scan over one continuous shape has trials in proportion to the root of the threshold in
+chi^2 (Rice's formula): from p = 0.01 to 1e-6 a factor 1.5."""
 
 
 @dataclass(frozen=True)
@@ -32,27 +36,27 @@ class Trials:
         """The probability that chance finds a local p-value as small anywhere."""
         if local <= 0.0:
             return 0.0
-        trials = self.first * local ** (-self.growth)
+        trials = max(self.first * local ** (-self.growth), 1.0)
         return float(-math.expm1(trials * math.log1p(-min(local, 1.0 - 1e-15))))
 
 
-def smallest_p_values(
-    bank: Bank, scans: list[ToneScan], residual: FloatArray
-) -> FloatArray:
-    """Return the smallest local p-value of each projected residual, shape (draws,)."""
-    smallest = np.ones(residual.shape[1])
-    if bank.candidates:
-        local = local_p_values(bank.scores(residual), bank.freedom)
-        smallest = np.minimum(smallest, local.min(axis=0))
-    for scan in scans:
-        best = scan.scores(residual).max(axis=0)
-        smallest = np.minimum(smallest, np.exp(-0.5 * best))
-    return smallest
+@dataclass(frozen=True)
+class Chance:
+    """What scans of white residuals find.
+
+    Parameters
+    ----------
+    everywhere
+        Trials of the whole catalogue.
+    own
+        Trials of each effect by itself, by identifier.
+    """
+
+    everywhere: Trials
+    own: dict[str, Trials]
 
 
-def count_trials(
-    bank: Bank, scans: list[ToneScan], seed: int, draws: int = _DRAWS
-) -> Trials:
+def draw_chance(bank: Bank, scans: Sequence[ToneScan], seed: int, draws: int = _DRAWS) -> Chance:
     """Draw white residuals, project them as the fit does, and see what the scans make of them.
 
     The tail of the smallest p-value is extrapolated with a slowly growing number of trials,
@@ -61,12 +65,26 @@ def count_trials(
     generator = np.random.default_rng(seed)
     white = generator.standard_normal((len(bank.basis), draws))
     white -= bank.basis @ (bank.basis.T @ white)
-    smallest = np.sort(smallest_p_values(bank, scans, white))
-    # 1 - F = (1 - p)^m: m from each order statistic, then a line in the logarithms.
+    smallest = np.ones(draws)
+    own: dict[str, Trials] = {}
+    if bank.candidates:
+        local = local_p_values(bank.scores(white), bank.freedom)
+        smallest = local.min(axis=0)
+        for name, rows in bank.rows().items():
+            one = len(rows) == 1
+            own[name] = Trials(1.0, 0.0) if one else _trials(local[rows].min(axis=0), _GROWTH)
+    for scan in scans:
+        smallest = np.minimum(smallest, np.exp(-0.5 * scan.scores(white).max(axis=0)))
+    return Chance(_trials(smallest, _GROWTH), own)
+
+
+def _trials(smallest: FloatArray, growth: float) -> Trials:
+    """Read the number of trials off the smallest p-values of many draws: 1 - F = (1 - p)^m."""
+    ordered = np.sort(smallest)
+    draws = len(ordered)
     rank = (np.arange(1, draws + 1) - 0.3) / (draws + 0.4)
-    trials = np.log1p(-rank) / np.log1p(-smallest)
+    trials = np.log1p(-rank) / np.log1p(-np.minimum(ordered, 1.0 - 1e-12))
     part = slice(max(2, draws // 50), int(_TAIL * draws))
     middle = float(np.exp(np.mean(np.log(trials[part]))))
-    at = float(np.exp(np.mean(np.log(smallest[part]))))
-    growth = 0.04 if len(bank.candidates) > 50 or scans else 0.0
-    return Trials(middle * at**growth, growth)
+    at = float(np.exp(np.mean(np.log(ordered[part]))))
+    return Trials(max(middle, 1.0) * at**growth, growth)

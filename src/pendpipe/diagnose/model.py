@@ -73,8 +73,9 @@ class Model:
         """Lowest and highest values."""
         low, high = list(_LOW), list(_HIGH)
         for effect in self.effects:
-            low += [0.0] * effect.switch + [parameter.low for parameter in effect.parameters]
-            high += [1.0] * effect.switch + [parameter.high for parameter in effect.parameters]
+            for lowest, highest in effect.bounds():
+                low.append(lowest)
+                high.append(highest)
         return np.array(low), np.array(high)
 
     def held(self) -> list[int]:

@@ -15,13 +15,18 @@ from typing import NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import response
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
+from pendpipe.effects.curves import Curve
 
 _SEEN = 1e-4
 """Part of a sensitivity that must be left by the projection for it to be told at all."""
+
+_STANDS_OUT = 4.0
+"""Standard deviations by which a mixture of a curve's hats must be seen to be kept."""
 
 
 class Candidate(NamedTuple):
@@ -62,6 +67,13 @@ class Bank:
         starts = [candidate.first for candidate in self.candidates]
         return np.asarray(np.add.reduceat(squares, starts, axis=0))
 
+    def rows(self) -> dict[str, list[int]]:
+        """Indices of the candidates of each effect, by its key."""
+        found: dict[str, list[int]] = {}
+        for index, candidate in enumerate(self.candidates):
+            found.setdefault(candidate.effect.key, []).append(index)
+        return found
+
     @property
     def freedom(self) -> FloatArray:
         """Degrees of freedom of each candidate."""
@@ -83,6 +95,8 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     pieces: list[tuple[Effect, tuple[float, ...], list[FloatArray]]] = []
     pendulum = fit.model.pendulum(fit.value)
     for effect in effects:
+        if isinstance(effect, FreedParameter):
+            continue
         small = effect.small(fit.at.span)
         for shape in effect.shapes(fit.at.span):
             columns = []
@@ -98,6 +112,12 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     before = np.linalg.norm(tall, axis=0)
     tall -= basis @ (basis.T @ tall)
     tall -= basis @ (basis.T @ tall)
+    known = [effect for effect in effects if isinstance(effect, FreedParameter)]
+    for effect in known:
+        column = fit.jacobian[:, [effect.index]]
+        pieces.append((effect, (), [column[:-1, 0]]))
+        before = np.append(before, np.linalg.norm(column))
+        tall = np.concatenate([tall, column - basis @ (basis.T @ column)], axis=1)
     return _gathered(pieces, tall, before, basis)
 
 
@@ -120,16 +140,28 @@ def _gathered(
         part = tall[:, place : place + len(columns)]
         whole = before[place : place + len(columns)]
         place += len(columns)
+        if isinstance(effect, Curve):
+            effect, part = _visible(effect, part)
+            if not part.shape[1]:
+                continue
+            whole = np.zeros(part.shape[1])
         length = np.linalg.norm(part, axis=0)
         if not np.all(length > _SEEN * np.maximum(whole, 1e-300)) or not np.all(length > 0.0):
             continue
-        unit = np.linalg.qr(part)[0] if len(columns) > 1 else part / length
+        unit = np.linalg.qr(part)[0] if part.shape[1] > 1 else part / length
         kept.append(unit)
-        candidates.append(Candidate(effect, shape, found, len(columns)))
+        candidates.append(Candidate(effect, shape, found, unit.shape[1]))
         lengths.append(float(length[0]))
-        found += len(columns)
+        found += unit.shape[1]
     stacked = np.concatenate(kept, axis=1) if kept else np.zeros((len(tall), 0))
     return Bank(basis, stacked.astype(np.float32), tuple(candidates), np.array(lengths))
+
+
+def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
+    """Keep the mixtures of a curve's hats that would stand out if they were of reasonable size."""
+    _, lengths, mixtures = np.linalg.svd(part, full_matrices=False)
+    mixing = mixtures[lengths > _STANDS_OUT].T
+    return curve.reduced(mixing), part @ mixing
 
 
 def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:

@@ -129,13 +129,27 @@ class Effect:
     """True where the effect has no free size: it is there, or it is not (size 1 or 0)."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
+    spectral: ClassVar[bool] = False
+    """Whether it is a tone, whose frequency is found by Fourier transform (see `tone`)."""
+    inside: ClassVar[tuple[str, ...]] = ()
+    """Baselines that hold it already."""
     local: ClassVar[bool] = False
     """Whether it happens at an instant."""
+
+    @property
+    def key(self) -> str:
+        """What tells it from other entries."""
+        return self.identifier
 
     @property
     def count(self) -> int:
         """How many values describe it, a switch's size included."""
         return len(self.parameters) + (1 if self.switch else 0)
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Return lowest and highest values, a pair each."""
+        limits = [(parameter.low, parameter.high) for parameter in self.parameters]
+        return [(0.0, 1.0), *limits] if self.switch else limits
 
     def acceleration(
         self, motion: Motion, pendulum: Pendulum, values: FloatArray
@@ -160,6 +174,13 @@ class Effect:
     def shapes(self, span: Span) -> Sequence[Sequence[float]]:
         """Return the shapes that a scan tries, each a row of the values behind the sizes."""
         return ((),)
+
+    def tone(self, frequency_hz: float, decay_time_s: float) -> Sequence[float] | None:
+        """Return the shape of a tone that a scan has found; None if this effect makes none such.
+
+        `decay_time_s` is inf for a steady tone.
+        """
+        return None
 
     def small(self, span: Span) -> float:
         """Return a size so small that the effect is linear in it."""

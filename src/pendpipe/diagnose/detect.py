@@ -1,0 +1,148 @@
+"""Detection: every effect's best score on what a fit leaves, and the global p-value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.chance import Chance, Trials, draw_chance
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
+from pendpipe.diagnose.spectrum import ToneScan, tone_scan
+from pendpipe.effects import Effect
+
+_DYING: Final = (0.06, 0.25)
+"""Decay times of the dying tones that are looked for, over the record's duration."""
+
+
+@dataclass(frozen=True)
+class Lead:
+    """An effect's best score.
+
+    Parameters
+    ----------
+    effect, shape
+        The effect, and the shape at which it scores best.
+    score
+        chi^2 that it would take off, to first order.
+    p_value
+        How often chance does better over the effect's own shapes.
+    """
+
+    effect: Effect
+    shape: tuple[float, ...]
+    score: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Detection:
+    """What a scan of the whole catalogue has found.
+
+    Parameters
+    ----------
+    leads
+        One an effect, the best first.
+    p_value
+        Global: of the smallest local p-value anywhere.
+    chance
+        What chance finds in the catalogue, and with each effect by itself.
+    """
+
+    leads: tuple[Lead, ...]
+    p_value: float
+    chance: Chance
+
+
+@dataclass(frozen=True)
+class Scanner:
+    """The columns of a catalogue along one fit."""
+
+    bank: Bank
+    scans: tuple[ToneScan, ...]
+    spectral: tuple[Effect, ...]
+    duration_s: float
+
+
+def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Scanner:
+    """Work out all columns."""
+    spectral = tuple(effect for effect in effects if effect.spectral)
+    others = [effect for effect in effects if effect not in spectral]
+    bank = build_bank(fit, noise, others)
+    scans: list[ToneScan] = []
+    if spectral and data.uniform:
+        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data))))
+        since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
+        scans += [
+            tone_scan(data, noise, bank.basis, np.exp(-since / dying)) for dying in _DYING
+        ]
+    return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))
+
+
+def detect(
+    scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None
+) -> Detection:
+    """Score everything.
+
+    Parameters
+    ----------
+    scanner, fit
+        The columns, and the fit whose residual is looked at.
+    seed
+        Of the draws that count the trials.
+    known
+        An earlier detection on this record: its trials are used again.
+    """
+    bank, scans = scanner.bank, list(scanner.scans)
+    residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
+    chance = draw_chance(bank, scans, seed) if known is None else known.chance
+    leads = _bank_leads(bank, residual, chance.own)
+    smallest = 1.0
+    if bank.candidates:
+        smallest = float(local_p_values(bank.scores(residual), bank.freedom).min())
+    for scan in scans:
+        scores = scan.scores(residual)
+        smallest = min(smallest, math.exp(-0.5 * float(scores.max())))
+    leads += _tone_leads(scanner, residual)
+    leads.sort(key=lambda lead: (lead.p_value, -lead.score))
+    return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
+
+
+def _bank_leads(bank: Bank, residual: FloatArray, own: dict[str, Trials]) -> list[Lead]:
+    if not bank.candidates:
+        return []
+    scores = bank.scores(residual)
+    leads = []
+    for name, rows in bank.rows().items():
+        index = rows[int(np.argmax(scores[rows]))]
+        candidate = bank.candidates[index]
+        score = float(scores[index])
+        local = float(local_p_values(np.array([score]), np.array([float(candidate.count)]))[0])
+        p_value = own[name].global_p_value(local) if name in own else local
+        leads.append(Lead(candidate.effect, candidate.shape, score, p_value))
+    return leads
+
+
+def _tone_leads(scanner: Scanner, residual: FloatArray) -> list[Lead]:
+    """The strongest tone, steady or dying, for each effect that is one."""
+    leads = []
+    for effect in scanner.spectral:
+        found = []
+        for scan, dying in zip(scanner.scans, (None, *_DYING), strict=True):
+            scores = scan.scores(residual)
+            index = int(np.argmax(scores))
+            score = float(scores[index])
+            decay = math.inf if dying is None else dying * scanner.duration_s
+            shape = effect.tone(float(scan.frequency_hz[index]), decay)
+            if shape is not None:
+                local = Trials(0.5 * len(scores), 0.0).global_p_value(math.exp(-0.5 * score))
+                found.append(Lead(effect, tuple(shape), score, local))
+        leads += sorted(found, key=lambda lead: lead.p_value)[:1]
+    return leads

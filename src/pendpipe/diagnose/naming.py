@@ -1,0 +1,138 @@
+"""Naming: the leaders are refitted, and weighed against each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.chance import Chance, Trials
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.detect import Detection, Lead
+from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.dynamics.any_law import NoMotionError
+
+CLASS: Final = 6.0
+"""Twice the logarithm of the likelihood within which effects are of one class."""
+_MOST: Final = 8
+_NEAR: Final = 16.0
+_UNNAMED: Final = 6.0
+"""What a curve without a name must be better by (in chi^2) than a name: a prior of 1 in 20."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect, refitted.
+
+    Parameters
+    ----------
+    lead
+        What it was found by.
+    fit
+        The extended model's.
+    gain
+        Delta chi^2 over the model before it.
+    evidence
+        chi^2 of one degree of freedom that is as improbable by chance, the effect's own
+        scan counted.
+    """
+
+    lead: Lead
+    fit: Fit
+    gain: float
+    evidence: float
+
+    @property
+    def identifier(self) -> str:
+        """The effect's."""
+        return self.lead.effect.identifier
+
+
+def refit_leads(
+    base: Fit, data: Data, noise: Noise, detection: Detection, *, held: Sequence[int],
+    gross: bool,
+) -> list[Rival]:  # fmt: skip
+    """Refit the leading effects nonlinearly; the best first."""
+    rivals = []
+    for lead in _worth_refitting(detection, gross):
+        fit = _refitted(base, data, noise, lead, held)
+        if fit is None:
+            continue
+        gain = base.chi2 - fit.chi2
+        rivals.append(Rival(lead, fit, gain, evidence(lead, gain, detection.chance)))
+    rivals.sort(key=lambda rival: -rival.evidence)
+    return rivals
+
+
+def _worth_refitting(detection: Detection, gross: bool) -> list[Lead]:
+    """The leads that may win, or be in the winner's class."""
+    leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
+    if not leads:
+        return []
+    best = _rank(leads[0])
+    near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.6 if gross else 0.3) * best]
+    return near[: _MOST + 4 if gross else _MOST]
+
+
+def _rank(lead: Lead) -> float:
+    return equivalent(lead.p_value, lead.score) - (
+        _UNNAMED if lead.effect.kind == "unnamed" else 0.0
+    )
+
+
+def equivalent(p_value: float, score: float) -> float:
+    """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
+    from scipy.special import ndtri_exp
+
+    if p_value <= 1e-290:
+        return score
+    return float(ndtri_exp(math.log(0.5 * p_value)) ** 2) if p_value < 1.0 else 0.0
+
+
+def evidence(lead: Lead, gain: float, chance: Chance) -> float:
+    """What a gain is worth, beside effects with more or fewer free values and shapes."""
+    from scipy.special import gammaincc
+
+    if gain <= 0.0:
+        return 0.0
+    effect = lead.effect
+    if effect.switch:
+        # Its size is predicted: a free one would have had to be found.
+        gain += max(math.log(gain) - 0.45, 0.0)
+    local = float(gammaincc(0.5 * effect.sizes, 0.5 * gain))
+    trials = chance.own.get(effect.key, Trials(1.0, 0.0))
+    p_value = trials.global_p_value(local) if local > 1e-290 else 0.0
+    worth = equivalent(p_value, gain - _cost(effect.sizes, trials))
+    return worth - (_UNNAMED if effect.kind == "unnamed" else 0.0)
+
+
+def _cost(sizes: int, trials: Trials) -> float:
+    """What free values and trials take off a gain too large for p-values."""
+    return 2.0 * math.log(max(trials.first, 1.0)) + 6.0 * (sizes - 1)
+
+
+def _refitted(
+    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
+) -> Fit | None:
+    effect = lead.effect
+    if isinstance(effect, FreedParameter):
+        held = [index for index in held if index != effect.index]
+    sizes = np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
+    start = np.concatenate([base.value, sizes, np.asarray(lead.shape, dtype=np.float64)])
+    try:
+        return refine(base.model.adding(effect), data, noise, start, held=held)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+
+
+def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
+    """Probability of each rival, with `none` the evidence that it is none of these."""
+    values = np.array([rival.evidence for rival in rivals] + [none])
+    weights = np.exp(0.5 * (values - values.max()))
+    return np.asarray(weights / weights.sum())

@@ -1,0 +1,257 @@
+"""What no entry of the catalogue explains: curves, that are drawn rather than named.
+
+A curve is a sum of hats (functions that are 1 at a knot, fall to 0 at its neighbours), in
+units of what may reasonably be there. Which of their mixtures a recording can see is worked
+out along its own fitted motion (`Curve.reduced`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from pendpipe.effects.effect import Effect, Pendulum, Span
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.any_law import Motion
+    from pendpipe.dynamics.sampling import Sampled
+
+
+class Curve(Effect):
+    """A curve over `argument`, by its values at the knots.
+
+    Parameters
+    ----------
+    knots
+        Where the hats stand, rising.
+    span
+        Of the recording.
+    mixing
+        Which mixtures of the hats are fitted, shape (hats, sizes); all by default.
+    """
+
+    kind = "unnamed"
+    parameters = ()
+    argument: ClassVar[str]
+    """What the curve is drawn against, with its unit."""
+    ordinate: ClassVar[str]
+    """What is drawn."""
+    flavour: ClassVar[str] = ""
+
+    def __init__(self, span: Span, mixing: FloatArray | None = None) -> None:
+        self.span = span
+        self.knots = self.make_knots(span)
+        self.hats = self.count_hats()
+        self.mixing = np.eye(self.hats) if mixing is None else mixing
+        self.sizes = self.mixing.shape[1]  # type: ignore[misc]
+
+    @property
+    def count(self) -> int:
+        """How many mixtures are fitted."""
+        return self.sizes
+
+    @property
+    def key(self) -> str:
+        """Identifier and flavour."""
+        return f"{self.identifier}:{self.flavour}"
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Any mixtures."""
+        return [(-np.inf, np.inf)] * self.sizes
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Return where the hats stand."""
+        raise NotImplementedError
+
+    def count_hats(self) -> int:
+        """Return how many hats there are."""
+        return len(self.knots)
+
+    def reduced(self, mixing: FloatArray) -> Curve:
+        """Return the same with fewer mixtures."""
+        return type(self)(self.span, mixing)
+
+    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return the curve's value, in its reasonable units."""
+        return np.asarray(np.interp(at, self.knots, self.mixing @ values))
+
+    def small(self, span: Span) -> float:
+        """A thousandth of what is reasonable."""
+        return 1e-3
+
+
+def _positions(span: Span) -> FloatArray:
+    """Knots over the angle: closer at the middle, where every swing passes."""
+    half = np.array([0.0, 0.04, 0.1, 0.2, 0.34, 0.52, 0.74, 1.02])
+    return np.asarray(span.first_amplitude * np.concatenate([-half[:0:-1], half]))
+
+
+class RestoringCurve(Curve):
+    """A restoring torque that is any function of the angle."""
+
+    identifier = "unnamed-restoring"
+    name = "a restoring torque of unknown form"
+    equation = r"\omega^2 x \to \omega^2 x + F(x)"
+    argument, ordinate = "angle, rad", "extra restoring torque over omega^2, rad"
+    deciding = "measure the torque against the angle at rest, or map it with a second pendulum"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the angle."""
+        return _positions(span)
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return -omega^2 F(x), in units of a tenth of the amplitude."""
+        scale = 0.1 * self.span.first_amplitude * pendulum.angular_frequency**2
+        return -scale * self.curve(values, motion.angle)
+
+
+class DampingCurve(Curve):
+    """A loss that is any function of the amplitude."""
+
+    identifier = "unnamed-damping"
+    name = "a loss that depends on the amplitude in an unknown way"
+    equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
+    argument, ordinate = "amplitude, rad", "extra loss rate over b"
+    flavour = "amplitude"
+    deciding = "release it from several amplitudes: the loss must follow the amplitude, not the time"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the amplitude, in equal ratios."""
+        ends = (0.95 * span.last_amplitude, 1.05 * span.first_amplitude)
+        return np.asarray(np.geomspace(*ends, 9))
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return -2 beta(r) v, in units of the usual loss rate."""
+        rate = _loss_rate(pendulum, self.span)
+        beta = np.interp(
+            np.log(motion.amplitude), np.log(self.knots), self.mixing @ values
+        )
+        return np.asarray(-2.0 * rate * beta * motion.velocity)
+
+
+class FrictionCurve(Curve):
+    """A friction that is any function of the angle."""
+
+    identifier = "unnamed-damping"
+    name = "a friction that depends on the angle in an unknown way"
+    equation = r"\ddot x \to \ddot x + g(x)\,\mathrm{sgn}\,\dot x"
+    argument, ordinate = "angle, rad", "extra friction, rad/s^2"
+    flavour = "angle"
+    deciding = "turn the bearing by a few degrees: a rough spot goes with it"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the angle."""
+        return _positions(span)
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return -g(x) sgn(v), in units of the usual friction."""
+        usual = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
+        scale = usual * self.span.first_amplitude
+        return np.asarray(-scale * motion.direction * self.curve(values, motion.angle))
+
+
+class ProfileCurve(Curve):
+    """A friction in proportion to the amplitude, of any form along the half swing."""
+
+    identifier = "unnamed-damping"
+    name = "a friction of unknown form along each half swing"
+    equation = r"\ddot x \to \ddot x + y\,h(\psi)\,\mathrm{sgn}\,\dot x"
+    argument, ordinate = "phase since the last turning point, rad", "extra friction over amplitude"
+    flavour = "profile"
+    deciding = "sample the swing faster, and look at the velocity about the turning points"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the half swing."""
+        return np.linspace(0.0, np.pi, 9)
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return -r h(psi) sgn(v)."""
+        phase = np.mod(motion.clock.psi, np.pi)
+        phase[:, -1] = np.pi
+        scale = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
+        return np.asarray(
+            -scale * motion.direction * motion.amplitude * self.curve(values, phase)
+        )
+
+
+class DriveCurve(Curve):
+    """A torque that comes and goes with the time, in step with the motion."""
+
+    identifier = "unnamed-drive"
+    name = "a torque that depends on the time in an unknown way"
+    equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
+    argument, ordinate = "time, s", "extra torque over omega^2 y"
+    deciding = "repeat the run: what depends on the time of day does not come again"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the time."""
+        return np.linspace(span.start_s, span.stop_s, 10)
+
+    def count_hats(self) -> int:
+        """In phase and in quadrature."""
+        return 2 * len(self.knots)
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return p(t) omega^2 x + q(t) omega v, in units of a hundredth."""
+        both = self.mixing @ values
+        count, omega = len(self.knots), pendulum.angular_frequency
+        in_phase = np.interp(motion.time_s, self.knots, both[:count])
+        quadrature = np.interp(motion.time_s, self.knots, both[count:])
+        return np.asarray(
+            0.01 * omega * (in_phase * omega * motion.angle + quadrature * motion.velocity)
+        )
+
+
+class ReadingCurve(Curve):
+    """A sensor whose reading is any function of the angle."""
+
+    identifier = "unnamed-measurement"
+    name = "a sensor curve of unknown form"
+    equation = r"y = x + s(x)"
+    argument, ordinate = "angle, rad", "reading minus angle, rad"
+    flavour = "angle"
+    deciding = "calibrate the sensor at rest over the whole range"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the angle."""
+        return _positions(span)
+
+    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return s(x), in units of a twentieth of the amplitude."""
+        return 0.05 * self.span.first_amplitude * self.curve(values, sampled.angle)
+
+
+class BaselineCurve(Curve):
+    """A level that wanders in time."""
+
+    identifier = "unnamed-measurement"
+    name = "a level that wanders"
+    equation = r"y = x + s(t)"
+    argument, ordinate = "time, s", "level, rad"
+    flavour = "time"
+    deciding = "record the pendulum at rest for as long"
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the time."""
+        return np.linspace(span.start_s, span.stop_s, 14)
+
+    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return s(t), in units of a twentieth of the amplitude."""
+        return 0.05 * self.span.first_amplitude * self.curve(values, sampled.time_s)
+
+
+def _loss_rate(pendulum: Pendulum, span: Span) -> float:
+    """The usual loss rate, 1/s: that of the middle amplitude."""
+    middle = (span.first_amplitude * span.last_amplitude) ** 0.5
+    return (
+        pendulum.quadratic * middle + pendulum.linear + pendulum.coulomb / middle
+    ) + 1e-4 * pendulum.angular_frequency
+
+
+CURVES: Sequence[type[Curve]] = (
+    RestoringCurve, DampingCurve, FrictionCurve, ProfileCurve, DriveCurve, ReadingCurve,
+    BaselineCurve,
+)  # fmt: skip
