@@ -1,0 +1,208 @@
+"""Where a mismatch lies: time, amplitude, phase of the cycle, frequency, harmonic, code."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.refine import Fit
+from pendpipe.effects import Effect
+
+_MOST: Final = 0.9
+"""Part of what an effect explains that its interval holds."""
+_BINS: Final = 24
+_HARMONICS: Final = 6
+_LOUD: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where an effect shows in the readings.
+
+    Parameters
+    ----------
+    time_s, amplitude_rad, phase_rad
+        Intervals that hold nine tenths of what it explains; the phase from a turning point
+        at the positive side; None where it is everywhere.
+    frequency_hz, harmonics
+        Where in the spectrum: frequencies, and multiples of the motion's.
+    adc_codes
+        The converter's codes that are concerned.
+    summary
+        One clause.
+    """
+
+    time_s: tuple[float, float] | None = None
+    amplitude_rad: tuple[float, float] | None = None
+    phase_rad: tuple[float, float] | None = None
+    frequency_hz: tuple[float, ...] = ()
+    harmonics: tuple[int, ...] = ()
+    adc_codes: tuple[int, ...] = ()
+    summary: str = ""
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+        def pair(interval: tuple[float, float] | None) -> list[float] | None:
+            return None if interval is None else [float(end) for end in interval]
+
+        return {
+            "summary": self.summary,
+            "time_s": pair(self.time_s),
+            "amplitude_rad": pair(self.amplitude_rad),
+            "phase_rad": pair(self.phase_rad),
+            "frequency_hz": list(self.frequency_hz),
+            "harmonics": list(self.harmonics),
+            "adc_codes": list(self.adc_codes),
+        }
+
+
+def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
+    """Say where the readings prefer the model with an effect to the one without.
+
+    Each reading's share of Delta chi^2 is expected to be the squared difference of the two
+    models (both at their best) over the noise; intervals hold nine tenths of it.
+    """
+    difference = (after.at.reading - before.at.reading) * data.weight
+    if before.slip_rad > 0.3:
+        difference = _along(before, after) * data.weight
+    power = difference**2
+    sampled = after.at.sampled
+    time = _interval(data.time_s, power)
+    amplitude = _interval(sampled.amplitude, power)
+    phase = _phase_interval(sampled.phase + (math.pi if sampled.motion.upwards < 0 else 0.0), power)
+    harmonics = _harmonics(sampled.phase, difference)
+    frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
+    lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
+    instant = instant_of(after, effect)
+    if instant is not None:
+        time = instant
+    tone = tone_of(after, effect)
+    if tone is not None:
+        lines, harmonics = (tone,), ()
+    found = Location(time, amplitude, phase, lines, harmonics)
+    return Location(
+        time, amplitude, phase, lines, harmonics, summary=_summary(found, data, sampled.amplitude)
+    )
+
+
+def _along(before: Fit, after: Fit) -> FloatArray:
+    """The difference where the models are far out of phase: phase times amplitude."""
+    one, other = before.at.sampled, after.at.sampled
+    turn = other.phase - one.phase
+    return np.asarray(other.amplitude * (turn - np.mean(turn)))
+
+
+def _interval(argument: FloatArray, power: FloatArray) -> tuple[float, float] | None:
+    """The shortest interval of an argument that holds nine tenths of the power."""
+    total = float(power.sum())
+    if not total > 0.0:
+        return None
+    order = np.argsort(argument, kind="stable")
+    grown = np.cumsum(power[order]) / total
+    sorted_argument = argument[order]
+    starts = np.concatenate([[0.0], grown[:-1]])
+    ends = np.searchsorted(grown, starts + _MOST, side="left")
+    inside = ends < len(grown)
+    if not inside.any():
+        return float(sorted_argument[0]), float(sorted_argument[-1])
+    lengths = sorted_argument[ends[inside]] - sorted_argument[: len(ends)][inside]
+    best = int(np.argmin(lengths))
+    first = int(np.flatnonzero(inside)[best])
+    return float(sorted_argument[first]), float(sorted_argument[ends[first]])
+
+
+def _phase_interval(phase: FloatArray, power: FloatArray) -> tuple[float, float] | None:
+    """The arc that holds most, where it is clearly shorter than the circle."""
+    turned = np.mod(phase, 2.0 * math.pi)
+    bins = np.bincount((turned / (2.0 * math.pi) * _BINS).astype(int) % _BINS, weights=power,
+                       minlength=_BINS)  # fmt: skip
+    total = float(bins.sum())
+    if not total > 0.0:
+        return None
+    for width in range(1, _BINS // 2):
+        sums = np.array([np.roll(bins, -start)[:width].sum() for start in range(_BINS)])
+        start = int(np.argmax(sums))
+        if sums[start] > _MOST * total:
+            step = 2.0 * math.pi / _BINS
+            return start * step, (start + width) * step
+    return None
+
+
+def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
+    """Multiples of the motion's frequency that hold a tenth of the difference or more."""
+    total = float(np.sum(difference**2))
+    if not total > 0.0:
+        return ()
+    # The envelope is a slow function: harmonics are compared cycle by cycle.
+    cycle = np.floor(phase / (2.0 * math.pi)).astype(np.int64)
+    cycle -= cycle.min()
+    count = int(cycle.max()) + 1
+    size = np.maximum(np.bincount(cycle, minlength=count), 1)
+    found = []
+    for harmonic in range(_HARMONICS + 1):
+        parts = [np.cos(harmonic * phase), np.sin(harmonic * phase)] if harmonic else [
+            np.ones_like(phase)
+        ]
+        held = 0.0
+        for part in parts:
+            sums = np.bincount(cycle, weights=difference * part, minlength=count)
+            held += float(np.sum(sums**2 / size)) * (2.0 if harmonic else 1.0)
+        if held > _LOUD * total:
+            found.append(harmonic)
+    return tuple(found)
+
+
+def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
+    """The 95 % interval of the instant at which a local effect happens."""
+    return _parameter_interval(fit, effect, "time_s") if effect.local else None
+
+
+def tone_of(fit: Fit, effect: Effect) -> float | None:
+    """The frequency of a tone, Hz."""
+    interval = _parameter_interval(fit, effect, "frequency_hz")
+    return None if interval is None else 0.5 * (interval[0] + interval[1])
+
+
+def _parameter_interval(fit: Fit, effect: Effect, name: str) -> tuple[float, float] | None:
+    from pendpipe.diagnose.values import effect_parameters
+
+    if name not in [parameter.name for parameter in effect.parameters]:
+        return None
+    found = effect_parameters(fit, effect).get(name)
+    if found is None:
+        return None
+    return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
+
+
+def _summary(found: Location, data: Data, amplitude: FloatArray) -> str:
+    """One clause."""
+    said = []
+    span = float(data.time_s[-1] - data.time_s[0])
+    if found.time_s is not None:
+        width = found.time_s[1] - found.time_s[0]
+        if width < 0.02 * span:
+            said.append(f"at {0.5 * (found.time_s[0] + found.time_s[1]):.6g} s")
+        elif width < 0.8 * span:
+            said.append(f"between {found.time_s[0]:.5g} and {found.time_s[1]:.5g} s")
+        else:
+            said.append("throughout the record")
+    if found.amplitude_rad is not None:
+        low, high = found.amplitude_rad
+        if high - low < 0.8 * float(np.ptp(amplitude)):
+            said.append(f"at amplitudes from {low:.3g} to {high:.3g} {data.unit}")
+    if found.phase_rad is not None:
+        low, high = found.phase_rad
+        said.append(f"at phases from {low:.2f} to {high:.2f} rad of the cycle")
+    if found.harmonics:
+        names = {0: "the level", 1: "the fundamental"}
+        parts = [names.get(h, f"harmonic {h}") for h in found.harmonics]
+        said.append("in " + " and ".join(parts))
+    elif found.frequency_hz:
+        said.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
+    return ", ".join(said)

@@ -1,0 +1,157 @@
+"""What a diagnosis says, and its form on disk (``diagnosis.json``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from pendpipe.diagnose.held_out import HeldOut
+from pendpipe.diagnose.location import Location
+from pendpipe.estimate import Estimate
+
+Verdict = Literal["consistent", "missing-physics", "not-analysable"]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A model's parameters, and how well it describes the readings."""
+
+    parameters: Mapping[str, Estimate]
+    residual_rms_rad: float
+    chi2_per_dof: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+        return {
+            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
+            "residual_rms_rad": self.residual_rms_rad,
+            "chi2_per_dof": self.chi2_per_dof,
+        }
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect that was left out.
+
+    Parameters
+    ----------
+    identifier, name, kind, equation
+        As the catalogue declares them.
+    parameters
+        Its own, in the extended model.
+    delta_chi2
+        By how much chi^2 rises without it.
+    p_value
+        Global, when it was found.
+    probability
+        Of this effect within its class and "none of these".
+    indistinguishable
+        The rest of its class: identifier and probability.
+    deciding
+        The one further measurement that would decide.
+    location
+        Where it shows.
+    curve
+        For an unnamed effect: the curve with its band.
+    """
+
+    identifier: str
+    name: str
+    kind: str
+    equation: str
+    parameters: Mapping[str, Estimate]
+    delta_chi2: float
+    p_value: float
+    probability: float
+    indistinguishable: tuple[tuple[str, float], ...]
+    deciding: str
+    location: Location
+    curve: Mapping[str, Any] | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+        found: dict[str, Any] = {
+            "id": self.identifier,
+            "name": self.name,
+            "kind": self.kind,
+            "equation": self.equation,
+            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
+            "delta_chi2": self.delta_chi2,
+            "p_value_global": self.p_value,
+            "probability": self.probability,
+            "indistinguishable_from": [
+                {"id": identifier, "probability": probability}
+                for identifier, probability in self.indistinguishable
+            ],
+            "deciding_measurement": self.deciding,
+            "location": self.location.as_json(),
+        }
+        if self.curve is not None:
+            found["curve"] = dict(self.curve)
+        return found
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer to: where do model and recording differ, and what was left out?
+
+    Parameters
+    ----------
+    baseline_name, baseline, improved
+        The model that was asked for, and the one that was found.
+    noise_rms_rad
+        Of one reading, never below step/sqrt(12).
+    verdict, p_value
+        Global: of the largest score over the whole catalogue.
+    effects
+        In the order in which they were added.
+    held_out
+        None where nothing was added.
+    unexplained_rms_rad, unexplained_p_value
+        What is left at the end.
+    statement
+        One paragraph.
+    """
+
+    baseline_name: str
+    baseline: Judged
+    improved: Judged
+    noise_rms_rad: float
+    verdict: Verdict
+    p_value: float
+    effects: tuple[Named, ...]
+    held_out: HeldOut | None
+    unexplained_rms_rad: float
+    unexplained_p_value: float
+    statement: str
+    warnings: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content of ``diagnosis.json``."""
+        held = self.held_out
+        return {
+            "schema_version": 1,
+            "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+            "noise_rms_rad": self.noise_rms_rad,
+            "verdict": self.verdict,
+            "p_value": self.p_value,
+            "effects": [effect.as_json() for effect in self.effects],
+            "improved": self.improved.as_json(),
+            "held_out": {
+                "log_density_before": None if held is None else held.before,
+                "log_density_after": None if held is None else held.after,
+                "gain": 0.0 if held is None else held.gain,
+                "gain_sd": 0.0 if held is None else held.gain_sd,
+            },
+            "unexplained": {
+                "residual_rms_rad": self.unexplained_rms_rad,
+                "p_value": self.unexplained_p_value,
+            },
+            "statement": self.statement,
+            "figures": list(self.figures),
+            "warnings": list(self.warnings),
+            "provenance": dict(self.provenance),
+        }

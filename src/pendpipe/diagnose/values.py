@@ -1,0 +1,107 @@
+"""A fit's values as the contract's parameters, with errors."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.intervals import intervals95
+from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.analysis.fit.result import PARAMETERS, units
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.model import OFFSET, OMEGA, A, B, C
+from pendpipe.diagnose.refine import Fit
+from pendpipe.effects import Effect
+from pendpipe.estimate import Estimate
+
+_STEP: Final = 1e-3
+"""Of a standard deviation, for derivatives of what is derived from the values."""
+
+
+def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
+    """Return a, b, c, frequency, amplitude, phase and offset (see contract: fit.json).
+
+    The amplitude is that of the first turning point in the readings, by the model; the phase
+    that at the first reading.
+    """
+    covariance = fit.covariance()
+    numbers = _numbers(fit, fit.value)
+    jacobian = np.zeros((2, len(fit.value)))
+    for index in fit.free:
+        sd = math.sqrt(max(float(covariance[index, index]), 0.0))
+        if sd == 0.0 or index in (A, B, C, OFFSET):
+            continue
+        moved = fit.value.copy()
+        moved[index] += _STEP * sd
+        jacobian[:, index] = (_numbers(fit, moved) - numbers) / (_STEP * sd)
+    spread = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
+    intervals = _intervals(fit)
+    dress = units(unit)
+    found = {}
+    for name, index in (("a", A), ("b", B), ("c", C), ("offset", OFFSET)):
+        found[name] = _estimate(fit, covariance, index, dress[name], intervals.get(index))
+    hertz = 0.5 / math.pi
+    frequency = float(fit.value[OMEGA]) * hertz
+    sd = math.sqrt(max(float(covariance[OMEGA, OMEGA]), 0.0)) * hertz
+    found["frequency"] = Estimate(frequency, sd, dress["frequency"])
+    found["amplitude"] = Estimate(float(numbers[0]), float(spread[0]), dress["amplitude"])
+    phase = math.remainder(float(numbers[1]), 2.0 * math.pi)
+    found["phase"] = Estimate(phase, float(spread[1]), dress["phase"])
+    return {name: found[name] for name in PARAMETERS}
+
+
+def _numbers(fit: Fit, value: FloatArray) -> FloatArray:
+    """Amplitude of the first turning point in the readings, and phase of the first reading."""
+    if np.array_equal(value, fit.value):
+        motion, sampled = fit.at.tangent.motion, fit.at.sampled
+    else:
+        at = fit.model.evaluate(value)
+        motion, sampled = at.tangent.motion, at.sampled
+    first = int(np.searchsorted(motion.time_s[:, 0], fit.model.time_s[0] - 1e-9))
+    first = min(first, len(motion.time_s) - 1)
+    turned = math.pi if motion.upwards < 0.0 else 0.0
+    return np.array([motion.amplitude[first, 0], sampled.phase[0] + turned])
+
+
+def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
+    """95 % intervals that are honest at a bound."""
+    low, high = fit.model.bounds()
+    held = [index for index in range(len(fit.value)) if index not in fit.free]
+    normal = fit.jacobian.T @ fit.jacobian
+    gradient = fit.jacobian.T @ fit.residual
+    wanted = [index for index in (A, B, C) if index in fit.free]
+    found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
+    return dict(zip(wanted, found, strict=True))
+
+
+def _estimate(
+    fit: Fit, covariance: FloatArray, index: int, unit: str, interval: tuple[float, float] | None
+) -> Estimate:
+    value = float(fit.value[index])
+    sd = math.sqrt(max(float(covariance[index, index]), 0.0))
+    at_bound = index in fit.free and index in (A, B, C) and value <= 0.0
+    return Estimate(value, sd, unit, interval, at_bound)
+
+
+def effect_parameters(fit: Fit, effect: Effect) -> dict[str, Estimate]:
+    """Return an effect's own parameters, by name."""
+    for other, place in fit.model.places():
+        if other is effect:
+            break
+    else:
+        return {}
+    covariance = fit.covariance()
+    found = {}
+    first = place.start + effect.switch
+    for offset, parameter in enumerate(effect.parameters):
+        index = first + offset
+        sd = math.sqrt(max(float(covariance[index, index]), 0.0))
+        value = float(fit.value[index])
+        half = 1.959963984540054 * sd
+        interval = (max(value - half, parameter.low), min(value + half, parameter.high))
+        found[parameter.name] = Estimate(value, sd, parameter.unit, interval)
+    return found
+
+
