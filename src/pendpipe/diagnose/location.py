@@ -160,24 +160,23 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
 
 def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
     """The 95 % interval of the instant at which a local effect happens."""
-    return _parameter_interval(fit, effect, "time_s") if effect.local else None
+    return _interval_of(fit, effect, "s") if effect.local else None
 
 
 def tone_of(fit: Fit, effect: Effect) -> float | None:
     """The frequency of a tone, Hz."""
-    interval = _parameter_interval(fit, effect, "frequency_hz")
+    interval = _interval_of(fit, effect, "Hz") if effect.spectral else None
     return None if interval is None else 0.5 * (interval[0] + interval[1])
 
 
-def _parameter_interval(fit: Fit, effect: Effect, name: str) -> tuple[float, float] | None:
+def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | None:
+    """The 95 % interval of an effect's parameter of that unit."""
     from pendpipe.diagnose.values import effect_parameters
 
-    if name not in [parameter.name for parameter in effect.parameters]:
-        return None
-    found = effect_parameters(fit, effect).get(name)
-    if found is None:
-        return None
-    return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
+    for found in effect_parameters(fit, effect).values():
+        if found.unit == unit:
+            return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
+    return None
 
 
 def _summary(found: Location, data: Data, amplitude: FloatArray) -> str:

@@ -89,7 +89,7 @@ def is_gross(fit: Fit, data: Data) -> bool:
     return fit.chi2 > GROSS * data.used or fit.slip_rad > _SLIP
 
 
-def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str) -> list[Effect]:
+def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
     """Choose the effects that a baseline may lack, and curves for what has no name."""
     value = fit.value
     present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
@@ -97,7 +97,9 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str) -> list[Eff
     named = [
         effect
         for effect in catalogue
-        if baseline not in effect.inside
+        if effect.template
+        and baseline not in effect.inside
+        and (unit == "rad" or not effect.angular)
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
@@ -121,7 +123,7 @@ def search(
     holding = list(held)
     while len(steps) < _MOST:
         gross = is_gross(fit, data)
-        effects = applicable(catalogue, fit, baseline)
+        effects = applicable(catalogue, fit, baseline, data.unit)
         open_parameters = [entry for entry in freed if entry.index in holding]
         scanner = prepare(fit, data, noise, [*effects, *open_parameters])
         now = detect(scanner, fit, seed=seed)
@@ -141,7 +143,7 @@ def search(
             break
     assert first is not None
     if now is None or len(steps) == _MOST:
-        scanner = prepare(fit, data, noise, applicable(catalogue, fit, baseline))
+        scanner = prepare(fit, data, noise, applicable(catalogue, fit, baseline, data.unit))
         now = detect(scanner, fit, seed=seed, known=now)
     base = refine(beginning.model, data, noise, beginning.value, held=held)
     return Search(

@@ -57,7 +57,7 @@ class Pendulum:
 
     @property
     def linear(self) -> float:
-        """b = b_h + b_v, 1/s."""
+        """The sum b = b_h + b_v, 1/s."""
         return self.hysteretic + self.viscous
 
     @property
@@ -129,12 +129,17 @@ class Effect:
     """True where the effect has no free size: it is there, or it is not (size 1 or 0)."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
-    spectral: ClassVar[bool] = False
-    """Whether it is a tone, whose frequency is found by Fourier transform (see `tone`)."""
     inside: ClassVar[tuple[str, ...]] = ()
     """Baselines that hold it already."""
     local: ClassVar[bool] = False
     """Whether it happens at an instant."""
+    spectral: ClassVar[bool] = False
+    """Whether it is a tone, looked for at thousands of frequencies by Fourier transform (see
+    `tone`); `shapes` is a rough grid."""
+    template: ClassVar[bool] = True
+    """False where it has no template in the readings, and is found by a test of its own."""
+    angular: ClassVar[bool] = False
+    """Whether it is about angles, and means nothing for an oscillator in metres."""
 
     @property
     def key(self) -> str:

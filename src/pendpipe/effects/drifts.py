@@ -1,0 +1,81 @@
+"""Constants of the pendulum that drift, and its equilibrium."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
+from pendpipe.effects.scan import rows, since_start
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.any_law import Motion
+
+
+class FrequencyDrift(Effect):
+    """omega (1 + eps t): the rod's temperature, a loss of mass."""
+
+    identifier = "frequency-drift"
+    name = "drifting frequency"
+    kind = "dynamics"
+    equation = r"\omega^2 x \to \omega^2 (1 + 2 \epsilon t)\, x"
+    parameters = (Parameter("rate", "1/s", -1.0, 1.0),)
+    deciding = "release it again with the same amplitude: the frequency must have moved on"
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return -2 eps t omega^2 x, t from the motion's start."""
+        omega = pendulum.angular_frequency
+        return np.asarray(-2.0 * values[0] * omega * omega * since_start(motion) * motion.angle)
+
+
+class DampingDrift(Effect):
+    """All losses of the baseline times (1 + eps t): bearing or fluid that warms."""
+
+    identifier = "damping-drift"
+    name = "drifting damping"
+    kind = "dynamics"
+    equation = r"F(x, \dot x) \to (1 + \epsilon t)\, F(x, \dot x)"
+    parameters = (Parameter("rate", "1/s", -10.0, 10.0),)
+    deciding = "release it again with the same amplitude: the damping must have moved on"
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return eps t times the baseline's friction, t from the motion's start."""
+        return np.asarray(values[0] * since_start(motion) * pendulum.acceleration(motion))
+
+
+class EquilibriumCreep(Effect):
+    """The equilibrium creeps: x_eq = s ln(1 + t/tau), or s (1 - exp(-t/tau)).
+
+    `exponential` 0 is the logarithm (linear where tau is long), 1 the exponential.
+    """
+
+    identifier = "equilibrium-creep"
+    name = "creep of the equilibrium"
+    kind = "dynamics"
+    equation = (
+        r"\omega^2 x \to \omega^2 (x - x_\mathrm{eq}), \quad x_\mathrm{eq} ="
+        r" s \left[(1 - p) \ln(1 + t/\tau) + p\, (1 - e^{-t/\tau})\right]"
+    )
+    parameters = (
+        Parameter("s", "rad", -10.0, 10.0),
+        Parameter("tau", "s", 1e-3, 1e7),
+        Parameter("exponential", "1", 0.0, 1.0),
+    )
+    deciding = "a second sensor or a level on the stand: a sensor's drift leaves it still"
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return omega^2 x_eq, t from the motion's start."""
+        size, tau, exponential = values
+        late = since_start(motion) / tau
+        crept = (1.0 - exponential) * np.log1p(late) - exponential * np.expm1(-late)
+        return np.asarray(size * pendulum.angular_frequency**2 * crept)
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """Short and long times, of both forms."""
+        lasts = span.duration_s
+        return [
+            *rows(lasts * np.array([0.03, 0.3, 3.0]), (0.0,)),
+            *rows(lasts * np.array([0.05, 0.2]), (1.0,)),
+        ]

@@ -1,0 +1,54 @@
+"""What the scans and the shapes of several effects have in common."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.any_law import Motion
+    from pendpipe.effects.effect import Span
+
+
+def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:
+    """Return every combination of the values along several axes."""
+    return [tuple(float(value) for value in row) for row in itertools.product(*axes)]
+
+
+def instants(span: Span, count: int = 48) -> list[tuple[float]]:
+    """Return rows with one instant each."""
+    return [(float(time),) for time in span.times(count)]
+
+
+def instants_at_phases(span: Span, count: int, turn: float, phases: int = 4) -> list[tuple[float]]:
+    """Return instants, each repeated at phases of the cycle that lie `turn` rad apart.
+
+    A kick's effect depends on the phase at which it comes.
+    """
+    later = turn / span.pendulum.angular_frequency
+    return [(float(time + phase * later),) for time in span.times(count) for phase in range(phases)]
+
+
+def since_start(motion: Motion) -> FloatArray:
+    """Return the time since the turning point from which the motion starts, s."""
+    return np.asarray(motion.time_s - motion.time_s[0, 0])
+
+
+def smooth_step(motion: Motion, instant_s: float) -> FloatArray:
+    """Return a step from 0 to 1 at an instant, at the nodes of a motion.
+
+    It takes about half a period (three tenths from 10 % to 90 %), which no free decay can
+    tell from a sharper one, and so stays smooth within the half cycles.
+    """
+    late = motion.angular_frequency * (motion.time_s - instant_s)
+    return np.asarray(0.5 + 0.5 * np.tanh(1.2 * late))
+
+
+def reading_step(time_s: FloatArray, instant_s: float) -> FloatArray:
+    """Return a step from 0 to 1 at an instant, at the readings; it lasts one interval."""
+    interval = (time_s[-1] - time_s[0]) / max(len(time_s) - 1, 1)
+    return np.asarray(np.clip((time_s - instant_s) / interval + 0.5, 0.0, 1.0))

@@ -1,0 +1,52 @@
+"""Faults of the time base."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.effects.effect import Effect, Parameter, Span
+from pendpipe.effects.scan import instants, reading_step
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+
+
+class ClockDrift(Effect):
+    """The digitiser's clock changes its rate: readings come later by rate t^2/2."""
+
+    identifier = "clock-drift"
+    name = "drifting clock"
+    kind = "measurement"
+    equation = r"t \to t + \tfrac12 \kappa t^2"
+    parameters = (Parameter("rate", "1/s", -1.0, 1.0),)
+    deciding = "record a second clock (GPS, mains) on another channel"
+
+    def delay(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
+        """Return kappa t^2/2, t from the first reading."""
+        return np.asarray(0.5 * values[0] * (time_s - time_s[0]) ** 2)
+
+
+class DroppedSamples(Effect):
+    """Samples were lost (or doubled): later readings come later (earlier) by a time."""
+
+    identifier = "dropped-samples"
+    name = "dropped samples"
+    kind = "measurement"
+    equation = r"t \to t + d\, H(t - t_k)"
+    parameters = (
+        Parameter("d", "s", -1e5, 1e5),
+        Parameter("time", "s", -math.inf, math.inf),
+    )
+    local = True
+    deciding = "compare the number of samples with the time that a second clock shows"
+
+    def delay(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
+        """Return d behind the instant."""
+        return np.asarray(values[0] * reading_step(time_s, values[1]))
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Instants."""
+        return instants(span)

@@ -1,0 +1,156 @@
+"""Tones: a second mode, a second plane, a drive, and what the wiring picks up."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
+from pendpipe.effects.scan import rows, since_start
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.any_law import Motion
+    from pendpipe.dynamics.sampling import Sampled
+
+
+def _tone(values: FloatArray, phase: FloatArray) -> FloatArray:
+    return np.asarray(values[0] * np.cos(phase) + values[1] * np.sin(phase))
+
+
+def _frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
+    return np.geomspace(low, 0.45 / span.interval_s, count)
+
+
+class SecondMode(Effect):
+    """A mode of rod, bob or stand that rings down of its own, added to the reading.
+
+    Its reaction on the pendulum is left out; times are from the first reading.
+    """
+
+    identifier = "second-mode"
+    name = "second mode"
+    kind = "dynamics"
+    equation = r"y = x + e^{-t/\tau_2} (q_c \cos 2\pi f_2 t + q_s \sin 2\pi f_2 t)"
+    parameters = (
+        Parameter("q_cosine", "rad", -10.0, 10.0),
+        Parameter("q_sine", "rad", -10.0, 10.0),
+        Parameter("f_2", "Hz", 0.0, 1e6),
+        Parameter("tau_2", "s", 1e-3, 1e6),
+    )
+    sizes = 2
+    spectral = True
+    deciding = "a second sensor on the stand, or another point of the rod; another release"
+
+    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return the decaying tone."""
+        time = sampled.time_s - sampled.time_s[0]
+        return np.asarray(
+            _tone(values, 2.0 * math.pi * values[2] * time) * np.exp(-time / values[3])
+        )
+
+    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float, float] | None:
+        """A dying tone."""
+        return None if math.isinf(decay_time_s) else (frequency_hz, decay_time_s)
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """A rough grid of frequencies above the pendulum's, and three times of decay."""
+        lasts = span.duration_s * np.array([0.02, 0.1, 0.5])
+        return rows(_frequencies(span, 1.5 / span.period_s), lasts)
+
+
+class PlaneCoupling(Effect):
+    """A second plane, of nearly the same frequency and loss, seen by the sensor: beats.
+
+    The tone has the main motion's envelope, and runs ahead of it by `detuning`. A slow
+    precession is a pair of such tones.
+    """
+
+    identifier = "plane-coupling"
+    name = "swing in a second plane"
+    kind = "dynamics"
+    equation = (
+        r"y = x + \frac{r}{r_1} \left[q_c \cos(\psi + 2\pi \delta t)"
+        r" + q_s \sin(\psi + 2\pi \delta t)\right]"
+    )
+    parameters = (
+        Parameter("q_cosine", "rad", -10.0, 10.0),
+        Parameter("q_sine", "rad", -10.0, 10.0),
+        Parameter("detuning", "Hz", -1e3, 1e3),
+    )
+    sizes = 2
+    deciding = "a second sensor across the first, or a longer record: beats must repeat"
+
+    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return the tone near the pendulum's own frequency."""
+        time = sampled.time_s - sampled.time_s[0]
+        envelope = sampled.amplitude / sampled.amplitude[0]
+        return np.asarray(
+            envelope * _tone(values, sampled.phase + 2.0 * math.pi * values[2] * time)
+        )
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """Detunings on both sides, half of 1/duration apart."""
+        beats = np.arange(0.25, 10.0, 0.5) / span.duration_s
+        return rows([*(-beats[::-1]), *beats])
+
+
+class PeriodicDrive(Effect):
+    """A periodic torque: fan, building, mains. Also rings the pendulum where it sets in."""
+
+    identifier = "periodic-drive"
+    name = "periodic drive"
+    kind = "dynamics"
+    equation = r"\ddot x \mathrel{+}= d_c \cos 2\pi f_d t + d_s \sin 2\pi f_d t"
+    parameters = (
+        Parameter("d_cosine", "rad/s^2", -100.0, 100.0),
+        Parameter("d_sine", "rad/s^2", -100.0, 100.0),
+        Parameter("f_d", "Hz", 0.0, 1e6),
+    )
+    sizes = 2
+    spectral = True
+    deciding = "record the pendulum at rest: the tone must stay, and fall off above resonance"
+
+    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return the drive, its time counted from the motion's start."""
+        return _tone(values, 2.0 * math.pi * values[2] * since_start(motion))
+
+    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
+        """A steady tone."""
+        return (frequency_hz,) if math.isinf(decay_time_s) else None
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """A rough grid of frequencies about the pendulum's."""
+        own = 1.0 / span.period_s
+        return rows([*np.linspace(0.3, 0.97, 8) * own, *np.geomspace(1.03, 4.0, 8) * own])
+
+
+class TonePickup(Effect):
+    """A steady tone in the reading, the alias of the mains for instance."""
+
+    identifier = "tone-pickup"
+    name = "tone in the reading"
+    kind = "measurement"
+    equation = r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t"
+    parameters = (
+        Parameter("a_cosine", "rad", -10.0, 10.0),
+        Parameter("a_sine", "rad", -10.0, 10.0),
+        Parameter("f_a", "Hz", 0.0, 1e6),
+    )
+    sizes = 2
+    spectral = True
+    deciding = "record with the pendulum held, and at another sampling rate: an alias moves"
+
+    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
+        """Return the tone, its time counted from the first reading."""
+        return _tone(values, 2.0 * math.pi * values[2] * (sampled.time_s - sampled.time_s[0]))
+
+    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
+        """A steady tone."""
+        return (frequency_hz,) if math.isinf(decay_time_s) else None
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """A rough grid of frequencies."""
+        return rows(_frequencies(span, 0.2 / span.period_s))
