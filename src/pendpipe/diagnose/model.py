@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Clock, Motion, NoMotionError, Tangent, follow, rates
 from pendpipe.dynamics.sampling import Sampled, sample_motion
-from pendpipe.effects import Effect, Pendulum, Span
+from pendpipe.effects import Effect, Kick, Pendulum, Span
 
 BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")
 """Eq. 13's rates; the hysteretic share of b; omega; the turning point from which the motion
@@ -23,13 +25,38 @@ _SPARE: Final = 3
 """Half cycles beyond the last reading."""
 
 
-class Evaluated(NamedTuple):
+@dataclass(frozen=True)
+class Evaluated:
     """A model at given values."""
 
     reading: FloatArray
     sampled: Sampled
     tangent: Tangent
     span: Span
+
+    @cached_property
+    def _start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Change of ln r and of t by ln r at the start: at the nodes, and at the readings."""
+        by_log, by_time = self.tangent.of_start()
+        at_readings = self.sampled.at_nodes(np.stack([by_log, by_time]))
+        return by_log, by_time, at_readings[0], at_readings[1]
+
+    def by_start(self) -> FloatArray:
+        """Change of the readings by ln r at the start."""
+        _, _, by_log, by_time = self._start
+        return np.asarray(self.sampled.angle * by_log - self.sampled.velocity * by_time)
+
+    def after_kick(self, kick: Kick | None) -> FloatArray:
+        """Change of the readings by a small kick."""
+        assert kick is not None
+        log, late = kick_sizes(self.tangent.motion, kick)
+        node_log, node_time, by_log, by_time = self._start
+        there = sample_motion(self.tangent.motion, np.array([kick.time_s]))
+        then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))[:, 0]
+        scale = log / then_log
+        x, v = self.sampled.angle, self.sampled.velocity
+        change = x * by_log * scale - v * (late + (by_time - then_time) * scale)
+        return np.asarray(np.where(self.sampled.time_s > kick.time_s, change, 0.0))
 
 
 @dataclass(frozen=True)
@@ -138,7 +165,7 @@ class Model:
             kick = effect.kick(value[place])
             if kick is None:
                 continue
-            by_log, by_time = kick_change(motion, kick.time_s, kick)
+            by_log, by_time = kick_change(motion, kick)
             law = lambda m: self.acceleration(m, value)  # noqa: E731
             grown, late = Tangent(law, motion).of_reset(by_log, by_time)
             motion = Motion(
@@ -189,11 +216,11 @@ class Model:
             C: dry * omega * np.ones_like(motion.angle),
             SHARE: value[B] * (by_hysteretic - by_viscous),
         }
-        for index, force in forces.items():
-            columns[:, index] = sampled.change(*tangent.of_force(force))
+        columns[:, list(forces)] = sampled.change(
+            *tangent.of_force(np.stack(list(forces.values())))
+        ).T
         columns[:, OMEGA] = self._by_omega(value, at)
-        by_log, by_time = tangent.of_start()
-        columns[:, START] = sampled.change(by_log, by_time) / value[START]
+        columns[:, START] = at.by_start() / value[START]
         columns[:, TIME] = -sampled.velocity
         columns[:, OFFSET] = 1.0
         for effect, place in self.places():
@@ -235,52 +262,58 @@ def response(
     effect: Effect, low: FloatArray, high: FloatArray, at: Evaluated, pendulum: Pendulum
 ) -> FloatArray:
     """Change of the readings when the values of one effect go from `low` to `high`."""
+    return responses(effect, [(low, high)], at, pendulum)[0]
+
+
+def responses(
+    effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]], at: Evaluated,
+    pendulum: Pendulum,
+) -> FloatArray:  # fmt: skip
+    """Change of the readings for each pair of values, shape (changes, n)."""
     sampled, tangent = at.sampled, at.tangent
-    total = np.zeros(len(sampled.time_s))
-    before = effect.acceleration(tangent.motion, pendulum, low)
-    if before is not None:
-        after = effect.acceleration(tangent.motion, pendulum, high)
-        assert after is not None
-        total += sampled.change(*tangent.of_force(after - before))
-    kick = effect.kick(high)
-    if kick is not None:
-        total += _kick_response(at, kick) - _kick_response(at, effect.kick(low))
-    added = effect.reading(sampled, pendulum, high)
-    if added is not None:
-        total += added - effect.reading(sampled, pendulum, low)
-    late = effect.delay(sampled.time_s, high)
-    if late is not None:
-        earlier = effect.delay(sampled.time_s, low)
-        assert earlier is not None
-        total += sampled.velocity * (late - earlier)
+    total = np.zeros((len(changes), len(sampled.time_s)))
+    forces = [_force_change(effect, tangent.motion, pendulum, *pair) for pair in changes]
+    if forces[0] is not None:
+        total += sampled.change(*tangent.of_force(np.stack(forces)))
+    for row, (low, high) in enumerate(changes):
+        kick = effect.kick(high)
+        if kick is not None:
+            total[row] += at.after_kick(kick) - at.after_kick(effect.kick(low))
+        added = effect.reading(sampled, pendulum, high)
+        if added is not None:
+            total[row] += added - effect.reading(sampled, pendulum, low)
+        late = effect.delay(sampled.time_s, high)
+        if late is not None:
+            earlier = effect.delay(sampled.time_s, low)
+            total[row] += sampled.velocity * (late - earlier)
     return total
 
 
-def _kick_response(at: Evaluated, kick: object) -> FloatArray:
-    from pendpipe.effects import Kick
+def _force_change(
+    effect: Effect, motion: Motion, pendulum: Pendulum, low: FloatArray, high: FloatArray
+) -> FloatArray | None:
+    before = effect.acceleration(motion, pendulum, low)
+    if before is None:
+        return None
+    return np.asarray(effect.acceleration(motion, pendulum, high) - before)
 
-    assert isinstance(kick, Kick)
-    by_log, by_time = kick_change(at.tangent.motion, kick.time_s, kick)
-    return at.sampled.change(*at.tangent.of_reset(by_log, by_time))
 
-
-def kick_change(motion: Motion, time_s: float, kick: object) -> tuple[FloatArray, FloatArray]:
-    """What a kick adds to ln r and t at the nodes behind it."""
-    from pendpipe.effects import Kick
-
-    assert isinstance(kick, Kick)
-    there = sample_motion(motion, np.array([time_s]))
+def kick_sizes(motion: Motion, kick: Kick) -> tuple[float, float]:
+    """What a kick adds to ln r and to t at fixed phase."""
+    there = sample_motion(motion, np.array([kick.time_s]))
     omega = motion.angular_frequency
-    x, v = float(there.angle[0]), float(there.velocity[0])
-    new_x, new_v = x + kick.angle, v + kick.velocity
-    by_log = 0.5 * math.log(
-        (new_x**2 + (new_v / omega) ** 2) / (x**2 + (v / omega) ** 2)
-    ) + kick.log_amplitude
-    turned = math.remainder(
-        math.atan2(-new_v / omega, new_x) - math.atan2(-v / omega, x), 2.0 * math.pi
-    )
-    behind = np.where(motion.time_s > time_s, 1.0, 0.0)
-    return by_log * behind, -turned / omega * behind
+    x, v = float(there.angle[0]), float(there.velocity[0]) / omega
+    new_x, new_v = x + kick.angle, v + kick.velocity / omega
+    by_log = 0.5 * math.log((new_x**2 + new_v**2) / (x**2 + v**2)) + kick.log_amplitude
+    turned = math.remainder(math.atan2(-new_v, new_x) - math.atan2(-v, x), 2.0 * math.pi)
+    return by_log, -turned / omega
+
+
+def kick_change(motion: Motion, kick: Kick) -> tuple[FloatArray, FloatArray]:
+    """What a kick adds to ln r and t at the nodes behind it."""
+    by_log, by_time = kick_sizes(motion, kick)
+    behind = np.where(motion.time_s > kick.time_s, 1.0, 0.0)
+    return by_log * behind, by_time * behind
 
 
 def _closed_form(value: FloatArray, clock: Clock) -> Motion:

@@ -16,7 +16,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.freed import FreedParameter
-from pendpipe.diagnose.model import response
+from pendpipe.diagnose.model import responses
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
@@ -98,12 +98,12 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
         if isinstance(effect, FreedParameter):
             continue
         small = effect.small(fit.at.span)
-        for shape in effect.shapes(fit.at.span):
-            columns = []
-            for index in range(effect.sizes):
-                low, high = _sizes(effect, shape, index, small)
-                columns.append(response(effect, low, high, fit.at, pendulum) / small)
-            pieces.append((effect, tuple(float(number) for number in shape), columns))
+        shapes = effect.shapes(fit.at.span)
+        changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
+        columns = responses(effect, changes, fit.at, pendulum) / small
+        for row, shape in enumerate(shapes):
+            own = columns[row * effect.sizes : (row + 1) * effect.sizes]
+            pieces.append((effect, tuple(float(number) for number in shape), list(own)))
     raw = np.stack([column for _, _, columns in pieces for column in columns], axis=1)
     usable = np.all(np.isfinite(raw), axis=0)
     raw[:, ~usable] = 0.0

@@ -23,7 +23,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 
-_TOLERANCE: Final = 1e-10
+_TOLERANCE: Final = 1e-9
 _ROUNDS: Final = 40
 _STEP: Final = 1e-6
 _STEEPEST: Final = 0.9
@@ -71,9 +71,9 @@ class Clock:
         return np.asarray(1.0 - 2.0 * (np.arange(self.count) % 2))[:, None]
 
     def integral(self, rate: FloatArray) -> FloatArray:
-        """Integrate over the phase from psi = 0; shape as that of `rate`."""
+        """Integrate over the phase from psi = 0; shape (..., count, order + 1) as `rate`."""
         parts = rate @ _integration(self.order).T
-        parts[1:] += np.cumsum(parts[:-1, -1])[:, None]
+        parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1], axis=-1)[..., None]
         return np.asarray(parts)
 
 
