@@ -48,7 +48,8 @@ class Evaluated:
 
     def after_kick(self, kick: Kick | None) -> FloatArray:
         """Change of the readings by a small kick."""
-        assert kick is not None
+        if kick is None or not (kick.angle or kick.velocity or kick.log_amplitude):
+            return np.zeros(len(self.reading))
         log, late = kick_sizes(self.tangent.motion, kick)
         node_log, node_time, by_log, by_time = self._start
         there = sample_motion(self.tangent.motion, np.array([kick.time_s]))
