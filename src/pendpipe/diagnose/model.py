@@ -49,6 +49,8 @@ class Evaluated:
     def after_kick(self, kick: Kick | None) -> FloatArray:
         """Change of the readings by a small kick."""
         assert kick is not None
+        if not (kick.angle or kick.velocity or kick.log_amplitude):
+            return np.zeros(len(self.sampled.time_s))
         log, late = kick_sizes(self.tangent.motion, kick)
         node_log, node_time, by_log, by_time = self._start
         there = sample_motion(self.tangent.motion, np.array([kick.time_s]))
@@ -255,6 +257,8 @@ class Model:
     def _step(self, effect: Effect, values: FloatArray, index: int, span: Span) -> float:
         if index < effect.sizes:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
+        if effect.parameters[index - effect.switch].name == "time":
+            return 0.25 * span.interval_s
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 
