@@ -256,6 +256,8 @@ class Model:
     def _step(self, effect: Effect, values: FloatArray, index: int, span: Span) -> float:
         if index < effect.sizes:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
+        if effect.parameters[index - effect.switch].name == "time":
+            return 0.25 * span.interval_s
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 

@@ -98,9 +98,14 @@ class Span(NamedTuple):
         return 2.0 * math.pi / self.pendulum.angular_frequency
 
     def times(self, count: int) -> FloatArray:
-        """Instants for a scan: inside the record, one and a half periods from its ends."""
+        """Instants for a scan: inside the record, one and a half periods from its ends.
+
+        They lie closer towards the ends, where there is less from which to tell them.
+        """
         edge = min(1.5 * self.period_s, 0.25 * self.duration_s)
-        return np.linspace(self.start_s + edge, self.stop_s - edge, count)
+        share = np.linspace(0.0, 1.0, count)
+        closer = 0.5 * share + 0.25 * (1.0 - np.cos(math.pi * share))
+        return np.asarray(self.start_s + edge + (self.duration_s - 2.0 * edge) * closer)
 
     def amplitudes(self, count: int) -> FloatArray:
         """Amplitudes for a scan, in equal ratios, within those of the record."""

@@ -19,7 +19,7 @@ def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:
     return [tuple(float(value) for value in row) for row in itertools.product(*axes)]
 
 
-def instants(span: Span, count: int = 48) -> list[tuple[float]]:
+def instants(span: Span, count: int) -> list[tuple[float]]:
     """Return rows with one instant each."""
     return [(float(time),) for time in span.times(count)]
 

@@ -35,4 +35,4 @@ class StribeckFriction(Effect):
         """Fractions of the peak velocities within the record."""
         omega = span.pendulum.angular_frequency
         slow, fast = 0.3 * omega * span.last_amplitude, 0.5 * omega * span.first_amplitude
-        return [(float(speed),) for speed in np.geomspace(slow, max(fast, 2.0 * slow), 4)]
+        return [(float(speed),) for speed in np.geomspace(slow, max(fast, 2.0 * slow), 6)]

@@ -62,7 +62,7 @@ class AmplitudeStep(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
-        return instants(span)
+        return instants(span, 72)
 
 
 class Impulse(Effect):
@@ -82,7 +82,7 @@ class Impulse(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants, at four phases of half a cycle."""
-        return instants_at_phases(span, 24, 0.25 * math.pi)
+        return instants_at_phases(span, 40, 0.25 * math.pi)
 
 
 class FrequencyStep(Effect):
@@ -103,7 +103,7 @@ class FrequencyStep(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
-        return instants(span)
+        return instants(span, 24)
 
 
 class DampingStep(Effect):
@@ -125,4 +125,4 @@ class DampingStep(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
-        return instants(span)
+        return instants(span, 24)

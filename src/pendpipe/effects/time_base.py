@@ -49,4 +49,4 @@ class DroppedSamples(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
-        return instants(span)
+        return instants(span, 64)

@@ -37,4 +37,4 @@ class VortexShedding(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """Amplitudes within the record."""
-        return [(float(angle),) for angle in span.amplitudes(6)]
+        return [(float(angle),) for angle in span.amplitudes(12)]
