@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data, gather
 from pendpipe.diagnose.model import OMEGA, SHARE, START, TIME, A, B, C, Model, OFFSET
 from pendpipe.diagnose.unwrapped import anchored
+from pendpipe.dynamics.any_law import NoMotionError
+
+_FEWEST: Final = 24
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,29 @@ def begin(
     data = gather(
         samples.time_s[span], samples.values[span], step=samples.step, unit=samples.unit,
         counts=samples.counts, period_s=2.0 * math.pi / omega,
+        noise_rms=points.noise_rms_rad,
     )  # fmt: skip
-    model = Model(data.time_s, data.interval_s, order=order_for(abs(angle), samples.unit))
+    order = order_for(abs(angle), samples.unit)
+    data, model = _before_the_stop(data, value, order)
     data = replace(data, anchor=anchored(data, model.evaluate(value)))
     return Beginning(
-        data, model, value, _held(held_rates, fixed, parts, baseline), points.noise_rms_rad, points
+        data, model, value, _held(held_rates, fixed, parts, baseline), data.noise_rms, points
     )
+
+
+def _before_the_stop(data: Data, value: FloatArray, order: int) -> tuple[Data, Model]:
+    """Leave readings at the end out until the start values move the pendulum to the last."""
+    while True:
+        model = Model(data.time_s, data.interval_s, order=order)
+        try:
+            model.evaluate(value)
+        except NoMotionError:
+            keep = int(0.93 * len(data))
+            if keep < _FEWEST:
+                raise
+            data = data.first(keep)
+        else:
+            return data, model
 
 
 def order_for(amplitude: float, unit: str) -> int:

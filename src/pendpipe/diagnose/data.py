@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
+
+_DITHERS: Final = tuple(np.linspace(0.04, 0.5, 12))
+"""Noise over step that is tried."""
+_WORTH: Final = 12.0
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,11 @@ class Data:
         ``"rad"`` or ``"m"``.
     time_noise
         Whether the error is in the times (an encoder's counts).
+    noise_rms
+        First estimate of one reading's noise.
+    lattice
+        Where the rounding rules: a reading's remainder by the step, and the noise before
+        the rounding (rad); None where noise makes the rounding random.
     anchor
         A time in s near the beginning, and the phase of the readings then: so that whole
         turns are counted alike whatever the model.
@@ -42,6 +52,8 @@ class Data:
     step: float = 0.0
     unit: str = "rad"
     time_noise: bool = False
+    noise_rms: float = 0.0
+    lattice: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
 
     def __len__(self) -> int:
@@ -52,14 +64,71 @@ class Data:
         """How many readings count."""
         return int(np.count_nonzero(self.weight))
 
+    def residual(self, reading: FloatArray) -> FloatArray:
+        """Return the readings minus what a model makes of them, rounding included."""
+        if self.lattice is None:
+            return self.values - reading
+        origin, noise = self.lattice
+        return self.values - reading - rounding_bias(reading - origin, self.step, noise)
+
+    def first(self, count: int) -> Data:
+        """The first `count` of them."""
+        return replace(
+            self, time_s=self.time_s[:count], values=self.values[:count],
+            weight=self.weight[:count],
+        )  # fmt: skip
+
     def masked(self, bad: BoolArray) -> Data:
         """The same without some readings."""
         return replace(self, weight=np.where(bad, 0.0, self.weight))
 
 
+def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArray:
+    """Return by how much rounding shifts the mean of a noisy reading, rad.
+
+    round(x) - x is a sawtooth; Gaussian noise takes its harmonic k down by
+    exp(-2 pi^2 k^2 (noise/step)^2) (Widrow).
+    """
+    total = np.zeros_like(angle)
+    turn = 2.0 * np.pi * angle / step
+    for harmonic in range(1, 9):
+        left = np.exp(-2.0 * (np.pi * harmonic * noise_rms / step) ** 2)
+        if left < 1e-4:
+            break
+        sign = -1.0 if harmonic % 2 else 1.0
+        total += sign * step / (np.pi * harmonic) * left * np.sin(harmonic * turn)
+    return total
+
+
+def with_lattice(data: Data, reading: FloatArray) -> Data:
+    """Find the noise before the rounding, where the rounding's bias is seen in the readings.
+
+    Parameters
+    ----------
+    data
+        The readings; their step must be known.
+    reading
+        A model of them that is good to a small part of the step.
+    """
+    if not data.step or data.time_noise:
+        return data
+    off = (data.values - reading)[data.weight > 0.0]
+    if float(np.median(np.abs(off))) > 0.6 * data.step:
+        return data
+    turn = 2.0 * np.pi * data.values / data.step
+    origin = float(np.angle(np.mean(np.exp(1j * turn)))) * data.step / (2.0 * np.pi)
+    best, least = None, len(off) * float(np.log(np.mean(off**2))) - _WORTH
+    for share in _DITHERS:
+        bias = rounding_bias((reading - origin)[data.weight > 0.0], data.step, share * data.step)
+        cost = len(off) * float(np.log(np.mean((off - bias) ** 2)))
+        if cost < least:
+            best, least = share, cost
+    return replace(data, lattice=None if best is None else (origin, best * data.step))
+
+
 def gather(
     time_s: FloatArray, values: FloatArray, *, step: float | None, unit: str, counts: bool,
-    period_s: float, most: int = 8000,
+    period_s: float, noise_rms: float, most: int = 8000,
 ) -> Data:  # fmt: skip
     """Take the readings, in means of several where there are very many in a cycle.
 
@@ -78,6 +147,6 @@ def gather(
         values = values[:whole].reshape(-1, fold).mean(axis=1)
         interval *= fold
     return Data(
-        time_s, values, interval, uniform, np.ones(len(time_s)), (step or 0.0) / fold**0.5, unit,
-        counts,
+        time_s, values, interval, uniform, np.ones(len(time_s)), (step or 0.0) if fold == 1 else 0.0, unit,
+        counts, noise_rms / fold**0.5,
     )  # fmt: skip

@@ -21,6 +21,9 @@ from pendpipe.effects import Effect
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""
 
+_TURNS: Final = 3.0
+"""Cycles in the record that make a tone; what is slower is a drift."""
+
 
 @dataclass(frozen=True)
 class Lead:
@@ -78,10 +81,12 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     bank = build_bank(fit, noise, others)
     scans: list[ToneScan] = []
     if spectral and data.uniform:
-        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data))))
+        slowest = _TURNS / (data.time_s[-1] - data.time_s[0])
+        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), slowest))
         since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
         scans += [
-            tone_scan(data, noise, bank.basis, np.exp(-since / dying)) for dying in _DYING
+            tone_scan(data, noise, bank.basis, np.exp(-since / dying), slowest)
+            for dying in _DYING
         ]
     return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))
 

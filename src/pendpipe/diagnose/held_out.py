@@ -78,6 +78,6 @@ def _densities(
         except NoMotionError:
             predicted = fit.at.reading
         wanted = out & (data.weight > 0.0)
-        off = (data.values - predicted)[wanted]
+        off = data.residual(predicted)[wanted]
         found[wanted] = -0.5 * (off**2 / variance[wanted] + np.log(2.0 * math.pi * variance[wanted]))
     return found

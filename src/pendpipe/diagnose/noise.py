@@ -16,9 +16,12 @@ _WIDTH: Final = 0.08
 """Of the frequency: the band about each harmonic that a misfit may fill."""
 _FIRST: Final = 3
 """The lowest cosine that is believed to be noise: a drift lies in those before."""
-_WORTH: Final = 12.0
-"""Gain in -2 ln L for which the spectrum is given a colour (two parameters each)."""
+_WORTH: Final = (4.0, 12.0)
+"""Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
+is missed accuses drifts and slow tones of the noise; a needless one costs little."""
 _STEEPEST: Final = 2.0
+_OUTLIER: Final = 12.0
+"""Power over the spectrum beyond which a cosine holds no noise but a line."""
 
 
 @dataclass(frozen=True)
@@ -170,19 +173,19 @@ def _best_shape(power: FloatArray, frequency: FloatArray, interval: float) -> Fl
     def cost(shape: FloatArray) -> float:
         spectrum = _spectrum(shape, frequency, interval)
         ratio = power / spectrum
-        return float(np.sum(np.log(spectrum) + np.minimum(ratio, 12.0 + 0.0 * ratio)))
+        return float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER)))
 
     white = np.array([math.log(level), -60.0, 1.0, 0.0])
     white[0] = math.log(_clipped_mean(power, level))
     best, least = white, cost(white)
-    bounds = [(None, None), (-12.0, 12.0), (0.3, _STEEPEST), (-0.95, 0.95)]
-    for start, frozen in (
-        (np.array([white[0], 0.0, 1.0, 0.0]), (3,)),
-        (np.array([white[0], -60.0, 1.0, 0.3]), (1, 2)),
+    bounds = [(white[0] - 5.0, white[0] + 5.0), (-12.0, 8.0), (0.3, _STEEPEST), (-0.95, 0.95)]
+    for start, frozen, worth in (
+        (np.array([white[0], 0.0, 1.0, 0.0]), (3,), _WORTH[0]),
+        (np.array([white[0], -60.0, 1.0, 0.3]), (1, 2), _WORTH[1]),
     ):
         limits = [(start[k], start[k]) if k in frozen else bounds[k] for k in range(4)]
         found = minimize(cost, start, method="L-BFGS-B", bounds=limits)
-        if found.fun < least - _WORTH:
+        if found.fun < least - worth:
             best, least = found.x, float(found.fun)
     return np.asarray(best)
 

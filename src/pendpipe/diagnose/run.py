@@ -94,15 +94,16 @@ def diagnose_decay(
         _named(found, beginning, step, index, baseline, seed)
         for index, step in enumerate(found.steps)
     )
+    rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
     after = _judged(found.improved, found)
     held = _held_out(found, beginning) if named else None
     diagnosis = Diagnosis(
-        baseline, before, after, found.noise.rms,
+        baseline, before, after, rms,
         "missing-physics" if named else "consistent", found.p_value, named, held,
         after.residual_rms_rad, found.unexplained,
         statement(
-            baseline, before, after, named, held, found.noise.rms, found.unexplained, level
+            baseline, before, after, named, held, rms, found.unexplained, level
         ),
         warnings=points.notes, provenance=dict(provenance or {}),
     )  # fmt: skip
@@ -111,7 +112,7 @@ def diagnose_decay(
 
 def _judged(fit: Fit, found: Search) -> Judged:
     data = found.data
-    residual = (data.values - fit.at.reading)[data.weight > 0.0]
+    residual = data.residual(fit.at.reading)[data.weight > 0.0]
     dof = max(data.used - len(fit.free), 1)
     return Judged(
         parameters_of(fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.diagnose.begin import Beginning
-from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection, detect, prepare
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import OMEGA
@@ -26,8 +26,8 @@ _SLIP: Final = 0.1
 _MOST: Final = 6
 _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
-_AMBITION: Final = 1.02
-"""chi^2 per degree of freedom by which a model passes for complete while searching."""
+_LEAST_STEP: Final = 0.1
+"""Noise over step below which no model of a rounded reading is believed."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def search(
     data, held = beginning.data, beginning.held
     noise = first_noise(beginning)
     fit = refine(beginning.model, data, noise, beginning.value, held=held)
-    fit, noise = settled(fit, data, noise, held)
+    fit, data, noise = settled(fit, data, noise, held)
     steps: list[Step] = []
     first: Detection | None = None
     now: Detection | None = None
@@ -137,7 +137,7 @@ def search(
         winner = rivals[0]
         if isinstance(winner.lead.effect, FreedParameter):
             holding.remove(winner.lead.effect.index)
-        fit, noise = settled(winner.fit, data, noise, holding)
+        fit, data, noise = settled(winner.fit, data, noise, holding)
         if winner.lead.effect.kind == "unnamed":
             now = None
             break
@@ -160,14 +160,17 @@ def first_noise(beginning: Beginning) -> Noise:
     return white_noise(data, beginning.noise_rms, slope)
 
 
-def settled(fit: Fit, data: Data, noise: Noise, held: Sequence[int]) -> tuple[Fit, Noise]:
+def settled(
+    fit: Fit, data: Data, noise: Noise, held: Sequence[int]
+) -> tuple[Fit, Data, Noise]:
     """Judge the noise anew where the model is near enough, and refit."""
     if is_gross(fit, data) or data.time_noise:
-        return fit, noise
-    residual = data.values - fit.at.reading
+        return fit, data, noise
+    data = with_lattice(data, fit.at.reading)
+    residual = data.residual(fit.at.reading)
     noise = estimate_noise(
-        data, residual, fit.value[OMEGA] / (2.0 * np.pi), data.step / np.sqrt(12.0)
+        data, residual, fit.value[OMEGA] / (2.0 * np.pi), _LEAST_STEP * data.step
     )
-    return refine(fit.model, data, noise, fit.value, held=held), noise
+    return refine(fit.model, data, noise, fit.value, held=held), data, noise
 
 

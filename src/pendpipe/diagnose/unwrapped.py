@@ -14,13 +14,16 @@ from pendpipe.diagnose.model import Evaluated
 _SLIP: Final = 0.15
 """Phase in rad, and part of the amplitude, from which the plain difference is no longer used."""
 
+_CHANCE: Final = 5.0
+"""Standard deviations of a cycle's phase and amplitude below which they are not believed."""
+
 
 def anchored(data: Data, at: Evaluated) -> tuple[float, float]:
     """Return a time near the beginning and the readings' phase then, turns counted.
 
     The model must be in phase with the first cycles, as a start from turning points is.
     """
-    _, phase, centre = _alignment(data, at, data.values - at.reading)
+    _, phase, centre = _alignment(data, at, data.residual(at.reading))
     if not len(phase):
         return float(at.sampled.time_s[0]), float(at.sampled.phase[0])
     when = float(np.interp(centre[0], at.sampled.phase, at.sampled.time_s))
@@ -43,10 +46,10 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     slip_rad
         The largest phase between model and readings.
     """
-    plain = data.values - at.reading
+    plain = data.residual(at.reading)
     log_ratio, phase, centre = _alignment(data, at, plain)
-    slip = float(np.max(np.abs(phase))) if len(phase) else 0.0
-    if slip < _SLIP and (not len(log_ratio) or np.max(np.abs(log_ratio)) < _SLIP):
+    slip = float(np.max(np.abs(phase), initial=0.0))
+    if slip < _SLIP and np.max(np.abs(log_ratio), initial=0.0) < _SLIP:
         return plain, slip
     sampled = at.sampled
     by_log = np.interp(sampled.phase, centre, log_ratio)
@@ -101,4 +104,8 @@ def _alignment(
         expected = turned - float(np.interp(when, sampled.time_s, sampled.phase))
     phase -= 2.0 * math.pi * np.round((phase[0] - expected) / (2.0 * math.pi))
     ratio = np.log(np.maximum(np.hypot(cosine, sine), 1e-3))
+    # What noise alone can do is no slip.
+    chance = _CHANCE * data.noise_rms / np.sqrt(np.maximum(sii, 1e-300))
+    phase = np.where(np.abs(phase) > chance, phase, 0.0)
+    ratio = np.where(np.abs(ratio) > chance, ratio, 0.0)
     return ratio, phase, middle / n
