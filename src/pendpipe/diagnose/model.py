@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Clock, Motion, NoMotionError, Tangent, follow, rates
-from pendpipe.dynamics.sampling import Sampled, sample_motion
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow, rates
+from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects import Effect, Kick, Pendulum, Span
 
 BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")
@@ -50,9 +50,9 @@ class Evaluated:
         """Change of the readings by a small kick."""
         if kick is None or not (kick.angle or kick.velocity or kick.log_amplitude):
             return np.zeros(len(self.reading))
-        log, late = kick_sizes(self.tangent.motion, kick)
         node_log, node_time, by_log, by_time = self._start
         there = sample_motion(self.tangent.motion, np.array([kick.time_s]))
+        log, late = kick_sizes(there, kick, self.tangent.motion)
         then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))[:, 0]
         scale = log / then_log
         x, v = self.sampled.angle, self.sampled.velocity
@@ -134,8 +134,8 @@ class Model:
                 total = total + extra
         return total
 
-    def follow(self, value: FloatArray) -> Motion:
-        """Solve the motion.
+    def follow(self, value: FloatArray) -> list[tuple[float, Motion]]:
+        """Solve the motion: from the start, and anew from each kick on, on one clock.
 
         Raises
         ------
@@ -147,9 +147,28 @@ class Model:
         guess = self._last.get("motion")
         if guess is None or guess.clock != Clock(count, self.order):
             guess = _closed_form(value, Clock(count, self.order))
-        motion = follow(lambda m: self.acceleration(m, value), omega, start, begin, guess)
+        law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+        motion = follow(law, omega, start, begin, guess)
         self._last["motion"] = motion
-        return self._kicked(motion, value)
+        pieces = [(-math.inf, motion)]
+        by_log, by_time = np.zeros_like(motion.time_s), np.zeros_like(motion.time_s)
+        for kick in self._kicks(value):
+            before = sample_motion(motion, np.array([kick.time_s]))
+            # It takes effect before the instant, so that what follows is smooth there.
+            whole = max(int(before.phase[0] // math.pi) - 1, 0)
+            for _ in range(2):
+                log, late = kick_sizes(before, kick, motion)
+                by_log[whole:] += log
+                by_time[whole:] += late
+                motion = follow(law, omega, start, begin, motion, (by_log, by_time))
+            pieces.append((kick.time_s, motion))
+        return pieces
+
+    def _kicks(self, value: FloatArray) -> list[Kick]:
+        """The sudden changes within the record, as they come."""
+        kicks = [effect.kick(value[place]) for effect, place in self.places()]
+        inside = [k for k in kicks if k is not None and value[TIME] < k.time_s < self.time_s[-1]]
+        return sorted(inside, key=lambda kick: kick.time_s)
 
     def _half_cycles(self, omega: float, begin: float) -> int:
         needed = (self.time_s[-1] - begin) * omega / math.pi
@@ -160,24 +179,10 @@ class Model:
             return last.clock.count
         return math.ceil(needed) + _SPARE + int(0.02 * needed)
 
-    def _kicked(self, motion: Motion, value: FloatArray) -> Motion:
-        """Put the sudden changes of the effects in."""
-        for effect, place in self.places():
-            kick = effect.kick(value[place])
-            if kick is None:
-                continue
-            by_log, by_time = kick_change(motion, kick)
-            law = lambda m: self.acceleration(m, value)  # noqa: E731
-            grown, late = Tangent(law, motion).of_reset(by_log, by_time)
-            motion = Motion(
-                motion.clock, motion.angular_frequency, motion.log_amplitude + grown,
-                motion.time_s + late, motion.upwards,
-            )  # fmt: skip
-        return motion
-
     def evaluate(self, value: FloatArray) -> Evaluated:
         """Return readings, and what the derivatives need."""
-        motion = self.follow(value)
+        pieces = self.follow(value)
+        motion = pieces[-1][1]
         if motion.time_s[-1, -1] < self.time_s[-1]:
             self._last.pop("motion", None)
             raise NoMotionError("the frequency is out of reach")
@@ -186,7 +191,7 @@ class Model:
             delay = effect.delay(self.time_s, value[place])
             if delay is not None:
                 times = times + delay
-        sampled = sample_motion(motion, times)
+        sampled = sample_pieces(pieces, times)
         pendulum = self.pendulum(value)
         reading = value[OFFSET] + sampled.angle
         for effect, place in self.places():
@@ -203,22 +208,11 @@ class Model:
     def jacobian(self, value: FloatArray, at: Evaluated) -> FloatArray:
         """Derivatives of the readings by all values, shape (n, size)."""
         sampled, tangent = at.sampled, at.tangent
-        motion, pendulum = tangent.motion, self.pendulum(value)
-        omega = pendulum.angular_frequency
+        pendulum = self.pendulum(value)
         columns = np.empty((len(self.time_s), self.size))
-        speed = omega * motion.amplitude
-        dry = -0.5 * math.pi * motion.direction
-        by_hysteretic = dry * speed
-        by_viscous = -2.0 * motion.velocity
-        share = float(value[SHARE])
-        forces = {
-            A: dry / omega * speed * speed,
-            B: share * by_hysteretic + (1.0 - share) * by_viscous,
-            C: dry * omega * np.ones_like(motion.angle),
-            SHARE: value[B] * (by_hysteretic - by_viscous),
-        }
-        columns[:, list(forces)] = sampled.change(
-            *tangent.of_force(np.stack(list(forces.values())))
+        losses = [A, B, C, SHARE]
+        columns[:, losses] = sampled.change(
+            *tangent.of_force(np.stack([self._by_loss(value, at, index) for index in losses]))
         ).T
         columns[:, OMEGA] = self._by_omega(value, at)
         columns[:, START] = at.by_start() / value[START]
@@ -230,6 +224,14 @@ class Model:
                     effect, value[place], index, at, pendulum
                 )
         return columns
+
+    def _by_loss(self, value: FloatArray, at: Evaluated, index: int) -> FloatArray:
+        """Derivative of the acceleration by one of the baseline's losses; it is linear in them."""
+        moved = value.copy()
+        moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
+        motion = at.tangent.motion
+        change = self.acceleration(motion, moved) - self.acceleration(motion, value)
+        return np.asarray(change / (moved[index] - value[index]))
 
     def _by_omega(self, value: FloatArray, at: Evaluated) -> FloatArray:
         motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
@@ -301,22 +303,20 @@ def _force_change(
     return np.asarray(effect.acceleration(motion, pendulum, high) - before)
 
 
-def kick_sizes(motion: Motion, kick: Kick) -> tuple[float, float]:
-    """What a kick adds to ln r and to t at fixed phase."""
-    there = sample_motion(motion, np.array([kick.time_s]))
-    omega = motion.angular_frequency
+def kick_sizes(before: Sampled, kick: Kick, now: Motion) -> tuple[float, float]:
+    """What a motion still lacks, in ln r and in t at fixed phase, to be the kicked one.
+
+    `before` is the unkicked motion at the kick's instant.
+    """
+    omega = now.angular_frequency
+    there = sample_motion(now, before.time_s)
     x, v = float(there.angle[0]), float(there.velocity[0]) / omega
-    new_x, new_v = x + kick.angle, v + kick.velocity / omega
-    by_log = 0.5 * math.log((new_x**2 + new_v**2) / (x**2 + v**2)) + kick.log_amplitude
+    grown = math.exp(kick.log_amplitude)
+    new_x = grown * (float(before.angle[0]) + kick.angle)
+    new_v = grown * (float(before.velocity[0]) + kick.velocity) / omega
+    by_log = 0.5 * math.log((new_x**2 + new_v**2) / (x**2 + v**2))
     turned = math.remainder(math.atan2(-new_v, new_x) - math.atan2(-v, x), 2.0 * math.pi)
     return by_log, -turned / omega
-
-
-def kick_change(motion: Motion, kick: Kick) -> tuple[FloatArray, FloatArray]:
-    """What a kick adds to ln r and t at the nodes behind it."""
-    by_log, by_time = kick_sizes(motion, kick)
-    behind = np.where(motion.time_s > kick.time_s, 1.0, 0.0)
-    return by_log * behind, by_time * behind
 
 
 def _closed_form(value: FloatArray, clock: Clock) -> Motion:

@@ -171,8 +171,9 @@ def rates(law: Law, motion: Motion) -> Rates:
 
 
 def follow(
-    law: Law, angular_frequency: float, start_rad: float, start_s: float, guess: Motion
-) -> Motion:
+    law: Law, angular_frequency: float, start_rad: float, start_s: float, guess: Motion,
+    reset: tuple[FloatArray, FloatArray] | None = None,
+) -> Motion:  # fmt: skip
     """Solve the motion from a turning point.
 
     Parameters
@@ -185,6 +186,8 @@ def follow(
         The turning point from which it starts, at psi = 0.
     guess
         Where the iteration begins: another law's motion, on the wanted clock.
+    reset
+        Sudden changes of ln r and t at the nodes, given as what they add up to.
 
     Raises
     ------
@@ -195,6 +198,7 @@ def follow(
     origin = math.log(abs(start_rad))
     log_amplitude = guess.log_amplitude + (origin - guess.log_amplitude[0, 0])
     time = guess.time_s + (start_s - guess.time_s[0, 0])
+    jumps, delays = (0.0, 0.0) if reset is None else reset
     motion = Motion(clock, angular_frequency, log_amplitude, time, upwards)
     steepness: FloatArray | None = None
     before = math.inf
@@ -202,9 +206,9 @@ def follow(
         now = rates(law, motion)
         if steepness is None:
             steepness = _steepness(law, motion, now)
-        off = origin + clock.integral(now.loss) - motion.log_amplitude
+        off = origin + jumps + clock.integral(now.loss) - motion.log_amplitude
         change = _linear(clock, steepness, off)
-        late = start_s + clock.integral(now.pace) - motion.time_s
+        late = start_s + delays + clock.integral(now.pace) - motion.time_s
         error = max(float(np.max(np.abs(change))), angular_frequency * float(np.max(np.abs(late))))
         motion = Motion(
             clock, angular_frequency, motion.log_amplitude + change, motion.time_s + late, upwards

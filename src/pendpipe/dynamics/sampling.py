@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -93,6 +94,28 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     return Sampled(
         motion, time_s, phase, np.exp(log_amplitude), np.cos(phase), np.sin(phase), first, weights
     )
+
+
+def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) -> Sampled:
+    """Read motions on one clock, each from its time on (the first from ever)."""
+    starts = np.array([start for start, _ in pieces[1:]])
+    which = np.searchsorted(starts, time_s)
+    parts = [
+        (which == index, sample_motion(motion, time_s[which == index]))
+        for index, (_, motion) in enumerate(pieces)
+    ]
+
+    def joined(name: str) -> FloatArray:
+        whole = np.empty((*getattr(parts[0][1], name).shape[:-1], len(time_s)))
+        for here, part in parts:
+            whole[..., here] = getattr(part, name)
+        return whole
+
+    first = np.rint(joined("_first")).astype(np.intp)
+    return Sampled(
+        pieces[-1][1], time_s, joined("phase"), joined("amplitude"), joined("cosine"),
+        joined("sine"), first, joined("_weights"),
+    )  # fmt: skip
 
 
 def _lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
