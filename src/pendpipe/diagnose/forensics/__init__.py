@@ -10,7 +10,13 @@ from typing import Final
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics import clipping, glitches, jitter
+from pendpipe.diagnose.forensics import (
+    clipping,
+    coarse_quantisation,
+    glitches,
+    jitter,
+    missing_codes,
+)
 from pendpipe.diagnose.forensics.finding import Finding, Location
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -18,15 +24,26 @@ from pendpipe.diagnose.refine import Fit
 Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
 TESTS: Final[dict[str, Test]] = {
-    "glitches": glitches.find,
     "clipping": clipping.find,
+    "glitches": glitches.find,
+    "missing-codes": missing_codes.find,
+    "coarse-quantisation": coarse_quantisation.find,
     "jitter": jitter.find,
 }
+"""In their order: what is masked by one is not seen by those behind it."""
+_SURE: Final = 1e-3
+"""p-value from which a finding's readings are left out of the tests that follow."""
 
 
 def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Finding]:
     """Make every test; what is found and what is not."""
-    return [find(data, fit, noise, samples) for find in TESTS.values()]
+    findings = []
+    for find in TESTS.values():
+        finding = find(data, fit, noise, samples)
+        findings.append(finding)
+        if finding.mask is not None and finding.p_value < _SURE:
+            data = data.masked((data.weight == 0.0) | finding.mask)
+    return findings
 
 
 __all__ = ["TESTS", "Finding", "Location", "Test", "examine"]

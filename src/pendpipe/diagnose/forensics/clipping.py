@@ -77,7 +77,7 @@ def _end(
     at = used & (sign * data.values >= level - slack)
     if np.count_nonzero(at) < _FEWEST:
         return End(named, sign * level, at, 1.0, 0.0)
-    local = local_residual(data, fit, residual, leave_out=at)
+    local = local_residual(fit.at.sampled.phase, residual, used, leave_out=at)
     true = sign * (data.values - local.left)
     before = _noise(local, step)
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))

@@ -22,7 +22,8 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 
-_NUMBERS: Final = (1, 2, 4, 8, 16, 32, 64, 128)
+_NUMBERS: Final = (1, 3, 10, 30, 100)
+_SURELY: Final = 4.5
 _LARGE: Final = 3.0
 _SHARED: Final = 0.35
 """Part of an error that its neighbours may have as well, if it is to be one reading's own."""
@@ -46,10 +47,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if data.used < 60:
         return nothing("glitches")
     residual = residual_of(data, fit)
-    local = local_residual(data, fit, whitened_in_time(residual, noise))
+    phase, used = fit.at.sampled.phase, data.weight > 0.0
+    local = local_residual(phase, whitened_in_time(residual, noise), used)
     error = own_error(local)
     place = np.flatnonzero(local.used)
-    p_value, tail = _smallest(np.sort(error[place]))
+    p_value = _smallest(np.sort(error[place]))
+    tail = _others(np.sort(error[place]))
     mask = np.zeros(len(data), dtype=bool)
     size = np.zeros(len(data))
     for _ in range(_ROUNDS):
@@ -65,7 +68,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         if noise.memory == 0.0:
             break
         rest = np.where(mask, 0.0, residual)
-        local = local_residual(data, fit, whitened_in_time(rest, noise), leave_out=mask)
+        local = local_residual(phase, whitened_in_time(rest, noise), used, leave_out=mask)
         error = own_error(local)
     if not mask.any():
         return Finding("glitches", p_value, summary="no reading stands out of the noise")
@@ -92,22 +95,26 @@ def _largest_about(error: FloatArray) -> FloatArray:
     )
 
 
-def _smallest(sorted_error: FloatArray) -> tuple[float, Tail]:
-    """The p-value over all numbers of glitches, and the noise's tail for the best."""
+def _smallest(sorted_error: FloatArray) -> float:
+    """The p-value over all numbers of glitches."""
     from scipy.special import bdtrc
 
     count = len(sorted_error)
     numbers = [k for k in _NUMBERS if k <= count // 30]
-    best, found = 1.0, None
+    best = 1.0
     for k in numbers:
         tail = fit_tail(sorted_error, k)
-        chance = float(tail.beyond(sorted_error[-k : count - k + 1])[0])
+        chance = float(tail.beyond(sorted_error[count - k]))
         p_value = float(bdtrc(k - 1, count, min(chance, 1.0)))
         share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
-        if p_value / share < best or found is None:
-            best, found = min(p_value / share, 1.0), tail
-    assert found is not None
-    return best, found
+        best = min(p_value / share, best)
+    return best
+
+
+def _others(sorted_error: FloatArray) -> Tail:
+    """The noise's tail where the largest errors are glitches."""
+    foreign = int(np.count_nonzero(sorted_error > _SURELY))
+    return fit_tail(sorted_error, min(max(foreign, 1), len(sorted_error) // 10), foreign=True)
 
 
 def _described(

@@ -10,44 +10,54 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.codes import read_codes
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
-from pendpipe.diagnose.forensics.lattice import (
-    find_lattice,
-    noise_before_rounding,
-    rounding_moments,
-    whole_readings,
-)
-from pendpipe.diagnose.forensics.local import (
-    Local,
-    local_residual,
-    residual_of,
-    whitened_in_time,
-)
+from pendpipe.diagnose.forensics.lattice import rounding_moments, whole_readings
+from pendpipe.diagnose.forensics.local import local_residual, residual_of, whitened_in_time
 from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 
-_FAR: Final = 4.5
-"""Standard deviations (of the noise that jitter makes) beyond which it is a glitch."""
+_FAR: Final = 3.0
+"""Standard deviations beyond which an error counts as if it were only that large."""
 _AGREE: Final = 2.6
 """Standard deviations by which the part at twice the frequency may fall short."""
-_DITHERED: Final = 1.5
-"""Noise in steps from which rounding is part of the noise."""
+_DITHERED: Final = 0.7
+"""Noise before rounding, in steps, from which rounding is part of the noise."""
+_ROUNDS: Final = 6
 
 
 class Squares(NamedTuple):
-    """Squared errors, their expectation without jitter and variance, and v^2; shape (n,).
+    """Squared errors against the speed; arrays of shape (m,).
 
-    All in units of the usual variance; v^2 in units of its mean.
+    Parameters
+    ----------
+    square
+        In units of the usual variance `unit`.
+    expected, variance
+        What they are, and vary by, without jitter.
+    mean, double
+        The parts of v^2 that follow the amplitude, (omega A)^2/2, and twice the frequency,
+        -(omega A)^2 cos(2 psi)/2; in units of `speed`.
+    unit
+        Variance of one reading, rad^2.
+    speed
+        Mean of v^2, (rad/s)^2.
     """
 
     square: FloatArray
     expected: FloatArray
     variance: FloatArray
-    speed: FloatArray
+    mean: FloatArray
     double: FloatArray
-    """v^2's part at twice the frequency: -(omega A)^2 cos(2 psi)/2."""
+    unit: float
+    speed: float
+
+    @property
+    def inverse(self) -> FloatArray:
+        """Weight of each square; those that rounding fixes are not believed exactly."""
+        return 1.0 / np.maximum(self.variance, 0.05 * float(np.mean(self.variance)))
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
@@ -61,137 +71,125 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """
     if data.time_noise or data.used < 60:
         return nothing("jitter")
-    local = local_residual(data, fit, whitened_in_time(residual_of(data, fit), noise))
-    squares = _squares(data, fit, local, samples)
-    if squares is None:
+    squares = _rounded(data, fit, samples) or _dithered(data, fit, noise)
+    if len(squares.square) < 50:
         return nothing("jitter")
-    whole = _chance(squares, squares.speed)
-    alone = _chance(squares, squares.double, beside=squares.speed - squares.double)
-    size, variance = _variance(squares)
-    first, second = size[1], size[2]
-    spread = math.sqrt(variance[1, 1] + variance[2, 2] - 2.0 * variance[1, 2])
-    p_value = whole
-    if second - first < -_AGREE * spread:
-        p_value = max(whole, alone)
-    return _described(data, fit, local, squares, noise, p_value)
+    p_value = _chance(squares, squares.mean + squares.double)
+    columns = np.stack([squares.expected, squares.mean, squares.double], axis=1)
+    size, covariance = _fitted(squares, columns)
+    spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
+    if size[2] - size[1] < -_AGREE * spread:
+        p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
+    return _described(data, fit, squares, p_value)
 
 
-def _squares(data: Data, fit: Fit, local: Local, samples: Samples) -> Squares | None:
-    used = local.used
-    sampled = fit.at.sampled
-    omega = sampled.motion.angular_frequency
-    top = (0.5 * (omega * sampled.amplitude) ** 2)[used]
-    double = -top * np.cos(2.0 * sampled.phase[used])
-    mean = float(np.mean(top))
-    scaled = local.scaled[used]
-    square = scaled**2
-    expected, variance = np.ones(len(square)), np.full(len(square), 2.0)
-    plain = local_residual(data, fit, residual_of(data, fit))
-    lattice = (
-        find_lattice(data.values, samples.step)
-        if whole_readings(data, samples) and not samples.counts
-        else None
-    )
-    if lattice is not None and plain.rms < _DITHERED * lattice.step:
-        before = noise_before_rounding(plain, lattice.step)
-        true = lattice.position(data.values - plain.left)[used]
-        expected, variance = rounding_moments(true - np.round(true), before / lattice.step)
-        unit = (plain.rms / lattice.step) ** 2
-        square = (plain.left[used] / plain.rms) ** 2 / np.maximum(1.0 + plain.leverage[used], 0.2)
-        expected, variance = expected / unit, variance / unit**2
-    # A glitch is nobody's jitter.
-    near = square < _FAR**2 * np.maximum(1.0, 3.0 * np.mean(square) * (top + double) / mean)
-    if np.count_nonzero(near) < 50:
+def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares:
+    """Squares of normal errors."""
+    sampled, used = fit.at.sampled, data.weight > 0.0
+    residual = residual_of(data, fit)
+    white = whitened_in_time(residual, noise)
+    scaled = local_residual(sampled.phase, white, used).scaled[used]
+    unit = noise.white_rms**2
+    mean, double, speed = _speeds(fit, np.flatnonzero(used))
+    ones = np.ones(len(scaled))
+    return Squares(scaled**2, ones, 2.0 * ones, mean, double, unit, speed)
+
+
+def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
+    """Squares of errors that are rounding's at that angle; None where noise dithers it."""
+    if not whole_readings(data, samples):
         return None
+    coded = read_codes(data, fit, samples)
+    if coded is None or coded.ratio > _DITHERED:
+        return None
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    index = coded.index - first
+    # At rest within a step the errors are all the same: they say nothing of noise.
+    moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
+    if np.count_nonzero(moving) < 50:
+        moving[:] = True
+    place = coded.position[moving] - np.round(coded.position[moving])
+    expected, variance = rounding_moments(place, coded.ratio, coded.blur)
+    square = coded.error[moving] ** 2
+    unit = float(np.mean(square))
+    mean, double, speed = _speeds(fit, index[moving])
+    step = coded.lattice.step
     return Squares(
-        square[near], expected[near], variance[near], ((top + double) / mean)[near],
-        (double / mean)[near],
-    )  # fmt: skip
+        square / unit, expected / unit, variance / unit**2, mean, double, unit * step**2, speed
+    )
+
+
+def _speeds(fit: Fit, index: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    sampled = fit.at.sampled
+    top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
+    double = -top * np.cos(2.0 * sampled.phase[index])
+    speed = float(np.mean(top))
+    return top / speed, double / speed, speed
 
 
 def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
     """Chance of a weighted sum of squares as large, the noise's own level unknown."""
-    columns = [squares.expected]
-    if beside is not None:
-        columns.append(beside)
-    # Weighed least squares: what the level (and what stands beside) can do is taken off.
-    basis = np.stack(columns, axis=1)
-    inverse = 1.0 / np.maximum(squares.variance, 0.05 * float(np.mean(squares.variance)))
+    capped = np.minimum(squares.square, _FAR**2 * squares.expected.mean())
+    columns = [squares.expected] if beside is None else [squares.expected, beside]
+    # What the level (and what stands beside) can do is taken off, by least squares.
+    basis, inverse = np.stack(columns, axis=1), squares.inverse
     solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * weight))
     rest = (weight - basis @ solved) * inverse
-    level = float(np.sum(squares.square * squares.expected * inverse)) / float(
+    level = float(np.sum(capped * squares.expected * inverse)) / float(
         np.sum(squares.expected**2 * inverse)
     )
-    off = squares.square - level * squares.expected
-    total = float(rest @ off)
-    # How much wider than for normal noise: heavy tails, or rounding that is seldom between.
-    usual = 2.0 * float(np.sum(rest**2 * squares.expected**2)) * level**2
-    found = float(np.sum(rest**2 * squares.variance)) * level**2
-    heavy = float(np.mean(off**2 / np.maximum(squares.variance, 1e-3))) / level**2
-    stretch = math.sqrt(max(found, 1e-30) / usual * max(heavy, 1.0))
+    off = capped - level * squares.expected
     weights = rest * squares.expected * level
-    return tail_of_squares(total / stretch + float(weights.sum()), weights)
+    # How much wider or narrower than squares of normal numbers: tails, or rounding.
+    share = float(np.mean(off**2 * squares.inverse)) / float(
+        np.mean(squares.variance * squares.inverse)
+    )
+    stretch = math.sqrt(share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights)))
+    total = float(rest @ off)
+    return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
 
 
-def _variance(squares: Squares) -> tuple[FloatArray, FloatArray]:
-    """Fit the variance as level + parts that follow v^2's mean and double frequency."""
-    columns = np.stack([squares.expected, squares.speed - squares.double, squares.double], axis=1)
-    spread = np.maximum(squares.variance, 0.05 * float(np.mean(squares.variance)))
-    size = np.array([1.0, 0.0, 0.0])
-    matrix = np.eye(3)
-    for _ in range(4):
-        model = np.maximum(columns @ size, 0.1 * squares.expected)
-        weight = 1.0 / (spread * (model / squares.expected) ** 2)
+def _fitted(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit the variance by columns, the first its level; sizes and their covariance."""
+    size, matrix = np.zeros(columns.shape[1]), np.eye(columns.shape[1])
+    size[0] = 1.0
+    square = np.minimum(squares.square, 25.0 * _smooth_model(squares, columns, size))
+    for _ in range(_ROUNDS):
+        model = _smooth_model(squares, columns, size)
+        weight = squares.inverse / (model / squares.expected) ** 2
         matrix = np.linalg.inv(columns.T @ (weight[:, None] * columns))
-        size = matrix @ (columns.T @ (weight * squares.square))
+        size = matrix @ (columns.T @ (weight * square))
     return size, matrix
 
 
-def _together(squares: Squares) -> tuple[float, float, float, float]:
-    """Level, size of the part that follows v^2, its sd, and twice the gain in likelihood."""
-    columns = np.stack([squares.expected, squares.speed], axis=1)
-    spread = np.maximum(squares.variance, 0.05 * float(np.mean(squares.variance)))
-    size, matrix = np.array([1.0, 0.0]), np.eye(2)
-    for _ in range(6):
-        model = np.maximum(columns @ size, 0.1 * squares.expected)
-        weight = 1.0 / (spread * (model / squares.expected) ** 2)
-        matrix = np.linalg.inv(columns.T @ (weight[:, None] * columns))
-        size = matrix @ (columns.T @ (weight * squares.square))
-    level = float(np.mean(squares.square)) / float(np.mean(squares.expected))
-    model = np.maximum(columns @ size, 0.1 * squares.expected)
-    plain = level * squares.expected
-    gain = float(
-        np.sum(np.log(plain) + squares.square / plain - np.log(model) - squares.square / model)
-    )
-    return float(size[0]), float(size[1]), math.sqrt(float(matrix[1, 1])), max(gain, 0.0)
+def _smooth_model(squares: Squares, columns: FloatArray, size: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(columns @ size, 0.1 * squares.expected))
 
 
-def _described(
-    data: Data, fit: Fit, local: Local, squares: Squares, noise: Noise, p_value: float
-) -> Finding:
-    level, size, spread, gain = _together(squares)
+def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
+    columns = np.stack([squares.expected, squares.mean + squares.double], axis=1)
+    size, covariance = _fitted(squares, columns)
+    model = _smooth_model(squares, columns, size)
+    plain = float(squares.square.mean() / squares.expected.mean()) * squares.expected
+    gain = np.log(plain / model) + squares.square * (1.0 / plain - 1.0 / model)
+    to_seconds = squares.unit / squares.speed
+    share = max(float(size[1]), 0.0)
+    seconds = math.sqrt(share * to_seconds)
+    sd = math.sqrt(covariance[1, 1])
+    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the square root's own size.
+    error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
     sampled = fit.at.sampled
     omega = sampled.motion.angular_frequency
-    used = local.used
-    mean = float(np.mean(0.5 * (omega * sampled.amplitude[used]) ** 2))
-    rms = _plain_rms(data, fit)
-    seconds = math.sqrt(max(size, 0.0) * rms**2 / mean)
-    error = spread * rms**2 / mean / (2.0 * max(seconds, rms / math.sqrt(mean) * 0.1))
-    speed = sampled.velocity**2
-    frequency = omega / (2.0 * math.pi)
+    factor = 1.0 + share / max(float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
     return Finding(
-        "jitter", p_value, gain if size > 0.0 else 0.0,
+        "jitter", p_value, max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
         {"sigma_t": Estimate(seconds, error, "s")},
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
-            (0.25 * math.pi, 0.75 * math.pi), (2.0 * frequency,),
+            (0.25 * math.pi, 0.75 * math.pi), (omega / math.pi,),
         ),
-        variance=1.0 + max(size, 0.0) / max(level, 0.1) * speed / mean,
+        variance=factor,
         summary=f"the noise is largest where the motion is fastest, as if the moments of"
         f" reading were uncertain by {seconds:.2g} s",
     )  # fmt: skip
-
-
-def _plain_rms(data: Data, fit: Fit) -> float:
-    return local_residual(data, fit, residual_of(data, fit)).rms

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -101,7 +102,9 @@ def noise_before_rounding(local: Local, step: float) -> float:
     return best * step
 
 
-def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
+def rounding_moments(
+    fraction: FloatArray, ratio: float, blur: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """Mean square, and its variance, of what rounding and noise add to a value.
 
     Parameters
@@ -110,6 +113,8 @@ def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, Fl
         The value's place between codes, in steps: 0 at a code; shape (n,).
     ratio
         Noise before rounding, in steps.
+    blur
+        Error of the value itself, in steps.
 
     Returns
     -------
@@ -119,6 +124,7 @@ def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, Fl
     from scipy.special import ndtr
 
     grid = np.linspace(-0.5, 0.5, 65)
+    ratio = math.hypot(ratio, blur)
     reach = int(np.ceil(5.0 * ratio)) + 1
     codes = np.arange(-reach, reach + 1)
     chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(

@@ -89,39 +89,41 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
 
 
 def local_residual(
-    data: Data, fit: Fit, values: FloatArray, *, leave_out: BoolArray | None = None
+    phase: FloatArray, values: FloatArray, used: BoolArray, *, leave_out: BoolArray | None = None
 ) -> Local:
     """Take what is smooth off a residual.
 
     Parameters
     ----------
-    data, fit
-        The readings and the model, whose phase divides the record into windows.
+    phase
+        Of the motion, rising, rad, shape (n,): it divides the record into windows.
     values
         The residual, shape (n,), of any scale.
+    used
+        Which readings count; shape (n,).
     leave_out
         Readings that may not take part in the fits, shape (n,).
     """
-    used = data.weight > 0.0
     part = used if leave_out is None else used & ~leave_out
-    window = _windows(fit.at.sampled.phase, len(data))
-    columns = _columns(fit.at.sampled.phase, window, harmonics=1)
+    window = _windows(phase)
+    columns = _columns(phase, window, harmonics=1)
     local = _fitted(columns, window, values, part, used)
     far = np.abs(local.scaled) > _FAR
     if far.any():
         local = _fitted(columns, window, values, part & ~far, used)
-    if _harmonics_are_there(fit, window, local, part & ~far):
-        columns = _columns(fit.at.sampled.phase, window, harmonics=3)
+    if _harmonics_are_there(phase, window, local, part & ~far):
+        columns = _columns(phase, window, harmonics=3)
         local = _fitted(columns, window, values, part & ~far, used)
-        far = np.abs(local.scaled) > _FAR
-        local = _fitted(columns, window, values, part & ~far, used)
+        again = np.abs(local.scaled) > _FAR
+        if np.any(again != far):
+            local = _fitted(columns, window, values, part & ~again, used)
     return local
 
 
-def _windows(phase: FloatArray, count: int) -> IntArray:
+def _windows(phase: FloatArray) -> IntArray:
     """Number of the window of each reading: whole cycles, with readings enough."""
     turns = (phase[-1] - phase[0]) / (2.0 * math.pi)
-    cycles = max(_CYCLES, math.ceil(_READINGS * turns / count))
+    cycles = max(_CYCLES, math.ceil(_READINGS * turns / len(phase)))
     number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles)).astype(np.int64)
     # A rest at the end joins the window before it.
     last = max(int(turns / cycles + 0.25), 1) - 1
@@ -149,18 +151,15 @@ def _fitted(
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
     kept = columns * part[:, None]
     size = columns.shape[1]
-    upper = [(i, j) for i in range(size) for j in range(i, size)]
-    sums = np.add.reduceat(np.stack([kept[:, i] * columns[:, j] for i, j in upper], 1), starts)
-    matrix = np.empty((len(starts), size, size))
-    for (i, j), column in zip(upper, sums.T, strict=True):
-        matrix[:, i, j] = matrix[:, j, i] = column
+    matrix = np.add.reduceat(kept[:, :, None] * columns[:, None, :], starts)
     # A window with few readings: what they can't tell apart stays small.
     matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
     right = np.add.reduceat(kept * values[:, None], starts)
     inverse = np.linalg.inv(matrix)
     solved = (inverse @ right[..., None])[..., 0]
     left = (values - np.sum(columns * solved[window], axis=1)) * used
-    hat = np.einsum("ni,nij,nj->n", columns, inverse[window], columns, optimize=True)
+    turned = np.matmul(columns[:, None, :], inverse[window])[:, 0, :]
+    hat = np.sum(turned * columns, axis=1)
     leverage = np.where(part, -np.minimum(hat, 1.0), np.minimum(hat, 10.0))
     freedom = max(float(np.sum(1.0 + leverage[part])), 1.0)
     return Local(left, _rms(left[part], freedom), leverage, used)
@@ -178,10 +177,11 @@ def _rms(left: FloatArray, freedom: float) -> float:
     return max(rms, 1e-300)
 
 
-def _harmonics_are_there(fit: Fit, window: IntArray, local: Local, part: BoolArray) -> bool:
+def _harmonics_are_there(
+    phase: FloatArray, window: IntArray, local: Local, part: BoolArray
+) -> bool:
     """Whether windows hold more of the second or third harmonic than noise would."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    phase = fit.at.sampled.phase
     total, number = 0.0, 0
     for harmonic in (2, 3):
         for column in (np.cos(harmonic * phase), np.sin(harmonic * phase)):

@@ -14,8 +14,8 @@ _INVERSE_FREEDOM: Final = (
     1e-6, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,
 )  # fmt: skip
 """1/nu: from the normal distribution to tails as heavy as any."""
-_BINS: Final = 300
-_ROUNDS: Final = 12
+_BINS: Final = 200
+_ROUNDS: Final = 8
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Tail:
         return float(self.weight @ (1.0 / self.freedom))
 
 
-def fit_tail(size: FloatArray, largest: int) -> Tail:
+def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False) -> Tail:
     """Fit Student's distribution, the `largest` errors counted but their sizes unknown.
 
     Parameters
@@ -54,6 +54,8 @@ def fit_tail(size: FloatArray, largest: int) -> Tail:
         |errors|, sorted, shape (n,).
     largest
         How many may be something else.
+    foreign
+        Whether they are: then not even their number says anything of the noise.
     """
     from scipy.special import stdtr
 
@@ -65,14 +67,18 @@ def fit_tail(size: FloatArray, largest: int) -> Tail:
     scale = np.full((len(freedom), 1), 1.4826 * float(np.median(size)) + 1e-300)
     # A reading beyond the edge counts as one on it: far more is unlikely.
     squares = np.append(middle, edge)[None, :] ** 2
-    number = np.append(counts, largest)[None, :]
+    number = np.append(counts, 0 if foreign else largest)[None, :]
     for _ in range(_ROUNDS):
         pull = (freedom + 1.0) / (freedom + squares / scale**2)
         scale = np.sqrt(np.sum(number * pull * squares, axis=1, keepdims=True) / number.sum())
     ratio = middle**2 / scale**2
     density = _log_density(freedom, scale) - 0.5 * (freedom + 1.0) * np.log1p(ratio / freedom)
     likelihood = np.sum(counts * density, axis=1)
-    likelihood += largest * np.log(2.0 * stdtr(freedom, -edge / scale))[:, 0]
+    beyond = 2.0 * stdtr(freedom, -edge / scale)[:, 0]
+    if foreign:
+        likelihood -= len(bulk) * np.log1p(-beyond)
+    else:
+        likelihood += largest * np.log(beyond)
     weight = np.exp(likelihood - likelihood.max()) * _prior()
     return Tail(freedom[:, 0], scale[:, 0], weight / weight.sum())
 
