@@ -11,8 +11,10 @@ from typing import Final
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics import (
+    broadband_drive,
     clipping,
     coarse_quantisation,
+    coloured_noise,
     glitches,
     jitter,
     missing_codes,
@@ -29,6 +31,8 @@ TESTS: Final[dict[str, Test]] = {
     "missing-codes": missing_codes.find,
     "coarse-quantisation": coarse_quantisation.find,
     "jitter": jitter.find,
+    "coloured-noise": coloured_noise.find,
+    "broadband-drive": broadband_drive.find,
 }
 """In their order: what is masked by one is not seen by those behind it."""
 _SURE: Final = 1e-3

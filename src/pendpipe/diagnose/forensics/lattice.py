@@ -13,8 +13,10 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.local import Local
 
-_RATIOS: Final = (0.04, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.56, 0.8, 1.1, 1.6, 2.3, 3.2, 4.5, 7.0)
+_RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56)
 """Noise before rounding, in steps."""
+_PLAINLY: Final = 0.6
+"""Rms of the readings' errors in steps, from which rounding is plainly dithered."""
 _OFF: Final = 0.05
 """Part of a step by which readings may be off their codes."""
 
@@ -84,21 +86,20 @@ def noise_before_rounding(local: Local, step: float) -> float:
     """
     from scipy.special import ndtr
 
+    if local.rms > _PLAINLY * step:
+        # Rounding is dithered: variances add.
+        return math.sqrt(local.rms**2 - step**2 / 12.0)
     left = local.left[local.used] / step
     near = np.abs(left) < 5.0 * local.rms / step + 1.0
     left = left[near]
     extra = np.maximum(local.leverage[local.used][near], -0.9)
     best, most = 0.0, -np.inf
-    ratios = np.array(_RATIOS)
-    for ratio in ratios[ratios < 3.0 * max(local.rms / step, 0.04)]:
+    for ratio in _RATIOS:
         spread = ratio * np.sqrt(1.0 + extra)
         chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
         likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
         if likelihood > most:
-            best, most = float(ratio), likelihood
-    if best >= 0.56:
-        # Rounding is dithered: variances add.
-        return float(np.sqrt(max(local.rms**2 - step**2 / 12.0, (0.5 * step) ** 2)))
+            best, most = ratio, likelihood
     return best * step
 
 

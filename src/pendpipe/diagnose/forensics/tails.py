@@ -94,8 +94,8 @@ def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
 
 
 def _prior() -> FloatArray:
-    """Half for normal noise, the rest evenly over 1/nu."""
+    """Nine tenths for normal noise, the rest evenly over 1/nu."""
     inverse = np.array(_INVERSE_FREEDOM)
     width = np.gradient(inverse)
     width[0] = 0.0
-    return np.asarray(np.append(0.5, 0.5 * width[1:] / width[1:].sum()))
+    return np.asarray(np.append(0.9, 0.1 * width[1:] / width[1:].sum()))
