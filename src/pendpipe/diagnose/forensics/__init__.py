@@ -18,14 +18,18 @@ from pendpipe.diagnose.forensics import (
     glitches,
     jitter,
     missing_codes,
+    time_stamps,
 )
 from pendpipe.diagnose.forensics.finding import Finding, Location
+from pendpipe.diagnose.forensics.lost_samples import LostSamples, find_lost_samples
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 
 Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
 TESTS: Final[dict[str, Test]] = {
+    "gaps": time_stamps.find_gaps,
+    "time-stamps": time_stamps.find_uneven,
     "clipping": clipping.find,
     "glitches": glitches.find,
     "missing-codes": missing_codes.find,
@@ -50,4 +54,6 @@ def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Findin
     return findings
 
 
-__all__ = ["TESTS", "Finding", "Location", "Test", "examine"]
+__all__ = [
+    "TESTS", "Finding", "Location", "LostSamples", "Test", "examine", "find_lost_samples",
+]  # fmt: skip

@@ -54,6 +54,8 @@ class Finding:
         Readings to leave out, shape (n,); None for none.
     variance
         Factor by which each reading's variance is larger, shape (n,); None for 1.
+    time_s
+        Better times of the readings, shape (n,); None where the stamps are as good.
     summary
         One clause of English.
     kind
@@ -68,6 +70,7 @@ class Finding:
     location: Location = Location()
     mask: BoolArray | None = None
     variance: FloatArray | None = None
+    time_s: FloatArray | None = None
     summary: str = ""
     kind: Literal["fault", "property"] = "fault"
 
