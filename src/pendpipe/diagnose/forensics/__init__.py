@@ -1,0 +1,59 @@
+"""Faults of the measurement that have no smooth shape in time, one small file each.
+
+Every module has ``find(data, fit, noise, samples) -> Finding``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics import (
+    broadband_drive,
+    clipping,
+    coarse_quantisation,
+    coloured_noise,
+    glitches,
+    jitter,
+    missing_codes,
+    time_stamps,
+)
+from pendpipe.diagnose.forensics.finding import Finding, Location
+from pendpipe.diagnose.forensics.lost_samples import LostSamples, find_lost_samples
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+
+Test = Callable[[Data, Fit, Noise, Samples], Finding]
+
+TESTS: Final[dict[str, Test]] = {
+    "gaps": time_stamps.find_gaps,
+    "time-stamps": time_stamps.find_uneven,
+    "clipping": clipping.find,
+    "glitches": glitches.find,
+    "missing-codes": missing_codes.find,
+    "coarse-quantisation": coarse_quantisation.find,
+    "jitter": jitter.find,
+    "coloured-noise": coloured_noise.find,
+    "broadband-drive": broadband_drive.find,
+}
+"""In their order: what is masked by one is not seen by those behind it."""
+_SURE: Final = 1e-3
+"""p-value from which a finding's readings are left out of the tests that follow."""
+
+
+def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Finding]:
+    """Make every test; what is found and what is not."""
+    findings = []
+    for find in TESTS.values():
+        finding = find(data, fit, noise, samples)
+        findings.append(finding)
+        if finding.mask is not None and finding.p_value < _SURE:
+            data = data.masked((data.weight == 0.0) | finding.mask)
+    return findings
+
+
+__all__ = [
+    "TESTS", "Finding", "Location", "LostSamples", "Test", "examine", "find_lost_samples",
+]  # fmt: skip

@@ -1,0 +1,144 @@
+"""A range that ends below the motion."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.lattice import (
+    Lattice,
+    find_lattice,
+    noise_before_rounding,
+    whole_readings,
+)
+from pendpipe.diagnose.forensics.local import Local, local_residual, residual_of
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.estimate import Estimate
+
+_FEWEST: Final = 3
+"""Readings at the very end of the range that make a flat top."""
+_SHARED: Final = 0.1
+"""Error in steps of the true angle that a window's readings share, where rounding is coarse."""
+_MASKED: Final = 1e-2
+
+Side = Literal["upper", "lower"]
+
+
+class End(NamedTuple):
+    """One end of the range."""
+
+    side: Side
+    level: float
+    at: BoolArray
+    """Which readings are there; shape (n,)."""
+    p_value: float
+    delta_chi2: float
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test whether the largest (smallest) reading is smaller than the motion's.
+
+    With the true angles x_j from the rest of each window (readings at the end itself have
+    no say), the chance that no reading passes the level m is
+
+        p = product over j of Phi((m + q/2 - x_j)/sigma_j),
+
+    the distribution of the largest reading. It counts only where at least three readings
+    are the very same, as at the end of a converter's range.
+    """
+    if data.time_noise or data.used < 60 or not whole_readings(data, samples):
+        return nothing("clipping")
+    residual = residual_of(data, fit)
+    lattice = find_lattice(data.values, samples.step)
+    ends = [_end(data, fit, residual, lattice, side) for side in ("upper", "lower")]
+    p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))
+    clipped = [end for end in ends if end.p_value < _MASKED]
+    if not clipped:
+        return Finding("clipping", p_value, summary="the largest readings are as the motion's")
+    return _described(data, fit, lattice, clipped, p_value)
+
+
+def _end(
+    data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str
+) -> End:
+    sign = 1.0 if side == "upper" else -1.0
+    named: Side = "upper" if side == "upper" else "lower"
+    used = data.weight > 0.0
+    level = float((sign * data.values[used]).max())
+    step = lattice.step if lattice is not None else 0.0
+    slack = 0.5 * step if step else 1e-9 * float(np.ptp(data.values[used]))
+    at = used & (sign * data.values >= level - slack)
+    if np.count_nonzero(at) < _FEWEST:
+        return End(named, sign * level, at, 1.0, 0.0)
+    local = local_residual(fit.at.sampled.phase, residual, used, leave_out=at)
+    true = sign * (data.values - local.left)
+    before = _noise(local, step)
+    spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
+    near = used & (true > level - 6.0 * local.rms - 3.0 * step)
+    p_value = _largest(level + 0.5 * step - true[near], spread[near], _common(before, step))
+    beyond = np.maximum(true[at] - level - 0.5 * step, 0.0) / spread[at]
+    return End(named, sign * level, at, p_value, float(beyond @ beyond))
+
+
+def _noise(local: Local, step: float) -> float:
+    return noise_before_rounding(local, step) if step else local.rms
+
+
+def _common(before: float, step: float) -> float:
+    """Error of the true angle that rounding leaves, common to readings at one level."""
+    if not step:
+        return 0.0
+    return _SHARED * step * math.exp(-2.0 * math.pi**2 * min((before / step) ** 2, 30.0))
+
+
+def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
+    """Chance that no reading goes beyond, its common error averaged over."""
+    from scipy.special import log_ndtr
+
+    nodes, weights = np.polynomial.hermite_e.hermegauss(9)
+    shifted = (room[:, None] + common * nodes) / spread[:, None]
+    chance = np.exp(np.sum(log_ndtr(shifted), axis=0))
+    return float(min(chance @ weights / weights.sum(), 1.0))
+
+
+def _described(
+    data: Data, fit: Fit, lattice: Lattice | None, ends: list[End], p_value: float
+) -> Finding:
+    mask = np.zeros(len(data), dtype=bool)
+    parameters = {}
+    codes = []
+    step = lattice.step if lattice is not None else 0.0
+    for end in ends:
+        mask |= end.at
+        parameters[f"{end.side}_level"] = Estimate(
+            end.level, step / math.sqrt(12.0), data.unit
+        )
+        if lattice is not None:
+            codes.append(round(float(lattice.position(np.array(end.level)))))
+    number = int(np.count_nonzero(mask))
+    parameters["number"] = Estimate(float(number), 0.0, "")
+    when, amplitude = data.time_s[mask], fit.at.sampled.amplitude[mask]
+    sides = " and ".join(end.side for end in ends)
+    levels = " and ".join(f"{end.level:.5g}" for end in ends)
+    around = {"upper": 0.0, "lower": math.pi}[ends[0].side]
+    return Finding(
+        "clipping", p_value, sum(end.delta_chi2 for end in ends), parameters,
+        Location(
+            (float(when[0]), float(when[-1])),
+            (float(amplitude.min()), float(amplitude.max())),
+            ((around - 0.2) % (2.0 * math.pi), (around + 0.2) % (2.0 * math.pi))
+            if len(ends) == 1
+            else None,
+            adc_codes=tuple(codes),
+        ),
+        mask=mask,
+        summary=f"{number} readings stand at the {sides} end of the range ({levels}"
+        f" {data.unit}), which the motion passes, until {when[-1]:.4g} s",
+    )  # fmt: skip

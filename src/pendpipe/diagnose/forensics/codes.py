@@ -1,0 +1,100 @@
+"""Codes of the converter beside the angles that the motion must have had."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.lattice import Lattice, find_lattice, noise_before_rounding
+from pendpipe.diagnose.forensics.local import local_residual, residual_of
+from pendpipe.diagnose.refine import Fit
+
+_MOST: Final = 12000
+"""Readings that are looked at: of more, every second, third, ..."""
+_MISFIT: Final = 0.15
+"""Misfit of the model in steps from which the angles are taken from the readings' windows."""
+
+
+@dataclass(frozen=True)
+class Coded:
+    """Readings as codes; only those that count, and far-off ones left out.
+
+    Parameters
+    ----------
+    lattice
+        Step and origin (its codes are those of all readings).
+    code
+        Of each reading, shape (m,).
+    position
+        The angle without noise, in steps from code 0, shape (m,).
+    blur
+        Standard deviation of `position`'s error, in steps.
+    ratio
+        Noise before rounding, in steps.
+    index
+        Which reading of the samples each is; shape (m,).
+    """
+
+    lattice: Lattice
+    code: IntArray
+    position: FloatArray
+    blur: float
+    ratio: float
+    index: IntArray
+
+    @property
+    def error(self) -> FloatArray:
+        """Reading less angle, in steps, shape (m,)."""
+        return self.code - self.position
+
+
+def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
+    """Set codes and angles side by side; None where the readings have no step.
+
+    The angles are the fitted model's while it is good to a small part of a step, else the
+    local fit's to the readings themselves.
+    """
+    if samples.counts or samples.step is None:
+        return None
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
+    every = 1 if last - first == len(data) else max(1, (last - first) // _MOST)
+    index = np.arange(first, last, every)
+    values = samples.values[index]
+    lattice = find_lattice(values, samples.step)
+    if lattice is None:
+        return None
+    sampled = fit.at.sampled
+    if last - first == len(data):
+        phase, used = sampled.phase, data.weight > 0.0
+        residual = residual_of(data, fit)
+    else:
+        when = samples.time_s[index]
+        phase = np.interp(when, data.time_s, sampled.phase)
+        used = np.interp(when, data.time_s, data.weight) > 0.99
+        residual = values - _between(data.time_s, fit.at.reading, when)
+    local = local_residual(phase, residual, used)
+    smooth = (residual - local.left)[used]
+    step = lattice.step
+    misfit = math.sqrt(float(np.mean(smooth**2))) / step
+    good = used & (np.abs(local.scaled) < 6.0)
+    ratio = noise_before_rounding(local, step) / step
+    if misfit < _MISFIT:
+        true, blur = values - residual, min(0.5 * misfit, 0.05)
+    else:
+        true = values - local.left
+        blur = local.rms / step * math.sqrt(float(np.mean(np.abs(local.leverage[used]))))
+    return Coded(lattice, lattice.code[good], lattice.position(true[good]), blur, ratio, index[good])
+
+
+def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:
+    """A smooth curve through values."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(time, values)(when))

@@ -1,0 +1,152 @@
+"""Single readings that are wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.local import (
+    Local,
+    local_residual,
+    residual_of,
+    whitened_in_time,
+)
+from pendpipe.diagnose.forensics.tails import Tail, fit_tail
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.estimate import Estimate
+
+_NUMBERS: Final = (1, 3, 10, 30, 100)
+_SURELY: Final = 4.5
+_LARGE: Final = 3.0
+_SHARED: Final = 0.35
+"""Part of an error that its neighbours may have as well, if it is to be one reading's own."""
+_ROUNDS: Final = 4
+_NEAR: Final = 4
+_EXPECTED: Final = 0.05
+"""A reading is left out where chance would make fewer than this in the whole record."""
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Look for readings that neither normal nor heavy-tailed noise explains.
+
+    Each error is compared with its window and its neighbours. For k = 1, 2, 4, ... the
+    noise's tail (Student's distribution, its nu averaged over what the record allows) is
+    fitted with the k largest unknown, and the k-th largest of n judged by it:
+
+        p_k = P(at least k of n beyond the k-th largest).
+
+    The smallest p_k, half of the chance given to k = 1, is the test.
+    """
+    if data.used < 60:
+        return nothing("glitches")
+    residual = residual_of(data, fit)
+    phase, used = fit.at.sampled.phase, data.weight > 0.0
+    local = local_residual(phase, whitened_in_time(residual, noise), used)
+    error = own_error(local)
+    place = np.flatnonzero(local.used)
+    p_value = _smallest(np.sort(error[place]))
+    tail = _others(np.sort(error[place]))
+    mask = np.zeros(len(data), dtype=bool)
+    size = np.zeros(len(data))
+    for _ in range(_ROUNDS):
+        beyond = (error > 3.0) & local.used & ~mask & (p_value < _EXPECTED)
+        beyond[beyond] = tail.beyond(error[beyond]) * len(place) < _EXPECTED
+        if noise.uniform and noise.memory != 0.0:
+            # Whitening smears a wrong reading over its neighbours: the largest goes first.
+            beyond &= error == _largest_about(error)
+        if not beyond.any():
+            break
+        size[beyond] = local.scaled[beyond]
+        mask |= beyond
+        if noise.memory == 0.0:
+            break
+        rest = np.where(mask, 0.0, residual)
+        local = local_residual(phase, whitened_in_time(rest, noise), used, leave_out=mask)
+        error = own_error(local)
+    if not mask.any():
+        return Finding("glitches", p_value, summary="no reading stands out of the noise")
+    return _described(data, fit, size, mask, p_value, tail)
+
+
+def own_error(local: Local) -> FloatArray:
+    """|error| of each reading in standard deviations, less what its neighbours share."""
+    scaled = local.scaled
+    around = np.zeros(len(scaled))
+    around[1:-1] = 0.5 * (scaled[:-2] + scaled[2:])
+    around[0], around[-1] = scaled[1], scaled[-2]
+    # Only where it matters: the bulk of the errors must stay as the noise made them.
+    shared = (np.abs(around) > _SHARED * np.abs(scaled)) & (np.abs(scaled) > _LARGE)
+    alone = np.abs(scaled - around) * math.sqrt(2.0 / 3.0)
+    return np.asarray(np.where(shared, np.minimum(np.abs(scaled), alone), np.abs(scaled)))
+
+
+def _largest_about(error: FloatArray) -> FloatArray:
+    """The largest of each reading and its neighbours."""
+    padded = np.pad(error, _NEAR)
+    return np.asarray(
+        np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1).max(axis=1)
+    )
+
+
+def _smallest(sorted_error: FloatArray) -> float:
+    """The p-value over all numbers of glitches."""
+    from scipy.special import bdtrc
+
+    count = len(sorted_error)
+    numbers = [k for k in _NUMBERS if k <= count // 30]
+    best = 1.0
+    for k in numbers:
+        tail = fit_tail(sorted_error, k)
+        chance = float(tail.beyond(sorted_error[count - k]))
+        p_value = float(bdtrc(k - 1, count, min(chance, 1.0)))
+        share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
+        best = min(p_value / share, best)
+    return best
+
+
+def _others(sorted_error: FloatArray) -> Tail:
+    """The noise's tail where the largest errors are glitches."""
+    foreign = int(np.count_nonzero(sorted_error > _SURELY))
+    return fit_tail(sorted_error, min(max(foreign, 1), len(sorted_error) // 10), foreign=True)
+
+
+def _described(
+    data: Data, fit: Fit, sizes: FloatArray, mask: BoolArray, p_value: float, tail: Tail
+) -> Finding:
+    sampled = fit.at.sampled
+    size = sizes[mask]
+    residual = residual_of(data, fit)
+    reading = residual[mask]
+    when = data.time_s[mask]
+    amplitude = sampled.amplitude[mask]
+    largest = int(np.argmax(np.abs(size)))
+    number = int(np.count_nonzero(mask))
+    rms = math.sqrt(float(np.mean(residual[~mask & (data.weight > 0.0)] ** 2)))
+    parameters = {
+        "number": Estimate(float(number), math.sqrt(number) if number > 1 else 0.0, ""),
+        "largest": Estimate(float(reading[largest]), rms, data.unit),
+        "largest_time": Estimate(float(when[largest]), 0.0, "s"),
+    }
+    if number == 1:
+        summary = f"one reading, at {when[0]:.6g} s, is wrong by {reading[0]:.3g} {data.unit}"
+    else:
+        summary = (
+            f"{number} single readings between {when[0]:.4g} and {when[-1]:.4g} s are wrong"
+            f" by up to {abs(reading[largest]):.3g} {data.unit}"
+        )
+    if tail.inverse_freedom > 0.03:
+        summary += f" (the other readings' tails: Student, nu = {1.0 / tail.inverse_freedom:.2g})"
+    return Finding(
+        "glitches", p_value, float(np.sum(size**2)), parameters,
+        Location(
+            (float(when[0]), float(when[-1])), (float(amplitude.min()), float(amplitude.max()))
+        ),
+        mask=mask, summary=summary,
+    )  # fmt: skip

@@ -1,0 +1,195 @@
+"""Readings taken at uncertain moments: noise that follows the speed."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.codes import read_codes
+from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.lattice import rounding_moments, whole_readings
+from pendpipe.diagnose.forensics.local import local_residual, residual_of, whitened_in_time
+from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.estimate import Estimate
+
+_FAR: Final = 3.0
+"""Standard deviations beyond which an error counts as if it were only that large."""
+_AGREE: Final = 2.6
+"""Standard deviations by which the part at twice the frequency may fall short."""
+_DITHERED: Final = 0.7
+"""Noise before rounding, in steps, from which rounding is part of the noise."""
+_ROUNDS: Final = 6
+
+
+class Squares(NamedTuple):
+    """Squared errors against the speed; arrays of shape (m,).
+
+    Parameters
+    ----------
+    square
+        In units of the usual variance `unit`.
+    expected, variance
+        What they are, and vary by, without jitter.
+    mean, double
+        The parts of v^2 that follow the amplitude, (omega A)^2/2, and twice the frequency,
+        -(omega A)^2 cos(2 psi)/2; in units of `speed`.
+    unit
+        Variance of one reading, rad^2.
+    speed
+        Mean of v^2, (rad/s)^2.
+    """
+
+    square: FloatArray
+    expected: FloatArray
+    variance: FloatArray
+    mean: FloatArray
+    double: FloatArray
+    unit: float
+    speed: float
+
+    @property
+    def inverse(self) -> FloatArray:
+        """Weight of each square; those that rounding fixes are not believed exactly."""
+        return 1.0 / np.maximum(self.variance, 0.05 * float(np.mean(self.variance)))
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
+
+    The score for sigma_t^2 at zero is a weighted sum of squared errors, the weights v^2 less
+    their mean; its chance is that of a weighted sum of squares, stretched where tails are
+    heavier than normal. Where the step is not dithered, each square is compared with what
+    rounding makes of it at that angle. The part of v^2 at twice the frequency must say the
+    same as the whole, or it alone counts: a noise that dies with the amplitude is no jitter.
+    """
+    if data.time_noise or data.used < 60:
+        return nothing("jitter")
+    squares = _rounded(data, fit, samples) or _dithered(data, fit, noise)
+    if len(squares.square) < 50:
+        return nothing("jitter")
+    p_value = _chance(squares, squares.mean + squares.double)
+    columns = np.stack([squares.expected, squares.mean, squares.double], axis=1)
+    size, covariance = _fitted(squares, columns)
+    spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
+    if size[2] - size[1] < -_AGREE * spread:
+        p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
+    return _described(data, fit, squares, p_value)
+
+
+def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares:
+    """Squares of normal errors."""
+    sampled, used = fit.at.sampled, data.weight > 0.0
+    residual = residual_of(data, fit)
+    white = whitened_in_time(residual, noise)
+    scaled = local_residual(sampled.phase, white, used).scaled[used]
+    unit = noise.white_rms**2
+    mean, double, speed = _speeds(fit, np.flatnonzero(used))
+    ones = np.ones(len(scaled))
+    return Squares(scaled**2, ones, 2.0 * ones, mean, double, unit, speed)
+
+
+def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
+    """Squares of errors that are rounding's at that angle; None where noise dithers it."""
+    if not whole_readings(data, samples):
+        return None
+    coded = read_codes(data, fit, samples)
+    if coded is None or coded.ratio > _DITHERED:
+        return None
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    index = coded.index - first
+    # At rest within a step the errors are all the same: they say nothing of noise.
+    moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
+    if np.count_nonzero(moving) < 50:
+        moving[:] = True
+    place = coded.position[moving] - np.round(coded.position[moving])
+    expected, variance = rounding_moments(place, coded.ratio, coded.blur)
+    square = coded.error[moving] ** 2
+    unit = float(np.mean(square))
+    mean, double, speed = _speeds(fit, index[moving])
+    step = coded.lattice.step
+    return Squares(
+        square / unit, expected / unit, variance / unit**2, mean, double, unit * step**2, speed
+    )
+
+
+def _speeds(fit: Fit, index: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    sampled = fit.at.sampled
+    top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
+    double = -top * np.cos(2.0 * sampled.phase[index])
+    speed = float(np.mean(top))
+    return top / speed, double / speed, speed
+
+
+def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
+    """Chance of a weighted sum of squares as large, the noise's own level unknown."""
+    capped = np.minimum(squares.square, _FAR**2 * squares.expected.mean())
+    columns = [squares.expected] if beside is None else [squares.expected, beside]
+    # What the level (and what stands beside) can do is taken off, by least squares.
+    basis, inverse = np.stack(columns, axis=1), squares.inverse
+    solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * weight))
+    rest = (weight - basis @ solved) * inverse
+    level = float(np.sum(capped * squares.expected * inverse)) / float(
+        np.sum(squares.expected**2 * inverse)
+    )
+    off = capped - level * squares.expected
+    weights = rest * squares.expected * level
+    # How much wider or narrower than squares of normal numbers: tails, or rounding.
+    share = float(np.mean(off**2 * squares.inverse)) / float(
+        np.mean(squares.variance * squares.inverse)
+    )
+    stretch = math.sqrt(share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights)))
+    total = float(rest @ off)
+    return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
+
+
+def _fitted(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit the variance by columns, the first its level; sizes and their covariance."""
+    size, matrix = np.zeros(columns.shape[1]), np.eye(columns.shape[1])
+    size[0] = 1.0
+    square = np.minimum(squares.square, 25.0 * _smooth_model(squares, columns, size))
+    for _ in range(_ROUNDS):
+        model = _smooth_model(squares, columns, size)
+        weight = squares.inverse / (model / squares.expected) ** 2
+        matrix = np.linalg.inv(columns.T @ (weight[:, None] * columns))
+        size = matrix @ (columns.T @ (weight * square))
+    return size, matrix
+
+
+def _smooth_model(squares: Squares, columns: FloatArray, size: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(columns @ size, 0.1 * squares.expected))
+
+
+def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
+    columns = np.stack([squares.expected, squares.mean + squares.double], axis=1)
+    size, covariance = _fitted(squares, columns)
+    model = _smooth_model(squares, columns, size)
+    plain = float(squares.square.mean() / squares.expected.mean()) * squares.expected
+    gain = np.log(plain / model) + squares.square * (1.0 / plain - 1.0 / model)
+    to_seconds = squares.unit / squares.speed
+    share = max(float(size[1]), 0.0)
+    seconds = math.sqrt(share * to_seconds)
+    sd = math.sqrt(covariance[1, 1])
+    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the square root's own size.
+    error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
+    sampled = fit.at.sampled
+    omega = sampled.motion.angular_frequency
+    factor = 1.0 + share / max(float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
+    return Finding(
+        "jitter", p_value, max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
+        {"sigma_t": Estimate(seconds, error, "s")},
+        Location(
+            (float(data.time_s[0]), float(data.time_s[-1])),
+            (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
+            (0.25 * math.pi, 0.75 * math.pi), (omega / math.pi,),
+        ),
+        variance=factor,
+        summary=f"the noise is largest where the motion is fastest, as if the moments of"
+        f" reading were uncertain by {seconds:.2g} s",
+    )  # fmt: skip

@@ -1,0 +1,141 @@
+"""The converter's codes, and how rounding to them distributes a reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.local import Local
+
+_RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56)
+"""Noise before rounding, in steps."""
+_PLAINLY: Final = 0.6
+"""Rms of the readings' errors in steps, from which rounding is plainly dithered."""
+_OFF: Final = 0.05
+"""Part of a step by which readings may be off their codes."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Readings as whole multiples of a step.
+
+    Parameters
+    ----------
+    step
+        In the unit of the readings.
+    code
+        Of each reading: its value is ``step code + origin``; shape (n,).
+    origin
+        The value of code 0: within half a step of zero.
+    """
+
+    step: float
+    code: IntArray
+    origin: float
+
+    def position(self, value: FloatArray) -> FloatArray:
+        """Return values in steps from code 0."""
+        return np.asarray((value - self.origin) / self.step)
+
+
+def find_lattice(values: FloatArray, step: float | None) -> Lattice | None:
+    """Number the codes of readings; None where they lie on no lattice.
+
+    The step is refined over the whole range, so that codes far from zero are counted right.
+    """
+    if step is None or not step > 0.0:
+        return None
+    levels, inverse = np.unique(values, return_inverse=True)
+    if len(levels) < 3:
+        return None
+    gaps = np.round(np.diff(levels) / step).astype(np.int64)
+    number = np.concatenate([[0], np.cumsum(gaps)])
+    if number[-1] < 2:
+        return None
+    centred = number - number.mean()
+    refined = float(centred @ levels / (centred @ centred))
+    origin = float(np.mean(levels - refined * number))
+    if np.max(np.abs(levels - origin - refined * number)) > _OFF * refined:
+        return None
+    shift = round(origin / refined)
+    return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
+
+
+def whole_readings(data: Data, samples: Samples) -> bool:
+    """Whether the data are the readings themselves, and not means of several."""
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
+    return last - first == len(data)
+
+
+def noise_before_rounding(local: Local, step: float) -> float:
+    """Maximum likelihood of the noise that was there before rounding, from P(code).
+
+    Parameters
+    ----------
+    local
+        Readings less what is smooth; the smooth part stands for the true angle.
+    step
+        Of the readings.
+    """
+    from scipy.special import ndtr
+
+    if local.rms > _PLAINLY * step:
+        # Rounding is dithered: variances add.
+        return math.sqrt(local.rms**2 - step**2 / 12.0)
+    left = local.left[local.used] / step
+    near = np.abs(left) < 5.0 * local.rms / step + 1.0
+    left = left[near]
+    extra = np.maximum(local.leverage[local.used][near], -0.9)
+    best, most = 0.0, -np.inf
+    for ratio in _RATIOS:
+        spread = ratio * np.sqrt(1.0 + extra)
+        chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
+        likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
+        if likelihood > most:
+            best, most = ratio, likelihood
+    return best * step
+
+
+def rounding_moments(
+    fraction: FloatArray, ratio: float, blur: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Mean square, and its variance, of what rounding and noise add to a value.
+
+    Parameters
+    ----------
+    fraction
+        The value's place between codes, in steps: 0 at a code; shape (n,).
+    ratio
+        Noise before rounding, in steps.
+    blur
+        Error of the value itself, in steps.
+
+    Returns
+    -------
+    square, variance
+        E[e^2] in steps^2 and Var[e^2] in steps^4, e = code - value; shape (n,).
+    """
+    from scipy.special import ndtr
+
+    grid = np.linspace(-0.5, 0.5, 65)
+    ratio = math.hypot(ratio, blur)
+    reach = int(np.ceil(5.0 * ratio)) + 1
+    codes = np.arange(-reach, reach + 1)
+    chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(
+        (codes - 0.5 - grid[:, None]) / ratio
+    )
+    error = codes - grid[:, None]
+    square = np.sum(chance * error**2, axis=1)
+    fourth = np.sum(chance * error**4, axis=1)
+    place = fraction - np.round(fraction)
+    return (
+        np.interp(place, grid, square),
+        np.interp(place, grid, np.maximum(fourth - square**2, 0.0)),
+    )

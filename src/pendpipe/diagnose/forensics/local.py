@@ -1,0 +1,194 @@
+"""What is left of the readings when all that is smooth from cycle to cycle is taken off.
+
+The tests of the measurement come before the physics is complete. So they look at what no
+motion of the pendulum, however wrong its model, could do: in windows of a few cycles the
+residual is freed of a level and of the fundamental, both quadratures, with their slopes (and
+of the second and third harmonic where these are there).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.unwrapped import unwrapped
+
+_CYCLES: Final = 2
+_READINGS: Final = 40
+_FAR: Final = 5.0
+"""Standard deviations beyond which a reading has no say in its window's fit."""
+_ROUGH: Final = 5.0
+"""Standard deviations by which the harmonics must be there to be taken off."""
+
+
+@dataclass(frozen=True)
+class Local:
+    """Readings less all that is smooth.
+
+    Parameters
+    ----------
+    left
+        What is left, shape (n,); 0 where a reading is masked.
+    rms
+        Standard deviation of one reading's noise, in the unit of `left`.
+    leverage
+        ``left`` has the variance rms^2 (1 + leverage); negative where the reading itself
+        took part in the fit. Shape (n,).
+    used
+        Which readings count; shape (n,).
+    """
+
+    left: FloatArray
+    rms: float
+    leverage: FloatArray
+    used: BoolArray
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviation of `left`, shape (n,)."""
+        return np.asarray(self.rms * np.sqrt(np.maximum(1.0 + self.leverage, 0.05)))
+
+    @property
+    def scaled(self) -> FloatArray:
+        """`left` in its own standard deviations, shape (n,)."""
+        return self.left / self.spread
+
+
+def residual_of(data: Data, fit: Fit) -> FloatArray:
+    """Readings minus model, along the motion where they are out of phase; 0 where masked."""
+    return np.asarray(unwrapped(data, fit.at)[0] * (data.weight > 0.0))
+
+
+def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
+    """S^-1 r in units of its own standard deviation: noise of any colour made comparable.
+
+    That is the best estimate of one reading's error from all the others (unit variance).
+    White noise is only divided by its standard deviation.
+    """
+    if not noise.uniform:
+        return np.asarray(residual / np.sqrt(noise.variance))
+    if noise.red == 0.0 and noise.memory == 0.0:
+        return residual / noise.rms
+    from scipy.fft import dct, idct
+
+    count = len(residual)
+    inverse = 1.0 / noise.variance
+    filtered = idct(dct(residual, norm="ortho") * inverse, norm="ortho")
+    # (S^-1)_jj = (2/n) sum of cos^2(pi k (2 j + 1)/(2 n))/S_k, from a sum of cosines.
+    doubled = np.fft.rfft(inverse, n=2 * count).real
+    odd = 2 * np.arange(count) + 1
+    diagonal = (inverse.sum() - inverse[0] + doubled[np.where(odd <= count, odd, 2 * count - odd)])
+    return np.asarray(filtered / np.sqrt(diagonal / count))
+
+
+def local_residual(
+    phase: FloatArray, values: FloatArray, used: BoolArray, *, leave_out: BoolArray | None = None
+) -> Local:
+    """Take what is smooth off a residual.
+
+    Parameters
+    ----------
+    phase
+        Of the motion, rising, rad, shape (n,): it divides the record into windows.
+    values
+        The residual, shape (n,), of any scale.
+    used
+        Which readings count; shape (n,).
+    leave_out
+        Readings that may not take part in the fits, shape (n,).
+    """
+    part = used if leave_out is None else used & ~leave_out
+    window = _windows(phase)
+    columns = _columns(phase, window, harmonics=1)
+    local = _fitted(columns, window, values, part, used)
+    far = np.abs(local.scaled) > _FAR
+    if far.any():
+        local = _fitted(columns, window, values, part & ~far, used)
+    if _harmonics_are_there(phase, window, local, part & ~far):
+        columns = _columns(phase, window, harmonics=3)
+        local = _fitted(columns, window, values, part & ~far, used)
+        again = np.abs(local.scaled) > _FAR
+        if np.any(again != far):
+            local = _fitted(columns, window, values, part & ~again, used)
+    return local
+
+
+def _windows(phase: FloatArray) -> IntArray:
+    """Number of the window of each reading: whole cycles, with readings enough."""
+    turns = (phase[-1] - phase[0]) / (2.0 * math.pi)
+    cycles = max(_CYCLES, math.ceil(_READINGS * turns / len(phase)))
+    number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles)).astype(np.int64)
+    # A rest at the end joins the window before it.
+    last = max(int(turns / cycles + 0.25), 1) - 1
+    return np.asarray(np.minimum(number, last))
+
+
+def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
+    """What is smooth: level, fundamental and its slope, further harmonics; shape (n, p)."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    ends = np.append(starts[1:], len(phase)) - 1
+    middle = 0.5 * (phase[starts] + phase[ends])
+    half = np.maximum(0.5 * (phase[ends] - phase[starts]), 1e-9)
+    along = (phase - middle[window]) / half[window]
+    cosine, sine = np.cos(phase), np.sin(phase)
+    parts = [np.ones(len(phase)), cosine, sine, along * cosine, along * sine]
+    for harmonic in range(2, harmonics + 1):
+        parts += [np.cos(harmonic * phase), np.sin(harmonic * phase)]
+    return np.stack(parts, axis=1)
+
+
+def _fitted(
+    columns: FloatArray, window: IntArray, values: FloatArray, part: BoolArray, used: BoolArray
+) -> Local:
+    """Least squares in every window at once."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    kept = columns * part[:, None]
+    size = columns.shape[1]
+    matrix = np.add.reduceat(kept[:, :, None] * columns[:, None, :], starts)
+    # A window with few readings: what they can't tell apart stays small.
+    matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
+    right = np.add.reduceat(kept * values[:, None], starts)
+    inverse = np.linalg.inv(matrix)
+    solved = (inverse @ right[..., None])[..., 0]
+    left = (values - np.sum(columns * solved[window], axis=1)) * used
+    turned = np.matmul(columns[:, None, :], inverse[window])[:, 0, :]
+    hat = np.sum(turned * columns, axis=1)
+    leverage = np.where(part, -np.minimum(hat, 1.0), np.minimum(hat, 10.0))
+    freedom = max(float(np.sum(1.0 + leverage[part])), 1.0)
+    return Local(left, _rms(left[part], freedom), leverage, used)
+
+
+def _rms(left: FloatArray, freedom: float) -> float:
+    """Root mean square, with what is far off taken as only just far off."""
+    scale = math.sqrt(len(left) / freedom)
+    rms = 1.4826 * float(np.median(np.abs(left))) * scale
+    if rms == 0.0:
+        rms = math.sqrt(float(left @ left) / freedom)
+    for _ in range(2):
+        near = np.minimum(np.abs(left), 4.0 * rms / scale)
+        rms = math.sqrt(float(near @ near) / freedom)
+    return max(rms, 1e-300)
+
+
+def _harmonics_are_there(
+    phase: FloatArray, window: IntArray, local: Local, part: BoolArray
+) -> bool:
+    """Whether windows hold more of the second or third harmonic than noise would."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    total, number = 0.0, 0
+    for harmonic in (2, 3):
+        for column in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
+            kept = column * part
+            norm = np.add.reduceat(kept * kept, starts)
+            size = np.add.reduceat(kept * local.left, starts)
+            good = norm > 4.0
+            total += float(np.sum(np.minimum(size[good] ** 2 / norm[good] / local.rms**2, 50.0)))
+            number += int(np.count_nonzero(good))
+    return total > number + _ROUGH * math.sqrt(2.0 * max(number, 1))

@@ -1,0 +1,182 @@
+"""Codes that the converter avoids, and bits that are stuck."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.codes import Coded, read_codes
+from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+from pendpipe.estimate import Estimate
+
+_LEAST: Final = 6.0
+"""Readings expected of a code, from which it is looked at."""
+_BITS: Final = 7
+_DOUBT: Final = 0.05
+"""Error in steps that the angles may have for all readings alike, beside their blur."""
+_FEW: Final = 1e-3
+_SHOWN: Final = 32
+
+
+class Occupation(NamedTuple):
+    """How often codes came, and should have come; shape (k,)."""
+
+    code: IntArray
+    found: FloatArray
+    low: FloatArray
+    high: FloatArray
+    expected: FloatArray
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Compare how often each code came with what motion and noise make of it.
+
+    Each code's number is held against Poisson's distribution about its expectation (readings
+    are spread less than that, so the chance is never underestimated), which may lie anywhere
+    within what a small common error of the angles allows. Single codes and whole bits are
+    looked at; the chance counts how many.
+    """
+    coded = None if data.time_noise else read_codes(data, fit, samples)
+    if coded is None or len(coded.code) < 100:
+        return nothing("missing-codes")
+    occupation = occupied(coded)
+    chance = _chances(occupation)
+    looked = len(chance)
+    single = min(1.0, looked * float(chance.min())) if looked else 1.0
+    bit, bits = _stuck_bits(coded)
+    p_value = min(1.0, 2.0 * min(single, bits))
+    if p_value > 0.01:
+        return Finding("missing-codes", p_value, summary="codes come as often as they should")
+    bad = np.minimum(chance * looked, 1.0) < _FEW
+    return _described(data, fit, coded, occupation, bad, bit if bits <= single else None, p_value)
+
+
+def occupied(coded: Coded) -> Occupation:
+    """Count each code, and work out how often it should have come."""
+    first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
+    found = np.bincount(coded.code - first, minlength=last - first + 1).astype(np.float64)
+    spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
+    shift = _DOUBT + 2.0 * coded.blur
+    size = last - first + 1
+    shapes = [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
+    inside = slice(2, -2)
+    codes = np.arange(first, last + 1)
+    low, high = np.min(shapes, axis=0), np.max(shapes, axis=0)
+    return Occupation(
+        codes[inside], found[inside], low[inside], high[inside], shapes[1][inside]
+    )
+
+
+def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
+    """Sum over readings of P(code), by a fine histogram of the angles."""
+    from scipy.special import ndtr
+
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    fine = 10 if spread < 1.0 else 4
+    cells = np.bincount(
+        np.clip(((position - first + 0.5) * fine).astype(np.int64), 0, size * fine - 1),
+        minlength=size * fine,
+    ).astype(np.float64)
+    reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
+    # A code's expectation: its chance about its middle, summed over the cells.
+    offset = (np.arange(-reach, reach) + 0.5) / fine
+    kernel = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
+    length = next_fast_len(len(cells) + 2 * reach, real=True)
+    smooth = irfft(rfft(cells, length) * rfft(kernel, length), length)
+    start = reach + fine // 2 - 1
+    return np.asarray(np.maximum(smooth[start : start + size * fine : fine], 0.0))
+
+
+def _chances(occupation: Occupation) -> FloatArray:
+    """Two-sided chance of each code's number; shape (codes that are looked at,)."""
+    from scipy.special import gammainc, gammaincc
+
+    looked = occupation.low > _LEAST
+    found = occupation.found
+    # P(N <= found) at the smallest expectation, P(N >= found) at the largest.
+    fewer = gammaincc(found + 1.0, np.maximum(occupation.low, 1e-12))
+    more = np.where(found > 0.0, gammainc(np.maximum(found, 1.0), occupation.high), 1.0)
+    chance = np.where(looked, 2.0 * np.minimum(fewer, more), 1.0)
+    return np.asarray(np.minimum(chance, 1.0)) if looked.any() else np.zeros(0)
+
+
+def _stuck_bits(coded: Coded) -> tuple[tuple[int, float], float]:
+    """The bit that is set far too often or seldom, and the chance of that.
+
+    Where code 0 of the converter lies is not known: a bit of weight 2^b splits the codes
+    into runs of 2^b, and every place of the runs is tried.
+    """
+    from scipy.special import ndtr
+
+    best, chance, tried = (0, 0.5), 1.0, 0
+    span = int(np.ptp(coded.code))
+    for bit in range(_BITS):
+        run = 2**bit
+        if 4 * run > span:
+            break
+        residue = np.bincount(coded.code % (2 * run), minlength=2 * run).astype(np.float64)
+        wanted = np.bincount(
+            np.floor(coded.position + 0.5).astype(np.int64) % (2 * run), minlength=2 * run
+        ).astype(np.float64)
+        found = _halves(residue, run)
+        should = np.clip(_halves(wanted, run), 0.05, 0.95)
+        tried += 2 * run
+        # Neighbouring readings share their half: as if there were fewer.
+        effective = len(coded.code) / max(1.0, _in_a_half(coded, run))
+        excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
+        worst = int(np.argmax(excess))
+        p_value = float(2.0 * ndtr(-excess[worst]))
+        if p_value < chance:
+            best, chance = (bit, float(found[worst])), p_value
+    return best, min(1.0, tried * chance)
+
+
+def _halves(residue: FloatArray, run: int) -> FloatArray:
+    """Share of the readings in each half of the residues, for each place of the half."""
+    ring = np.concatenate([[0.0], np.cumsum(np.tile(residue, 2))])
+    return np.asarray((ring[run : 3 * run] - ring[: 2 * run]) / residue.sum())
+
+
+def _in_a_half(coded: Coded, run: int) -> float:
+    """How many readings in a row are in the same half."""
+    changes = np.count_nonzero(np.diff(np.floor(coded.position / run)))
+    return len(coded.position) / max(changes, 1)
+
+
+def _described(
+    data: Data, fit: Fit, coded: Coded, occupation: Occupation, bad: BoolArray,
+    bit: tuple[int, float] | None, p_value: float,
+) -> Finding:  # fmt: skip
+    step = coded.lattice.step
+    found, expected = occupation.found[bad], occupation.expected[bad]
+    codes = occupation.code[bad]
+    likely = np.where(found > 0.0, found * np.log(np.maximum(found, 1e-9) / expected), 0.0)
+    gain = 2.0 * float(np.sum(likely - found + expected))
+    seldom = codes[found < expected]
+    parameters = {
+        "number": Estimate(float(len(seldom)), 0.0, ""),
+        "found": Estimate(float(found.sum()), math.sqrt(max(float(found.sum()), 1.0)), ""),
+        "expected": Estimate(float(expected.sum()), 0.0, ""),
+    }
+    if bit is not None:
+        parameters["bit"] = Estimate(float(bit[0]), 0.0, "")
+        summary = f"bit {bit[0]} of the converter is stuck or sticky: {100 * bit[1]:.0f} % of the"
+        summary += " readings lie in one half of its codes"
+    else:
+        named = ", ".join(str(code) for code in seldom[:5]) + (", ..." if len(seldom) > 5 else "")
+        summary = f"{len(seldom)} code(s) ({named}, in steps of {step:.4g} {data.unit}) came"
+        summary += f" {int(occupation.found[bad][found < expected].sum())} times where"
+        summary += f" {occupation.expected[bad][found < expected].sum():.0f} were due"
+    shown = seldom if len(seldom) else codes
+    return Finding(
+        "missing-codes", p_value, gain, parameters,
+        Location(adc_codes=tuple(int(code) for code in shown[:_SHOWN])), summary=summary,
+    )  # fmt: skip
