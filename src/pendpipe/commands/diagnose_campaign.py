@@ -15,7 +15,7 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.errors import InputError
 
     raise InputError(
-        "diagnose-campaign",
-        "this is not available yet",
+        arguments.folder,
+        "diagnose-campaign is not available yet",
         "diagnose each recording with pendpipe diagnose FILE --out DIR",
     )
