@@ -25,6 +25,8 @@ COMMANDS: Final = {
     "simulate": "a recording from a described pendulum and measurement chain",
     "turning-points": "the turning points of one recording",
     "fit": "a, b, c and the rest of one recording",
+    "diagnose": "what physics was left out: located, named, modelled",
+    "diagnose-campaign": "the same over a campaign's records (not available yet)",
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
     "figures": "the figures 3 to 10 of a campaign",

@@ -15,6 +15,7 @@ from pendpipe.diagnose.freed import FreedParameter, freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.naming import CLASS, Rival, probabilities
+from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Diagnosis, Judged, Named
 from pendpipe.diagnose.search import Search, Step, is_gross, search
@@ -40,7 +41,7 @@ class Outcome:
 def diagnose_recording(
     recording: Recording, *, baseline: Baseline = "eq8", fixed: Mapping[str, float] | None = None,
     seed: int = 0, level: float = LEVEL, place: str | Path = "recording",
-    provenance: Mapping[str, Any] | None = None,
+    provenance: Mapping[str, Any] | None = None, progress: Progress = silent,
 ) -> Outcome:  # fmt: skip
     """Say where Eq. 8 and a recording differ, and what was left out.
 
@@ -60,6 +61,8 @@ def diagnose_recording(
         Named in messages.
     provenance
         Goes into the result.
+    progress
+        Is told each step in a line.
 
     Raises
     ------
@@ -68,10 +71,11 @@ def diagnose_recording(
     """
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
+    progress("finding the free decay and its turning points")
     points, part = measure_recording(recording.as_motion(), place)
     return diagnose_decay(
         part, points, baseline=baseline, fixed=fixed, seed=seed, level=level, place=place,
-        provenance=provenance,
+        provenance=provenance, progress=progress,
     )  # fmt: skip
 
 
@@ -79,6 +83,7 @@ def diagnose_decay(
     part: Recording, points: Any, *, baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None, seed: int = 0, level: float = LEVEL,
     place: str | Path = "recording", provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
 ) -> Outcome:  # fmt: skip
     """The same for a free decay whose turning points are known."""
     from pendpipe.effects.catalogue import CATALOGUE
@@ -88,7 +93,7 @@ def diagnose_decay(
     beginning = begin(samples, points, baseline=baseline, fixed=fixed)
     found = search(
         beginning, CATALOGUE, baseline=baseline, level=level, seed=seed,
-        freed=freed_parameters(fixed),
+        freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
     named = tuple(
         _named(found, beginning, step, index, baseline, seed)
@@ -97,6 +102,8 @@ def diagnose_decay(
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
     after = _judged(found.improved, found)
+    if named:
+        progress("predicting held-out blocks")
     held = _held_out(found, beginning) if named else None
     diagnosis = Diagnosis(
         baseline, before, after, rms,

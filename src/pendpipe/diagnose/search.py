@@ -15,6 +15,7 @@ from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.naming import Rival, refit_leads
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES
@@ -110,10 +111,11 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
 
 def search(
     beginning: Beginning, catalogue: Sequence[Effect], *, baseline: str, level: float, seed: int,
-    freed: Sequence[FreedParameter] = (),
+    freed: Sequence[FreedParameter] = (), progress: Progress = silent,
 ) -> Search:  # fmt: skip
     """Fit the baseline, and add what improves it most, until chance explains the rest."""
     data, held = beginning.data, beginning.held
+    progress(f"fitting {baseline} to {data.used} readings")
     noise = first_noise(beginning)
     fit = refine(beginning.model, data, noise, beginning.value, held=held)
     fit, data, noise = settled(fit, data, noise, held)
@@ -126,15 +128,18 @@ def search(
         effects = applicable(catalogue, fit, baseline, data.unit)
         open_parameters = [entry for entry in freed if entry.index in holding]
         scanner = prepare(fit, data, noise, [*effects, *open_parameters])
+        progress(f"scanning {len(effects)} effects")
         now = detect(scanner, fit, seed=seed)
         first = first or now
         if now.p_value > level:
             break
+        progress(f"something is there (global p = {now.p_value:.2g}): refitting the leaders")
         rivals = refit_leads(fit, data, noise, now, held=holding, gross=gross)
         if not rivals or rivals[0].gain <= _NEEDED:
             break
         steps.append(Step(tuple(rivals), now.p_value))
         winner = rivals[0]
+        progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
         if isinstance(winner.lead.effect, FreedParameter):
             holding.remove(winner.lead.effect.index)
         fit, data, noise = settled(winner.fit, data, noise, holding)

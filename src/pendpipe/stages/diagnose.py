@@ -1,0 +1,116 @@
+"""The diagnosis of one recording as files: ``diagnosis.json`` and its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from pendpipe.diagnose.progress import Progress, silent
+from pendpipe.files import write_json
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import Baseline
+    from pendpipe.diagnose.run import Outcome
+    from pendpipe.recording import Recording
+
+RESULT: Final = "diagnosis.json"
+FIGURES: Final = ("residual_map", "residual_spectrum", "damping", "frequency", "codes", "curve")
+"""The figures' names; `codes` and `curve` are drawn where they have something to show."""
+Figures = Literal["all", "found", "none"]
+"""Of every recording, of those in which something is missing, or of none."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a recording is asked.
+
+    Parameters
+    ----------
+    baseline, fixed
+        The model that it is held against, and which of its parameters are held.
+    seed, level
+        Of the draws that count trials; global p-value of an accusation.
+    figures
+        Which are drawn.
+    """
+
+    baseline: Baseline = "eq8"
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    seed: int = 0
+    level: float = 0.01
+    figures: Figures = "all"
+
+
+def diagnose_motion(
+    recording: Recording, question: Question, *, place: str | Path,
+    turning_points: Path | None = None, provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Outcome:  # fmt: skip
+    """Diagnose a recording in rad (or m), with turning points found before where there are."""
+    from pendpipe.analysis.turning_points import read_turning_points
+    from pendpipe.diagnose.run import diagnose_decay, diagnose_recording
+    from pendpipe.dynamics.any_law import NoMotionError
+    from pendpipe.errors import NotAnalysableError
+
+    asked: dict[str, Any] = {
+        "baseline": question.baseline, "fixed": question.fixed, "seed": question.seed,
+        "level": question.level, "place": place, "provenance": provenance, "progress": progress,
+    }  # fmt: skip
+    try:
+        if turning_points is None:
+            return diagnose_recording(recording, **asked)
+        points = read_turning_points(turning_points)
+        return diagnose_decay(recording.between(points.start_s, points.stop_s), points, **asked)
+    except NoMotionError as fault:
+        remedy = "cut it with --start and --stop, or change what is held with --fix"
+        raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
+
+
+def write_diagnosis(
+    folder: Path, outcome: Outcome, question: Question, progress: Progress = silent
+) -> dict[str, Any]:
+    """Draw the figures that are asked for, then write the result that names them."""
+    diagnosis = outcome.diagnosis
+    wanted = question.figures == "all" or (
+        question.figures == "found" and diagnosis.verdict == "missing-physics"
+    )
+    _forget_figures(folder)
+    if wanted:
+        from pendpipe.figures.diagnosis import draw_diagnosis
+
+        progress("drawing")
+        drawn = draw_diagnosis(outcome, folder)
+        diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
+    content = diagnosis.as_json()
+    write_json(folder / RESULT, content)
+    return content
+
+
+def _forget_figures(folder: Path) -> None:
+    """Remove what an earlier diagnosis has drawn here."""
+    for name in FIGURES:
+        for form in (".svg", ".png"):
+            folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
+
+
+def write_not_analysable(
+    folder: Path, baseline: str, reason: str, provenance: Mapping[str, Any]
+) -> None:
+    """Write the result of a recording that can't be analysed."""
+    from pendpipe.diagnose.not_analysable import not_analysable
+
+    _forget_figures(folder)
+    write_json(folder / RESULT, not_analysable(baseline, reason, provenance))
+
+
+def refused_before(refused: Path | None) -> str | None:
+    """Why a record of a campaign was refused by a stage that the diagnosis builds on.
+
+    The fit runs beside the diagnosis and not before it, so it has no say. A diagnosis
+    refuses no record either: what can't be diagnosed may still have been fitted.
+    """
+    from pendpipe.stages.refusal import reason_of
+
+    return None if refused is None else reason_of(refused, before="fit")
