@@ -21,8 +21,8 @@ starts (about the equilibrium) and when; and the reading of the equilibrium."""
 A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
 _LOW: Final = (0.0, 0.0, 0.0, 0.0, 1e-9, -math.inf, -math.inf, -math.inf)
 _HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, math.inf)
-_SPARE: Final = 3
-"""Half cycles beyond the last reading."""
+_MORE: Final = (1.0, 1.02, 1.12, 1.28)
+"""Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
 
 
 @dataclass(frozen=True)
@@ -143,12 +143,8 @@ class Model:
             If it stops, or runs away, before the last reading.
         """
         omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
-        count = self._half_cycles(omega, begin)
-        guess = self._last.get("motion")
-        if guess is None or guess.clock != Clock(count, self.order):
-            guess = _closed_form(value, Clock(count, self.order))
         law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
-        motion = follow(law, omega, start, begin, guess)
+        motion = self._smooth(law, value)
         self._last["motion"] = motion
         pieces = [(-math.inf, motion)]
         by_log, by_time = np.zeros_like(motion.time_s), np.zeros_like(motion.time_s)
@@ -170,22 +166,44 @@ class Model:
         inside = [k for k in kicks if k is not None and value[TIME] < k.time_s < self.time_s[-1]]
         return sorted(inside, key=lambda kick: kick.time_s)
 
-    def _half_cycles(self, omega: float, begin: float) -> int:
+    def _smooth(self, law: Law, value: FloatArray) -> Motion:
+        """The motion without kicks, on as many half cycles as it takes, and hardly more.
+
+        More would ask for motion beyond the stop.
+        """
+        omega, begin = float(value[OMEGA]), float(value[TIME])
         needed = (self.time_s[-1] - begin) * omega / math.pi
         if not 1.0 <= needed < 2e5:
             raise NoMotionError("the frequency is out of reach")
         last = self._last.get("motion")
-        if last is not None and _SPARE - 2 <= last.clock.count - needed <= 4 * _SPARE + 0.1 * needed:
-            return last.clock.count
-        return math.ceil(needed) + _SPARE + int(0.02 * needed)
+        known = [] if last is None else [last.clock.count]
+        for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
+            if not needed - 1.0 < count < 1.3 * needed + 4.0:
+                continue
+            clock = Clock(count, self.order)
+            try:
+                motion = self._from_guesses(law, value, clock)
+            except NoMotionError:
+                continue
+            if motion.time_s[-1, -1] >= self.time_s[-1]:
+                return motion
+        raise NoMotionError("it stops, or the frequency is out of reach")
+
+    def _from_guesses(self, law: Law, value: FloatArray, clock: Clock) -> Motion:
+        """Begin with the last motion, if it was on this clock; else with the closed form."""
+        start = (float(value[OMEGA]), float(value[START]), float(value[TIME]))
+        last = self._last.get("motion")
+        if last is not None and last.clock == clock:
+            try:
+                return follow(law, *start, last)
+            except NoMotionError:
+                pass
+        return follow(law, *start, _closed_form(value, clock))
 
     def evaluate(self, value: FloatArray) -> Evaluated:
         """Return readings, and what the derivatives need."""
         pieces = self.follow(value)
         motion = pieces[-1][1]
-        if motion.time_s[-1, -1] < self.time_s[-1]:
-            self._last.pop("motion", None)
-            raise NoMotionError("the frequency is out of reach")
         times = self.time_s
         for effect, place in self.places():
             delay = effect.delay(self.time_s, value[place])
@@ -327,5 +345,7 @@ def _closed_form(value: FloatArray, clock: Clock) -> Motion:
     time = value[TIME] + clock.psi / omega
     start = abs(float(value[START]))
     decayed = amplitude(clock.psi / omega, start, *(max(float(value[k]), 0.0) for k in (A, B, C)))
-    floor = np.maximum(decayed, 1e-3 * start)
-    return Motion(clock, omega, np.log(floor), time, math.copysign(1.0, value[START]))
+    # Not so small that friction would hold the guess itself.
+    stop = 2.0 * math.pi * max(float(value[C]), 0.0) / omega
+    kept = np.maximum(decayed, min(max(1e-3 * start, stop), start))
+    return Motion(clock, omega, np.log(kept), time, math.copysign(1.0, value[START]))

@@ -22,8 +22,9 @@ CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
 _MOST: Final = 8
 _NEAR: Final = 16.0
-_UNNAMED: Final = 6.0
-"""What a curve without a name must be better by (in chi^2) than a name: a prior of 1 in 20."""
+_ALIKE: Final = 0.98
+_MUCH: Final = 0.5
+"""Part of the best gain that a name must explain to go before a curve."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +60,34 @@ def refit_leads(
     gross: bool,
 ) -> list[Rival]:  # fmt: skip
     """Refit the leading effects nonlinearly; the best first."""
-    rivals = []
+    fits = []
     for lead in _worth_refitting(detection, gross):
         fit = _refitted(base, data, noise, lead, held)
-        if fit is None:
-            continue
-        gain = base.chi2 - fit.chi2
-        rivals.append(Rival(lead, fit, gain, evidence(lead, gain, detection.chance)))
+        if fit is not None:
+            fits.append((lead, fit))
+    if not fits:
+        return []
+    # What is still left makes differences of chi^2 mean less.
+    left = max(min(fit.chi2 for _, fit in fits) / max(data.used, 1), 1.0)
+    rivals = [
+        Rival(lead, fit, base.chi2 - fit.chi2,
+              evidence(lead, (base.chi2 - fit.chi2) / left, detection.chance))
+        for lead, fit in fits
+    ]  # fmt: skip
     rivals.sort(key=lambda rival: -rival.evidence)
-    return rivals
+    return _named_first(rivals) if gross else rivals
+
+
+def _named_first(rivals: list[Rival]) -> list[Rival]:
+    """While the misfit is gross, prefer names that explain much of it to curves that bend."""
+    best = max(rival.gain for rival in rivals)
+    named = [
+        rival for rival in rivals
+        if rival.lead.effect.kind != "unnamed" and rival.gain > _MUCH * best
+    ]  # fmt: skip
+    # What must be there anyway goes before what merely fits a trifle better.
+    named.sort(key=lambda rival: -rival.lead.effect.prior if rival.gain > _ALIKE * best else 0.0)
+    return [*named, *(rival for rival in rivals if rival not in named)]
 
 
 def _worth_refitting(detection: Detection, gross: bool) -> list[Lead]:
@@ -81,9 +101,7 @@ def _worth_refitting(detection: Detection, gross: bool) -> list[Lead]:
 
 
 def _rank(lead: Lead) -> float:
-    return equivalent(lead.p_value, lead.score) - (
-        _UNNAMED if lead.effect.kind == "unnamed" else 0.0
-    )
+    return equivalent(lead.p_value, lead.score) + lead.effect.prior
 
 
 def equivalent(p_value: float, score: float) -> float:
@@ -109,7 +127,7 @@ def evidence(lead: Lead, gain: float, chance: Chance) -> float:
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     p_value = trials.global_p_value(local) if local > 1e-290 else 0.0
     worth = equivalent(p_value, gain - _cost(effect.sizes, trials))
-    return worth - (_UNNAMED if effect.kind == "unnamed" else 0.0)
+    return worth + effect.prior
 
 
 def _cost(sizes: int, trials: Trials) -> float:

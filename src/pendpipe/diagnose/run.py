@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +12,10 @@ import numpy as np
 
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.diagnose.begin import Beginning, begin, read_samples
+from pendpipe.diagnose.faults import Fault
 from pendpipe.diagnose.freed import FreedParameter, freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
-from pendpipe.diagnose.location import locate
+from pendpipe.diagnose.location import Location, locate
 from pendpipe.diagnose.naming import CLASS, Rival, probabilities
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit, refine
@@ -92,12 +94,15 @@ def diagnose_decay(
     samples = read_samples(part, place)
     beginning = begin(samples, points, baseline=baseline, fixed=fixed)
     found = search(
-        beginning, CATALOGUE, baseline=baseline, level=level, seed=seed,
+        beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
         freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
-    named = tuple(
-        _named(found, beginning, step, index, baseline, seed)
-        for index, step in enumerate(found.steps)
+    named = (
+        *(_fault(found, fault) for fault in found.faults),
+        *(
+            _named(found, beginning, step, index, baseline, seed)
+            for index, step in enumerate(found.steps)
+        ),
     )
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
@@ -152,6 +157,24 @@ def _named(
         tuple((mate.identifier, float(weight)) for mate, weight in
               zip(mates, weights[1:], strict=False)),
         effect.deciding, locate(without, found.improved, found.data, effect),
+    )  # fmt: skip
+
+
+def _fault(found: Search, fault: Fault) -> Named:
+    """A fault of the measurement that a test of its own has found."""
+    from pendpipe.effects.catalogue import by_identifier
+
+    finding = fault.finding
+    effect = by_identifier(finding.identifier)
+    place = finding.location
+    doubt = math.exp(-0.5 * (_NONE + _misfit(found)))
+    return Named(
+        effect.identifier, effect.name, effect.kind, effect.equation, finding.parameters,
+        finding.delta_chi2, fault.p_value, 1.0 / (1.0 + doubt), (), effect.deciding,
+        Location(
+            place.time_s, place.amplitude_rad, place.phase_rad, place.frequency_hz, (),
+            place.adc_codes, finding.summary,
+        ),
     )  # fmt: skip
 
 

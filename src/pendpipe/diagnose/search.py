@@ -8,9 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection, detect, prepare
+from pendpipe.diagnose.faults import CATALOGUE_SHARE, Fault, Forensics
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.naming import Rival, refit_leads
@@ -27,6 +29,8 @@ _SLIP: Final = 0.1
 _MOST: Final = 6
 _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
+_PART: Final = 0.03
+"""Part of a gross misfit that an effect must explain to be worth naming."""
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
 
@@ -66,8 +70,10 @@ class Search:
         The extended model's fit (the baseline's where nothing was found).
     steps
         One an effect.
+    faults
+        Of the measurement, found by tests of their own.
     p_value
-        Global, of the catalogue on the baseline.
+        Global, on the baseline: of the catalogue's largest score, and of the tests.
     unexplained
         Global p-value of what is left at the end.
     detection
@@ -79,6 +85,7 @@ class Search:
     baseline: Fit
     improved: Fit
     steps: tuple[Step, ...]
+    faults: tuple[Fault, ...]
     p_value: float
     unexplained: float
     detection: Detection
@@ -109,51 +116,79 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
     return [*named, *(curve for curve in curves if curve.key not in drawn)]
 
 
+@dataclass
+class _State:
+    """What a search knows so far."""
+
+    fit: Fit
+    data: Data
+    noise: Noise
+    holding: list[int]
+    steps: list[Step] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    first: Detection | None = None
+    now: Detection | None = None
+
+
 def search(
-    beginning: Beginning, catalogue: Sequence[Effect], *, baseline: str, level: float, seed: int,
-    freed: Sequence[FreedParameter] = (), progress: Progress = silent,
+    beginning: Beginning, samples: Samples, catalogue: Sequence[Effect], *, baseline: str,
+    level: float, seed: int, freed: Sequence[FreedParameter] = (), progress: Progress = silent,
 ) -> Search:  # fmt: skip
     """Fit the baseline, and add what improves it most, until chance explains the rest."""
     data, held = beginning.data, beginning.held
     progress(f"fitting {baseline} to {data.used} readings")
-    noise = first_noise(beginning)
-    fit = refine(beginning.model, data, noise, beginning.value, held=held)
-    fit, data, noise = settled(fit, data, noise, held)
-    steps: list[Step] = []
-    first: Detection | None = None
-    now: Detection | None = None
-    holding = list(held)
-    while len(steps) < _MOST:
-        gross = is_gross(fit, data)
-        effects = applicable(catalogue, fit, baseline, data.unit)
-        open_parameters = [entry for entry in freed if entry.index in holding]
-        scanner = prepare(fit, data, noise, [*effects, *open_parameters])
-        progress(f"scanning {len(effects)} effects")
-        now = detect(scanner, fit, seed=seed)
-        first = first or now
-        if now.p_value > level:
+    fit = refine(beginning.model, data, first_noise(beginning), beginning.value, held=held)
+    state = _State(*settled(fit, data, first_noise(beginning), held), list(held))
+    start = state.fit.value
+    forensics = Forensics(samples, level)
+    while len(state.steps) < _MOST:
+        forensics.before(state, progress)
+        if not _add_one(state, catalogue, freed, baseline, level, seed, progress):
             break
-        progress(f"something is there (global p = {now.p_value:.2g}): refitting the leaders")
-        rivals = refit_leads(fit, data, noise, now, held=holding, gross=gross)
-        if not rivals or rivals[0].gain <= _NEEDED:
-            break
-        steps.append(Step(tuple(rivals), now.p_value))
-        winner = rivals[0]
-        progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
-        if isinstance(winner.lead.effect, FreedParameter):
-            holding.remove(winner.lead.effect.index)
-        fit, data, noise = settled(winner.fit, data, noise, holding)
-        if winner.lead.effect.kind == "unnamed":
-            now = None
-            break
-    assert first is not None
-    if now is None or len(steps) == _MOST:
-        scanner = prepare(fit, data, noise, applicable(catalogue, fit, baseline, data.unit))
-        now = detect(scanner, fit, seed=seed, known=now)
-    base = refine(beginning.model, data, noise, beginning.value, held=held)
+    forensics.after(state, progress)
+    assert state.first is not None and state.now is not None
+    base = refine(beginning.model, state.data, state.noise, start, held=held)
     return Search(
-        data, noise, base, fit, tuple(steps), first.p_value, now.p_value, first, tuple(holding)
+        state.data, state.noise, base, state.fit, tuple(state.steps), tuple(state.faults),
+        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value, 1.0),
+        min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
+    )  # fmt: skip
+
+
+def _add_one(
+    state: _State, catalogue: Sequence[Effect], freed: Sequence[FreedParameter], baseline: str,
+    level: float, seed: int, progress: Progress,
+) -> bool:  # fmt: skip
+    """Scan the catalogue, and add the best effect if it is needed; say whether to go on."""
+    gross = is_gross(state.fit, state.data)
+    effects = applicable(catalogue, state.fit, baseline, state.data.unit)
+    open_parameters = [entry for entry in freed if entry.index in state.holding]
+    progress(f"scanning {len(effects)} effects")
+    scanner = prepare(state.fit, state.data, state.noise, [*effects, *open_parameters])
+    state.now = detect(scanner, state.fit, seed=seed)
+    state.first = state.first or state.now
+    if state.now.p_value > level * CATALOGUE_SHARE or _drawn(state):
+        return False
+    progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
+    rivals = refit_leads(
+        state.fit, state.data, state.noise, state.now, held=state.holding, gross=gross
     )
+    if not rivals or rivals[0].gain <= max(_NEEDED, _PART * state.fit.chi2 if gross else 0.0):
+        return False
+    state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE))
+    winner = rivals[0]
+    progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
+    if isinstance(winner.lead.effect, FreedParameter):
+        state.holding.remove(winner.lead.effect.index)
+    state.fit, state.data, state.noise = settled(
+        winner.fit, state.data, state.noise, state.holding
+    )
+    return True
+
+
+def _drawn(state: _State) -> bool:
+    """Whether a curve without a name was the last: nothing is named on top of it."""
+    return bool(state.steps) and state.steps[-1].winner.lead.effect.kind == "unnamed"
 
 
 def first_noise(beginning: Beginning) -> Noise:

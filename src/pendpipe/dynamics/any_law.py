@@ -26,6 +26,8 @@ from pendpipe.arrays import FloatArray
 _TOLERANCE: Final = 1e-9
 _ROUNDS: Final = 40
 _STEP: Final = 1e-6
+_STRIDE: Final = 0.7
+"""Longest step in ln r."""
 _STEEPEST: Final = 0.9
 """Of g: beyond, the pendulum hardly turns, or never."""
 
@@ -160,12 +162,18 @@ class Rates:
     pace: FloatArray
 
 
-def rates(law: Law, motion: Motion) -> Rates:
-    """Return the rates of a law along a given (perhaps wrong) motion."""
+def rates(law: Law, motion: Motion, *, lenient: bool = False) -> Rates:
+    """Return the rates of a law along a given (perhaps wrong) motion.
+
+    `lenient` bounds them where the pendulum would not turn, for a search on its way.
+    """
     omega, clock = motion.angular_frequency, motion.clock
     g = motion.upwards * law(motion) / (omega * omega * motion.amplitude)
     free = 1.0 - g * clock.cosine
-    if not np.all(np.isfinite(g)) or np.min(free) < 1.0 - _STEEPEST:
+    if lenient:
+        g = np.nan_to_num(np.clip(g, -_STEEPEST, _STEEPEST))
+        free = 1.0 - g * clock.cosine
+    elif not np.all(np.isfinite(g)) or np.min(free) < 1.0 - _STEEPEST:
         raise NoMotionError("the pendulum does not turn")
     return Rates(-g * clock.sine / free, 1.0 / (omega * free))
 
@@ -203,17 +211,18 @@ def follow(
     steepness: FloatArray | None = None
     before = math.inf
     for _ in range(_ROUNDS):
-        now = rates(law, motion)
+        now = rates(law, motion, lenient=True)
         if steepness is None:
             steepness = _steepness(law, motion, now)
         off = origin + jumps + clock.integral(now.loss) - motion.log_amplitude
-        change = _linear(clock, steepness, off)
+        change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
         late = start_s + delays + clock.integral(now.pace) - motion.time_s
         error = max(float(np.max(np.abs(change))), angular_frequency * float(np.max(np.abs(late))))
         motion = Motion(
             clock, angular_frequency, motion.log_amplitude + change, motion.time_s + late, upwards
         )
         if error < _TOLERANCE:
+            rates(law, motion)
             return motion
         if not error < 1e3:
             break
@@ -229,7 +238,7 @@ def _steepness(law: Law, motion: Motion, now: Rates) -> FloatArray:
         motion.clock, motion.angular_frequency, motion.log_amplitude + _STEP, motion.time_s,
         motion.upwards,
     )  # fmt: skip
-    return np.asarray((rates(law, moved).loss - now.loss) / _STEP)
+    return np.asarray((rates(law, moved, lenient=True).loss - now.loss) / _STEP)
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:

@@ -22,6 +22,7 @@ class CircularError(Effect):
     equation = r"\omega^2 x \to \omega^2 \sin x"
     parameters = ()
     switch = True
+    prior = 6.0
     angular = True
     deciding = "release it again with half the amplitude: the period must follow 1 + y^2/16"
 

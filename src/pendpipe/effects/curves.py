@@ -35,6 +35,7 @@ class Curve(Effect):
 
     kind = "unnamed"
     parameters = ()
+    prior = -6.0
     argument: ClassVar[str]
     """What the curve is drawn against, with its unit."""
     ordinate: ClassVar[str]

@@ -141,6 +141,8 @@ class Effect:
     spectral: ClassVar[bool] = False
     """Whether it is a tone, looked for at thousands of frequencies by Fourier transform (see
     `tone`); `shapes` is a rough grid."""
+    prior: ClassVar[float] = 0.0
+    """Twice the logarithm of how much likelier it is beforehand than others."""
     template: ClassVar[bool] = True
     """False where it has no template in the readings, and is found by a test of its own."""
     angular: ClassVar[bool] = False

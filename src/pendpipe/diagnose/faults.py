@@ -1,0 +1,127 @@
+"""Forensics in the search: what the tests of the measurement find is repaired, and kept.
+
+One lost sample outweighs all physics, so what can corrupt the fit is looked for before the
+catalogue; what only fine residuals show, behind it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnose.forensics import TESTS, find_lost_samples
+from pendpipe.diagnose.forensics.finding import Finding, Location
+from pendpipe.diagnose.refine import refine
+from pendpipe.estimate import Estimate
+
+if TYPE_CHECKING:
+    from pendpipe.diagnose.progress import Progress
+    from pendpipe.diagnose.search import _State
+
+CATALOGUE_SHARE: Final = 0.7
+"""Part of the level that the catalogue's scan spends; the tests share the rest."""
+_BEFORE: Final = ("clipping", "glitches")
+_BEHIND: Final = (
+    "missing-codes", "coarse-quantisation", "jitter", "coloured-noise", "broadband-drive",
+)  # fmt: skip
+_EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
+_ROUNDS: Final = 3
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A finding that counts, and its global p-value."""
+
+    finding: Finding
+    p_value: float
+
+
+class Forensics:
+    """The tests of the measurement, on one recording.
+
+    Parameters
+    ----------
+    samples
+        The readings as they came.
+    level
+        Global p-value of an accusation.
+    """
+
+    def __init__(self, samples: Samples, level: float) -> None:
+        self.samples, self.level = samples, level
+        self.p_value = 1.0
+
+    def before(self, state: _State, progress: Progress) -> None:
+        """Mend what would corrupt the fit: lost samples, clipping, glitches."""
+        self._mend_clock(state, progress)
+        from pendpipe.diagnose.search import is_gross
+
+        if is_gross(state.fit, state.data):
+            return
+        for name in _BEFORE:
+            for _ in range(_ROUNDS):
+                if not self._examine(name, state, progress):
+                    break
+
+    def after(self, state: _State, progress: Progress) -> None:
+        """Make the tests that need a clean residual."""
+        from pendpipe.diagnose.search import is_gross
+
+        if is_gross(state.fit, state.data):
+            return
+        for name in _BEHIND:
+            self._examine(name, state, progress)
+
+    def _examine(self, name: str, state: _State, progress: Progress) -> bool:
+        """Make one test; keep what it finds; say whether to look again."""
+        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
+        p_value = min(finding.p_value / _EACH, 1.0)
+        if not any(fault.finding.identifier == finding.identifier for fault in state.faults):
+            self.p_value = min(self.p_value, p_value)
+        if finding.kind != "fault" or p_value > self.level:
+            return False
+        progress(f"{name}: {finding.summary}")
+        known = [fault for fault in state.faults if fault.finding.identifier != name]
+        earlier = [fault for fault in state.faults if fault.finding.identifier == name]
+        kept = Fault(finding, p_value) if not earlier else earlier[0]
+        state.faults[:] = [*known, kept]
+        if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
+            return False
+        from pendpipe.diagnose.search import settled
+
+        data = state.data.masked((state.data.weight == 0.0) | finding.mask)
+        noise = replace(state.noise, weight=data.weight)
+        fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
+        state.fit, state.data, state.noise = settled(fit, data, noise, state.holding)
+        return True
+
+    def _mend_clock(self, state: _State, progress: Progress) -> None:
+        """Put the readings behind lost samples where they belong."""
+        from pendpipe.diagnose.search import settled
+
+        lost = find_lost_samples(state.data, state.fit)
+        if not lost:
+            return
+        data, interval = state.data, state.data.interval_s
+        time = data.time_s.copy()
+        for each in lost:
+            time[data.time_s >= each.time_s - 1e-9] += each.number * interval
+        mended = replace(data, time_s=time, uniform=False)
+        model = replace(state.fit.model, time_s=time, _last={})
+        fit = refine(model, mended, state.noise, state.fit.value, held=state.holding)
+        if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
+            return
+        progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
+        number = sum(each.number for each in lost)
+        found = Finding(
+            "dropped-samples", 0.0, state.fit.chi2 - fit.chi2,
+            {"samples": Estimate(float(number), 0.0, "")},
+            Location(time_s=(lost[0].time_s, lost[-1].time_s)),
+            summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
+        )  # fmt: skip
+        state.faults.append(Fault(found, 0.0))
+        self.p_value = 0.0
+        state.fit, state.data, state.noise = settled(fit, mended, state.noise, state.holding)
