@@ -1,0 +1,196 @@
+"""The oracle: it knows nuisances, noise and catalogue, and pays the same look-elsewhere.
+
+Its detection level comes from Monte Carlo of the projected Gaussian scores. Two levels are
+told. `threshold` is that of the largest score over the whole catalogue, scans included.
+`threshold_by_effect` first takes each effect's own look-elsewhere off (so that an effect
+without a scan does not pay for the tones' thousands of frequencies); it is the harder
+rival, and its level depends on the effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.challenge import bank
+from pendpipe.challenge.bench import Bench
+from pendpipe.challenge.specials import Specials
+from pendpipe.challenge.tones import Tones
+
+LEVEL: Final = 0.01
+CLASS: Final = 6.0
+"""Difference of Delta chi^2 within which two names cannot be told apart: exp(-3)."""
+DRAWS: Final = 800
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the oracle says of one recording.
+
+    Parameters
+    ----------
+    scores
+        Delta chi^2 of every effect, its best shape.
+    threshold, threshold_by_effect
+        See the module. The second is by effect.
+    detected, detected_by_effect
+        Whether any effect passes the one, or its own of the other.
+    ranking
+        Effects by likelihood, the best first (a parameter more costs 2).
+    members
+        The equivalence class: effects within `CLASS` of the best.
+    """
+
+    scores: dict[str, float]
+    threshold: float
+    threshold_by_effect: dict[str, float]
+    detected: bool
+    detected_by_effect: bool
+    ranking: tuple[str, ...]
+    members: tuple[str, ...]
+
+
+@dataclass
+class Oracle:
+    """The catalogue's signatures for one workbench.
+
+    Parameters
+    ----------
+    bench
+        Baseline at the point about which scores are linear.
+    """
+
+    bench: Bench
+    shapes: list[bank.Shape] = field(init=False)
+    steps: list[tuple[str, FloatArray]] = field(init=False)
+    tones: Tones = field(init=False)
+    specials: Specials = field(init=False)
+
+    def __post_init__(self) -> None:
+        bench = self.bench
+        self.shapes = [
+            *bank.integrated(bench), *bank.instrument(bench), *bank.beats(bench),
+        ]  # fmt: skip
+        self.steps = []
+        for effect, columns in bank.steps(bench):
+            left = bench.off(bench.whiten(columns))
+            norms = np.linalg.norm(left, axis=0)
+            known = norms > 1e-7 * norms.max()
+            self.steps.append((effect, left[:, known] / norms[known]))
+        self.tones = Tones(bench)
+        self.specials = Specials(bench)
+        self._levels: tuple[float, dict[str, float]] | None = None
+
+    def scores(self, residuals: FloatArray) -> dict[str, FloatArray]:
+        """Best score of every effect for each of several residuals (kept, draws)."""
+        residuals = self.bench.off(residuals)
+        found: dict[str, FloatArray] = {}
+
+        def better(effect: str, values: FloatArray) -> None:
+            found[effect] = np.maximum(found[effect], values) if effect in found else values
+
+        for shape in self.shapes:
+            better(shape.effect, np.sum((shape.columns.T @ residuals) ** 2, axis=0))
+        for effect, columns in self.steps:
+            better(effect, ((columns.T @ residuals) ** 2).max(axis=0))
+        for part in (self.tones.scores(residuals), self.specials.of_residuals(residuals)):
+            for effect, values in part.items():
+                better(effect, values)
+        return found
+
+    def levels(self, draws: int = DRAWS) -> tuple[float, dict[str, float]]:
+        """The detection levels: of the largest score, and of each effect."""
+        if self._levels is None:
+            random = np.random.default_rng(self.bench.count)
+            parts = [
+                self.scores(random.standard_normal((self.bench.count, 100)))
+                for _ in range(draws // 100)
+            ]
+            null = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            largest = np.max(list(null.values()), axis=0)
+            # Each effect's own look-elsewhere: the height that it passes once in twenty.
+            own = {name: float(np.quantile(values, 0.95)) for name, values in null.items()}
+            excess = np.max([values - own[name] for name, values in null.items()], axis=0)
+            common = tail(excess)
+            self._levels = (tail(largest), {name: own[name] + common for name in null})
+        return self._levels
+
+    def clean_scores(self, residual: FloatArray) -> dict[str, float]:
+        """Scores of a noise-free residual: of the effects that are directions in it."""
+        directions = {shape.effect for shape in self.shapes} | {name for name, _ in self.steps}
+        directions |= {"tone-pickup", "periodic-drive", "second-mode"}
+        found = self.scores(residual[:, None])
+        return {name: float(found[name][0]) for name in directions}
+
+    def judge(
+        self,
+        residual: FloatArray,
+        codes: IntArray | None = None,
+        more: dict[str, float] | None = None,
+    ) -> Verdict:
+        """Detect and name from one whitened residual and the codes it comes from.
+
+        Parameters
+        ----------
+        residual
+            Recording less the baseline about which the scores are linear, kept samples.
+        codes
+            The converter's codes, for its own faults.
+        more
+            Scores found in other ways.
+        """
+        scores = {name: float(u[0]) for name, u in self.scores(residual[:, None]).items()}
+        if codes is not None:
+            of_codes = self.specials.of_codes(codes)
+            if of_codes["coarse-quantisation"] > 0.0:
+                # Everything else is judged by the noise that such steps make.
+                dead = len(codes) and of_codes["coarse-quantisation"] / (2.0 * len(codes))
+                scenario = self.bench.scenario
+                coarse = scenario.chain.step_rad * np.exp(dead) / np.sqrt(12.0)
+                share = scenario.sd_rad**2 / (scenario.noise.white_sd**2 + coarse**2)
+                scores = {name: value * share for name, value in scores.items()}
+            scores |= of_codes
+        scores |= more or {}
+        threshold, by_effect = self.levels()
+        by_effect = {name: by_effect.get(name, threshold) for name in scores}
+        ranking = ranked(scores)
+        return Verdict(
+            scores=scores,
+            threshold=threshold,
+            threshold_by_effect=by_effect,
+            detected=max(scores.values()) > threshold,
+            detected_by_effect=any(scores[name] > by_effect[name] for name in scores),
+            ranking=ranking,
+            members=members(scores),
+        )
+
+
+FREEDOM: Final = {
+    "circular-error": 0, "tone-pickup": 3, "periodic-drive": 3, "second-mode": 4,
+    "plane-coupling": 3, "power-law-damping": 2, "stribeck-friction": 2,
+    "presliding-friction": 2, "vortex-shedding": 2, "release-transient": 2, "impulse": 2,
+    "equilibrium-step": 2, "amplitude-step": 2, "frequency-step": 2, "damping-step": 2,
+    "glitches": 2, "dropped-samples": 2, "clipping": 2,
+}  # fmt: skip
+"""Free numbers of each effect; 1 where nothing is said."""
+
+
+def ranked(scores: dict[str, float]) -> tuple[str, ...]:
+    """Effects by likelihood, two units of Delta chi^2 for each free number."""
+    return tuple(sorted(scores, key=lambda name: 2.0 * FREEDOM.get(name, 1) - scores[name]))
+
+
+def members(scores: dict[str, float]) -> tuple[str, ...]:
+    """Names whose likelihood is within exp(-3) of the leader's."""
+    best = max(scores.values())
+    return tuple(name for name in ranked(scores) if best - scores[name] <= CLASS)
+
+
+def tail(values: FloatArray, level: float = LEVEL) -> float:
+    """Upper quantile by the exponential tail above the upper tenth."""
+    start = float(np.quantile(values, 0.9))
+    beyond = values[values > start] - start
+    return start + float(beyond.mean()) * float(np.log(0.1 / level))
