@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Kick, Parameter, Pendulum, Span
-from pendpipe.effects.scan import instants, instants_at_phases, reading_step, smooth_step
+from pendpipe.effects.scan import instants, instants_at_phases, smooth_step
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -38,7 +38,7 @@ class EquilibriumStep(Effect):
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the new equilibrium."""
-        return np.asarray(values[0] * reading_step(sampled.time_s, values[1]))
+        return np.asarray(values[0] * (sampled.time_s > values[1]))
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants, at four phases of the cycle."""
