@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from pendpipe.diagnose.model import OFFSET, OMEGA, START, TIME, A, B, C, Model, response
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.manual import page
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
@@ -91,6 +93,12 @@ def test_every_declaration_is_whole() -> None:
         assert len(names) == len(set(names))
         assert all(parameter.low < parameter.high for parameter in effect.parameters)
         assert effect.switch or len(names) >= effect.sizes
+
+
+def test_the_page_is_the_catalogues() -> None:
+    """Made by `pendpipe effects > docs/effects.md`; whoever changes an effect makes it anew."""
+    committed = Path(__file__).parents[2] / "docs/effects.md"
+    assert committed.read_text(encoding="utf-8") == page()
 
 
 def test_what_eq8_holds_is_left_out_of_its_catalogue() -> None:

@@ -72,12 +72,17 @@ class Model:
         Between them, usually.
     effects
         What is added; their values follow the baseline's in the vector of parameters.
+    order
+        Intervals between the nodes of a half cycle.
+    half_cycles
+        How many are followed; None for as many as the readings may need, and some more.
     """
 
     time_s: FloatArray
     interval_s: float
     effects: tuple[Effect, ...] = ()
     order: int = 14
+    half_cycles: int | None = None
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     def adding(self, effect: Effect) -> Model:
@@ -171,6 +176,8 @@ class Model:
         return sorted(inside, key=lambda kick: kick.time_s)
 
     def _half_cycles(self, omega: float, begin: float) -> int:
+        if self.half_cycles is not None:
+            return self.half_cycles
         needed = (self.time_s[-1] - begin) * omega / math.pi
         if not 1.0 <= needed < 2e5:
             raise NoMotionError("the frequency is out of reach")

@@ -25,6 +25,8 @@ class Parameter(NamedTuple):
     unit: str
     low: float
     high: float
+    default: float | None = None
+    """What a simulation takes where it is not given; None: it must be."""
 
 
 class Kick(NamedTuple):
