@@ -268,7 +268,8 @@ class Model:
         if index < effect.sizes:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
         if effect.parameters[index - effect.switch].name == "time":
-            return 0.25 * span.interval_s
+            # Over several readings, or the one that is crossed decides.
+            return 2.0 * span.interval_s
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 

@@ -187,6 +187,10 @@ class Effect:
         """Return the shapes that a scan tries, each a row of the values behind the sizes."""
         return ((),)
 
+    def finer(self, span: Span, shape: Sequence[float]) -> Sequence[Sequence[float]]:
+        """Return shapes about one that stands out in a scan, where a fit alone would get stuck."""
+        return ()
+
     def tone(self, frequency_hz: float, decay_time_s: float) -> Sequence[float] | None:
         """Return the shape of a tone that a scan has found; None if this effect makes none such.
 

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Kick, Parameter, Pendulum, Span
-from pendpipe.effects.scan import instants, instants_at_phases, smooth_step
+from pendpipe.effects.scan import finer_instants, instants, instants_at_phases, smooth_step
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.any_law import Motion
     from pendpipe.dynamics.sampling import Sampled
@@ -44,6 +46,10 @@ class EquilibriumStep(Effect):
         """Instants, at four phases of the cycle."""
         return instants_at_phases(span, 24, 0.5 * math.pi)
 
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 24, shape[0])
+
 
 class AmplitudeStep(Effect):
     """The amplitude changes at once by a factor e^s, the phase unchanged."""
@@ -64,6 +70,10 @@ class AmplitudeStep(Effect):
         """Instants."""
         return instants(span, 72)
 
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 72, shape[0])
+
 
 class Impulse(Effect):
     """A knock: the velocity jumps, the angle does not."""
@@ -83,6 +93,10 @@ class Impulse(Effect):
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants, at four phases of half a cycle."""
         return instants_at_phases(span, 40, 0.25 * math.pi)
+
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 40, shape[0])
 
 
 class FrequencyStep(Effect):
