@@ -32,6 +32,7 @@ COMMANDS: Final = {
     "figures": "the figures 3 to 10 of a campaign",
     "report": "one self-contained page about a campaign",
     "config": "check a configuration, or print its schema",
+    "effects": "the catalogue of what may have been left out",
 }
 """The commands with the line that ``--help`` shows for each."""
 

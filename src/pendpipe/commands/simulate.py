@@ -1,7 +1,8 @@
 """Make a recording from a described pendulum and measurement chain.
 
-MODEL.toml has the sections pendulum, sampling and, where wanted, sensor and converter;
-config/model.toml is an example with every key.
+MODEL.toml has the sections pendulum, sampling and, where wanted, sensor, converter and
+[[effects]] (what is left out of Eq. 8: see docs/effects.md); config/model.toml is an example
+with every key.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
     model = read_model(arguments.model)
     if arguments.seed is not None:
         model = model.model_copy(update={"seed": arguments.seed})
-    recording = simulate(model, source=f"simulated: {Path(arguments.model).name}")
+    source = f"simulated: {Path(arguments.model).name}"
+    recording = simulate(model, source, place=arguments.model)
     write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
     return 0

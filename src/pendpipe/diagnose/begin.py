@@ -20,8 +20,11 @@ from pendpipe.diagnose.data import Data, gather
 from pendpipe.diagnose.model import OMEGA, SHARE, START, TIME, A, B, C, Model, OFFSET
 from pendpipe.diagnose.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.physics.decay import time_at
 
 _FEWEST: Final = 24
+_WIDTHS: Final = 10.0
+"""Of the Coulomb stop's width: nearer to it the rest position jumps with the parameters."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +74,25 @@ def begin(
         counts=samples.counts, period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
     )  # fmt: skip
+    data = _far_from_the_stop(data, value)
     order = order_for(abs(angle), samples.unit)
     data, model = _before_the_stop(data, value, order)
     data = replace(data, anchor=anchored(data, model.evaluate(value)))
     return Beginning(
         data, model, value, _held(held_rates, fixed, parts, baseline), data.noise_rms, points
     )
+
+
+def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
+    """Leave readings out whose amplitude is within a few widths of the Coulomb stop."""
+    rates = [max(float(value[k]), 0.0) for k in (A, B, C)]
+    width = 0.5 * math.pi * rates[2] / value[OMEGA]
+    start = abs(float(value[START]))
+    if not 0.0 < _WIDTHS * width < 0.5 * start:
+        return data
+    last = value[TIME] + float(time_at(_WIDTHS * width, start, *rates))
+    keep = int(np.searchsorted(data.time_s, last))
+    return data.first(keep) if _FEWEST < keep < len(data) else data
 
 
 def _before_the_stop(data: Data, value: FloatArray, order: int) -> tuple[Data, Model]:

@@ -72,12 +72,17 @@ class Model:
         Between them, usually.
     effects
         What is added; their values follow the baseline's in the vector of parameters.
+    order
+        Intervals between the nodes of a half cycle.
+    half_cycles
+        How many are followed; None for as many as the readings may need, and some more.
     """
 
     time_s: FloatArray
     interval_s: float
     effects: tuple[Effect, ...] = ()
     order: int = 14
+    half_cycles: int | None = None
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     def adding(self, effect: Effect) -> Model:
@@ -125,7 +130,7 @@ class Model:
         )  # fmt: skip
 
     def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
-        """x'' + omega^2 x of the baseline and of all effects."""
+        """Return x'' + omega^2 x of the baseline and of all effects."""
         pendulum = self.pendulum(value)
         total = pendulum.acceleration(motion)
         for effect, place in self.places():
@@ -171,6 +176,8 @@ class Model:
 
         More would ask for motion beyond the stop.
         """
+        if self.half_cycles is not None:
+            return self._from_guesses(law, value, Clock(self.half_cycles, self.order))
         omega, begin = float(value[OMEGA]), float(value[TIME])
         needed = (self.time_s[-1] - begin) * omega / math.pi
         if not 1.0 <= needed < 2e5:
@@ -271,13 +278,14 @@ class Model:
         step = self._step(effect, values, index, at.span)
         low[index] -= step
         high[index] += step
-        return response(effect, low, high, at, pendulum) / (2.0 * step)
+        return np.asarray(response(effect, low, high, at, pendulum) / (2.0 * step))
 
     def _step(self, effect: Effect, values: FloatArray, index: int, span: Span) -> float:
         if index < effect.sizes:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
         if effect.parameters[index - effect.switch].name == "time":
-            return 0.25 * span.interval_s
+            # Over several readings, or the one that is crossed decides.
+            return 2.0 * span.interval_s
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 
@@ -285,7 +293,7 @@ def response(
     effect: Effect, low: FloatArray, high: FloatArray, at: Evaluated, pendulum: Pendulum
 ) -> FloatArray:
     """Change of the readings when the values of one effect go from `low` to `high`."""
-    return responses(effect, [(low, high)], at, pendulum)[0]
+    return np.asarray(responses(effect, [(low, high)], at, pendulum)[0])
 
 
 def responses(
@@ -295,19 +303,21 @@ def responses(
     """Change of the readings for each pair of values, shape (changes, n)."""
     sampled, tangent = at.sampled, at.tangent
     total = np.zeros((len(changes), len(sampled.time_s)))
-    forces = [_force_change(effect, tangent.motion, pendulum, *pair) for pair in changes]
-    if forces[0] is not None:
+    found = [_force_change(effect, tangent.motion, pendulum, *pair) for pair in changes]
+    forces = [force for force in found if force is not None]
+    if forces:
         total += sampled.change(*tangent.of_force(np.stack(forces)))
     for row, (low, high) in enumerate(changes):
         kick = effect.kick(high)
         if kick is not None:
             total[row] += at.after_kick(kick) - at.after_kick(effect.kick(low))
         added = effect.reading(sampled, pendulum, high)
-        if added is not None:
-            total[row] += added - effect.reading(sampled, pendulum, low)
+        before = effect.reading(sampled, pendulum, low)
+        if added is not None and before is not None:
+            total[row] += added - before
         late = effect.delay(sampled.time_s, high)
-        if late is not None:
-            earlier = effect.delay(sampled.time_s, low)
+        earlier = effect.delay(sampled.time_s, low)
+        if late is not None and earlier is not None:
             total[row] += sampled.velocity * (late - earlier)
     return total
 
@@ -316,9 +326,10 @@ def _force_change(
     effect: Effect, motion: Motion, pendulum: Pendulum, low: FloatArray, high: FloatArray
 ) -> FloatArray | None:
     before = effect.acceleration(motion, pendulum, low)
-    if before is None:
+    after = effect.acceleration(motion, pendulum, high)
+    if before is None or after is None:
         return None
-    return np.asarray(effect.acceleration(motion, pendulum, high) - before)
+    return np.asarray(after - before)
 
 
 def kick_sizes(before: Sampled, kick: Kick, now: Motion) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, Lead
+from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
@@ -142,7 +143,8 @@ def _refitted(
     if isinstance(effect, FreedParameter):
         held = [index for index in held if index != effect.index]
     sizes = np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
-    start = np.concatenate([base.value, sizes, np.asarray(lead.shape, dtype=np.float64)])
+    shape = finer_shape(base, noise, lead)
+    start = np.concatenate([base.value, sizes, np.asarray(shape, dtype=np.float64)])
     try:
         return refine(base.model.adding(effect), data, noise, start, held=held)
     except (NoMotionError, np.linalg.LinAlgError):

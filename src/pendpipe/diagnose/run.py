@@ -11,11 +11,13 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.analysis.fit.result import Baseline
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning, begin, read_samples
 from pendpipe.diagnose.faults import Fault
 from pendpipe.diagnose.freed import FreedParameter, freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
 from pendpipe.diagnose.location import Location, locate
+from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.naming import CLASS, Rival, probabilities
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit, refine
@@ -23,6 +25,7 @@ from pendpipe.diagnose.result import Diagnosis, Judged, Named
 from pendpipe.diagnose.search import Search, Step, is_gross, search
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import effect_parameters, parameters_of
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.recording import Recording
 
 LEVEL: Final = 0.01
@@ -196,7 +199,7 @@ def _rivalry(
         if other is not effect:
             model = model.adding(other)
             value = np.append(value, found.improved.value[place])
-    without = refine(model, found.data, found.noise, value, held=held)
+    without = _refined(model, found, value, held) or step.before
     alone = len(found.steps) == 1 and not is_gross(without, found.data)
     if alone:
         return without, step.rivals
@@ -215,22 +218,25 @@ def _rivalry(
     return without, rivals
 
 
+def _refined(model: Model, found: Search, value: FloatArray, held: Sequence[int]) -> Fit | None:
+    """The fit of a model, from values that may be far from its own; None if it can't move so."""
+    for start in (value, np.concatenate([found.baseline.value, value[8:]])):
+        try:
+            return refine(model, found.data, found.noise, start, held=held)
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+    return None
+
+
 def refit_one(
     without: Fit, found: Search, lead: Any, held: Sequence[int], rival: Rival
 ) -> Fit | None:
     """Refit a rival in the final model, from where it ended before."""
-    from pendpipe.dynamics.any_law import NoMotionError
-
     effect = lead.effect
     if isinstance(effect, FreedParameter):
         held = [index for index in held if index != effect.index]
     own = rival.fit.value[len(rival.fit.value) - effect.count :] if effect.count else []
     start = np.concatenate([without.value, own])
-    try:
-        return refine(
-            without.model.adding(effect), found.data, found.noise, start, held=held
-        )
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
+    return _refined(without.model.adding(effect), found, start, held)
 
 

@@ -45,10 +45,13 @@ class Step:
         All that were refitted, the winner first.
     p_value
         Global, when it was found.
+    before
+        The model that it was added to.
     """
 
     rivals: tuple[Rival, ...]
     p_value: float
+    before: Fit
 
     @property
     def winner(self) -> Rival:
@@ -175,7 +178,7 @@ def _add_one(
     )
     if not rivals or rivals[0].gain <= max(_NEEDED, _PART * state.fit.chi2 if gross else 0.0):
         return False
-    state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE))
+    state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit))
     winner = rivals[0]
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
     if isinstance(winner.lead.effect, FreedParameter):

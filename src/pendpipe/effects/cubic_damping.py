@@ -29,7 +29,7 @@ class CubicDamping(Effect):
     )
     parameters = (
         Parameter("d", "1/(rad^2 s)", -1e3, 1e3),
-        Parameter("position_form", "1", 0.0, 1.0),
+        Parameter("position_form", "1", 0.0, 1.0, 0.0),
     )
     deciding = (
         "release it with twice the amplitude: the sign of the third harmonic in quadrature "

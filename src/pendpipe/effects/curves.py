@@ -117,7 +117,9 @@ class DampingCurve(Curve):
     equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
     argument, ordinate = "amplitude, rad", "extra loss rate over b"
     flavour = "amplitude"
-    deciding = "release it from several amplitudes: the loss must follow the amplitude, not the time"
+    deciding = (
+        "release it from several amplitudes: the loss must follow the amplitude, not the time"
+    )
 
     def make_knots(self, span: Span) -> FloatArray:
         """Knots over the amplitude, in equal ratios."""
@@ -127,9 +129,7 @@ class DampingCurve(Curve):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 beta(r) v, in units of the usual loss rate."""
         rate = _loss_rate(pendulum, self.span)
-        beta = np.interp(
-            np.log(motion.amplitude), np.log(self.knots), self.mixing @ values
-        )
+        beta = np.interp(np.log(motion.amplitude), np.log(self.knots), self.mixing @ values)
         return np.asarray(-2.0 * rate * beta * motion.velocity)
 
 
@@ -173,9 +173,7 @@ class ProfileCurve(Curve):
         phase = np.mod(motion.clock.psi, np.pi)
         phase[:, -1] = np.pi
         scale = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
-        return np.asarray(
-            -scale * motion.direction * motion.amplitude * self.curve(values, phase)
-        )
+        return np.asarray(-scale * motion.direction * motion.amplitude * self.curve(values, phase))
 
 
 class DriveCurve(Curve):

@@ -61,7 +61,7 @@ class EquilibriumCreep(Effect):
     parameters = (
         Parameter("s", "rad", -10.0, 10.0),
         Parameter("tau", "s", 1e-3, 1e7),
-        Parameter("exponential", "1", 0.0, 1.0),
+        Parameter("exponential", "1", 0.0, 1.0, 0.0),
     )
     deciding = "a second sensor or a level on the stand: a sensor's drift leaves it still"
 

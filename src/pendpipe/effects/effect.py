@@ -25,6 +25,8 @@ class Parameter(NamedTuple):
     unit: str
     low: float
     high: float
+    default: float | None = None
+    """What a simulation takes where it is not given; None: it must be."""
 
 
 class Kick(NamedTuple):
@@ -186,6 +188,10 @@ class Effect:
     def shapes(self, span: Span) -> Sequence[Sequence[float]]:
         """Return the shapes that a scan tries, each a row of the values behind the sizes."""
         return ((),)
+
+    def finer(self, span: Span, shape: Sequence[float]) -> Sequence[Sequence[float]]:
+        """Return shapes about one that stands out in a scan, where a fit alone would get stuck."""
+        return ()
 
     def tone(self, frequency_hz: float, decay_time_s: float) -> Sequence[float] | None:
         """Return the shape of a tone that a scan has found; None if this effect makes none such.

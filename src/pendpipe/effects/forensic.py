@@ -14,7 +14,7 @@ class BroadbandDrive(Effect):
     name = "broadband drive"
     kind = "dynamics"
     equation = r"\ddot x \mathrel{+}= \xi(t), \quad S_\xi(f) = S_a"
-    parameters = (Parameter("S_a", "rad^2/(s^4 Hz)", 0.0, 1e6),)
+    parameters = (Parameter("acceleration_density", "(rad/s^2)^2/Hz", 0.0, 1e6),)
     template = False
     deciding = "record it at rest, and two pendulums at once: the walk does not repeat"
 
@@ -27,8 +27,8 @@ class Clipping(Effect):
     kind = "measurement"
     equation = r"y = \operatorname{clip}(x, y_\mathrm{low}, y_\mathrm{high})"
     parameters = (
-        Parameter("low", "rad", -math.inf, math.inf),
-        Parameter("high", "rad", -math.inf, math.inf),
+        Parameter("lower_level", "rad", -math.inf, math.inf, -math.inf),
+        Parameter("upper_level", "rad", -math.inf, math.inf, math.inf),
     )
     template = False
     deciding = "widen the range, or release it with less amplitude"
@@ -41,7 +41,7 @@ class MissingCodes(Effect):
     name = "missing codes"
     kind = "measurement"
     equation = r"y = q\, \operatorname{code}(x/q), \quad \operatorname{code} \notin \mathcal{M}"
-    parameters = (Parameter("share", "1", 0.0, 1.0),)
+    parameters = (Parameter("number", "1", 0.0, 4096.0),)
     template = False
     deciding = "record a slow ramp: the same codes must be missing"
 
@@ -78,7 +78,7 @@ class Glitches(Effect):
     kind = "measurement"
     equation = r"y_k = x_k + g_k, \quad k \in \mathcal{G}"
     parameters = (
-        Parameter("share", "1", 0.0, 1.0),
+        Parameter("number", "1", 0.0, 1e6),
         Parameter("rms", "rad", 0.0, math.inf),
     )
     template = False
@@ -94,7 +94,7 @@ class ColouredNoise(Effect):
     equation = r"S(f) = S_0 \left[1 + (f_0/f)^{\alpha}\right]"
     parameters = (
         Parameter("corner", "Hz", 0.0, math.inf),
-        Parameter("slope", "1", 0.0, 4.0),
+        Parameter("exponent", "1", 0.0, 4.0),
     )
     template = False
     deciding = "record with the pendulum held"

@@ -42,7 +42,7 @@ class PowerLawDamping(Effect):
     parameters = (
         Parameter("f", "rad/s^2", 0.0, 100.0),
         Parameter("exponent", "1", 0.1, 6.0),
-        Parameter("energy_form", "1", 0.0, 1.0),
+        Parameter("energy_form", "1", 0.0, 1.0, 0.0),
     )
     deciding = "release it with other amplitudes at once after another: time and amplitude part"
 

@@ -33,6 +33,15 @@ def instants_at_phases(span: Span, count: int, turn: float, phases: int = 4) -> 
     return [(float(time + phase * later),) for time in span.times(count) for phase in range(phases)]
 
 
+def finer_instants(span: Span, count: int, instant_s: float) -> list[tuple[float]]:
+    """Return instants about one of a scan's, as far as its neighbours, an eighth cycle apart."""
+    rough = span.times(count)
+    place = int(np.argmin(np.abs(rough - instant_s)))
+    low, high = rough[max(place - 1, 0)], rough[min(place + 1, count - 1)] + 0.5 * span.period_s
+    number = min(int((high - low) / (0.125 * span.period_s)) + 2, 300)
+    return [(float(time),) for time in np.linspace(low, high, number)]
+
+
 def since_start(motion: Motion) -> FloatArray:
     """Return the time since the turning point from which the motion starts, s."""
     return np.asarray(motion.time_s - motion.time_s[0, 0])

@@ -31,6 +31,7 @@ class SensorBacklash(Effect):
         """Return the play operator less the angle."""
         motion = sampled.motion
         half = np.floor(sampled.phase / math.pi).astype(np.intp)
-        turn = motion.turning_angle[np.clip(half, 0, motion.clock.count - 1), 0]
+        half = np.clip(half, 0, motion.clock.count - 1)
+        turn, direction = motion.turning_angle[half, 0], motion.direction[half, 0]
         rests = np.maximum(0.0, values[0] - np.abs(sampled.angle - turn))
-        return np.asarray(sampled.direction * (rests - 0.5 * values[0]))
+        return np.asarray(direction * (rests - 0.5 * values[0]))

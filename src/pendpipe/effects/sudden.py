@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Kick, Parameter, Pendulum, Span
-from pendpipe.effects.scan import instants, instants_at_phases, reading_step, smooth_step
+from pendpipe.effects.scan import finer_instants, instants, instants_at_phases, smooth_step
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.any_law import Motion
     from pendpipe.dynamics.sampling import Sampled
@@ -38,11 +40,15 @@ class EquilibriumStep(Effect):
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the new equilibrium."""
-        return np.asarray(values[0] * reading_step(sampled.time_s, values[1]))
+        return np.asarray(values[0] * (sampled.time_s > values[1]))
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants, at four phases of the cycle."""
         return instants_at_phases(span, 24, 0.5 * math.pi)
+
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 24, shape[0])
 
 
 class AmplitudeStep(Effect):
@@ -64,6 +70,10 @@ class AmplitudeStep(Effect):
         """Instants."""
         return instants(span, 72)
 
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 72, shape[0])
+
 
 class Impulse(Effect):
     """A knock: the velocity jumps, the angle does not."""
@@ -83,6 +93,10 @@ class Impulse(Effect):
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants, at four phases of half a cycle."""
         return instants_at_phases(span, 40, 0.25 * math.pi)
+
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 40, shape[0])
 
 
 class FrequencyStep(Effect):

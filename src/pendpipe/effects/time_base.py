@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Span
-from pendpipe.effects.scan import instants, reading_step
+from pendpipe.effects.scan import finer_instants, instants, reading_step
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendpipe.arrays import FloatArray
 
 
@@ -50,3 +52,7 @@ class DroppedSamples(Effect):
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
         return instants(span, 64)
+
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Return instants between those of the scan."""
+        return finer_instants(span, 64, shape[0])

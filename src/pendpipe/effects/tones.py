@@ -36,7 +36,7 @@ class SecondMode(Effect):
     equation = r"y = x + e^{-t/\tau_2} (q_c \cos 2\pi f_2 t + q_s \sin 2\pi f_2 t)"
     parameters = (
         Parameter("q_cosine", "rad", -10.0, 10.0),
-        Parameter("q_sine", "rad", -10.0, 10.0),
+        Parameter("q_sine", "rad", -10.0, 10.0, 0.0),
         Parameter("f_2", "Hz", 0.0, 1e6),
         Parameter("tau_2", "s", 1e-3, 1e6),
     )
@@ -77,7 +77,7 @@ class PlaneCoupling(Effect):
     )
     parameters = (
         Parameter("q_cosine", "rad", -10.0, 10.0),
-        Parameter("q_sine", "rad", -10.0, 10.0),
+        Parameter("q_sine", "rad", -10.0, 10.0, 0.0),
         Parameter("detuning", "Hz", -1e3, 1e3),
     )
     sizes = 2
@@ -106,7 +106,7 @@ class PeriodicDrive(Effect):
     equation = r"\ddot x \mathrel{+}= d_c \cos 2\pi f_d t + d_s \sin 2\pi f_d t"
     parameters = (
         Parameter("d_cosine", "rad/s^2", -100.0, 100.0),
-        Parameter("d_sine", "rad/s^2", -100.0, 100.0),
+        Parameter("d_sine", "rad/s^2", -100.0, 100.0, 0.0),
         Parameter("f_d", "Hz", 0.0, 1e6),
     )
     sizes = 2
@@ -136,7 +136,7 @@ class TonePickup(Effect):
     equation = r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t"
     parameters = (
         Parameter("a_cosine", "rad", -10.0, 10.0),
-        Parameter("a_sine", "rad", -10.0, 10.0),
+        Parameter("a_sine", "rad", -10.0, 10.0, 0.0),
         Parameter("f_a", "Hz", 0.0, 1e6),
     )
     sizes = 2

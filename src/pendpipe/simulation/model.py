@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
+from pendpipe.arrays import FloatArray
 from pendpipe.configuration.faults import as_input_error
 from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 from pendpipe.simulation.converter import clipped, quantised
+from pendpipe.simulation.effects import Given, read_effects
+from pendpipe.simulation.instrument import Instrument
 
 
 class PendulumModel(Section):
@@ -74,6 +77,9 @@ class Model(Section):
     sensor: SensorModel | None = Field(None, description="the sensor; none: radians")
     converter: ConverterModel | None = Field(None, description="the converter; none: no steps")
     sampling: SamplingModel = Field(description="rate and length")
+    effects: list[dict[str, Any]] = Field(
+        [], description="effects of docs/effects.md: id, and its parameters by their names"
+    )
 
     @model_validator(mode="after")
     def _converter_has_a_sensor(self) -> Model:
@@ -97,30 +103,61 @@ def read_model(path: str | Path) -> Model:
         raise as_input_error(place, fault, Model) from None
 
 
-def simulate(model: Model, source: str = "simulated") -> Recording:
+def simulate(model: Model, source: str = "simulated", place: str = "the model") -> Recording:
     """Make the recording that a model describes.
+
+    Parameters
+    ----------
+    model, source
+        What is simulated, and what the recording says of itself.
+    place
+        For messages about its effects.
 
     Returns
     -------
     Recording
         In volts where there is a sensor, else in radians, with its metadata.
     """
+    given = read_effects(place, model.effects)
     rate = model.sampling.sample_rate_hz
     time = np.arange(int(np.floor(model.sampling.duration_s * rate + 1e-9))) / rate
-    release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
-    angle = sample(model.pendulum.equation(), release, time)
+    instrument = Instrument(given, np.random.default_rng([model.seed, 1]), place)
+    angle = _angles(model, given, instrument, time, place)
     random = np.random.default_rng(model.seed)
-    angle = angle + model.noise_rad * random.standard_normal(len(time))
+    angle += instrument.coloured(model.noise_rad * random.standard_normal(len(time)), rate)
     metadata = {"source": source, "seed": str(model.seed)}
-    if model.sensor is None:
-        return Recording(time, angle, "angle_rad", metadata=metadata)
+    if given:
+        metadata["effects"] = ", ".join(one.effect.identifier for one in given)
     sensor, converter = model.sensor, model.converter
-    volts = sensor.offset_volts + sensor.volts_per_radian * angle
-    volts = volts + sensor.noise_volts * random.standard_normal(len(time))
+    if "missing-codes" in instrument.settings and converter is None:
+        raise InputError(place, "missing-codes without a converter", "add [converter]")
+    if sensor is None:
+        return Recording(time, instrument.spoilt(angle), "angle_rad", metadata=metadata)
+    noise = sensor.noise_volts * random.standard_normal(len(time))
+    angle += instrument.coloured(noise, rate) / sensor.volts_per_radian
+    volts = sensor.offset_volts + sensor.volts_per_radian * instrument.spoilt(angle)
     metadata["volts_per_radian"] = repr(sensor.volts_per_radian)
     if converter is None:
         return Recording(time, volts, "volts", metadata=metadata)
     metadata |= {"bits": str(converter.bits), "range_volts": repr(converter.range_volts)}
     step = 2.0 * converter.range_volts / 2.0**converter.bits
     volts = quantised(clipped(volts, converter.range_volts, step), step)
+    volts = step * instrument.given_codes(np.round(volts / step))
     return Recording(time, volts, "volts", metadata=metadata, resolution=step)
+
+
+def _angles(
+    model: Model, given: list[Given], instrument: Instrument, time: FloatArray, place: str
+) -> FloatArray:
+    """The motion at the instants of the readings; by Eq. 8's engine where that is all."""
+    equation = model.pendulum.equation()
+    release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
+    taken = instrument.times(time)
+    templates = [one for one in given if one.effect.template]
+    if templates:
+        from pendpipe.simulation.motion import angles
+
+        angle = angles(equation, release, templates, taken, place)
+    else:
+        angle = sample(equation, release, taken)
+    return instrument.shaken(angle, time, equation)

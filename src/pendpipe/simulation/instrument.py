@@ -1,0 +1,102 @@
+"""Faults of the instrument that have no template: jitter, glitches, clipping, codes, noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8
+from pendpipe.errors import InputError
+from pendpipe.simulation.effects import Given
+
+
+class Instrument:
+    """What a list of effects does to times, angles, noise and codes.
+
+    Parameters
+    ----------
+    given
+        The effects; those with a template are none of its business.
+    random
+        Numbers for what is drawn.
+    place
+        For messages.
+    """
+
+    def __init__(
+        self, given: Sequence[Given], random: np.random.Generator, place: str | Path
+    ) -> None:
+        self.random, self.place = random, place
+        self.settings = {one.effect.identifier: one.named() for one in given}
+
+    def times(self, time_s: FloatArray) -> FloatArray:
+        """When the readings are really taken (jitter)."""
+        if "jitter" not in self.settings:
+            return time_s
+        scatter = self.settings["jitter"]["sigma_t"] * self.random.standard_normal(len(time_s))
+        return np.sort(time_s + scatter)
+
+    def shaken(self, angle: FloatArray, time_s: FloatArray, equation: Eq8) -> FloatArray:
+        """Add what a random torque of constant density does (linear response, by impulses)."""
+        if "broadband-drive" not in self.settings:
+            return angle
+        from scipy.signal import lfilter
+
+        density = self.settings["broadband-drive"]["acceleration_density"]
+        interval = float(time_s[1] - time_s[0])
+        loss = equation.hysteretic + equation.viscous
+        turn = math.sqrt(max(equation.angular_frequency**2 - loss**2, 0.0))
+        left = math.exp(-loss * interval)
+        # One-sided density: the velocity's impulses have the variance S_a dt/2.
+        impulses = math.sqrt(0.5 * density * interval) * self.random.standard_normal(len(angle))
+        rings = [0.0, left * math.sin(turn * interval) / turn]
+        back = [1.0, -2.0 * left * math.cos(turn * interval), left**2]
+        return np.asarray(angle + lfilter(rings, back, impulses))
+
+    def coloured(self, noise: FloatArray, rate_hz: float) -> FloatArray:
+        """Give white noise the density 1 + (corner/f)^exponent."""
+        if "coloured-noise" not in self.settings:
+            return noise
+        colour = self.settings["coloured-noise"]
+        lines = np.fft.rfft(noise)
+        frequency = np.fft.rfftfreq(len(noise), 1.0 / rate_hz)
+        frequency[0] = frequency[1] if len(frequency) > 1 else 1.0
+        lines *= np.sqrt(1.0 + (colour["corner"] / frequency) ** colour["exponent"])
+        return np.asarray(np.fft.irfft(lines, len(noise)))
+
+    def spoilt(self, angle: FloatArray) -> FloatArray:
+        """Add glitches, then clip, then round coarsely."""
+        angle = angle.copy()
+        if "glitches" in self.settings:
+            glitches = self.settings["glitches"]
+            number = min(round(glitches["number"]), len(angle))
+            where = self.random.choice(len(angle), number, replace=False)
+            angle[where] += glitches["rms"] * self.random.standard_normal(number)
+        if "clipping" in self.settings:
+            levels = self.settings["clipping"]
+            if not levels["lower_level"] < levels["upper_level"]:
+                raise InputError(
+                    self.place, "clipping: lower_level is not below upper_level", "swap them"
+                )
+            angle = np.clip(angle, levels["lower_level"], levels["upper_level"])
+        step = self.settings.get("coarse-quantisation", {}).get("step", 0.0)
+        return step * np.round(angle / step) if step else angle
+
+    def given_codes(self, codes: FloatArray) -> FloatArray:
+        """Let some codes within the record's range never come: a neighbour comes instead."""
+        number = round(self.settings.get("missing-codes", {}).get("number", 0.0))
+        if not number:
+            return codes
+        low, high = int(codes.min()), int(codes.max())
+        if number > (high - low) // 4:
+            raise InputError(
+                self.place, f"{number} missing codes of {high - low + 1}", "leave most of them"
+            )
+        missing = self.random.choice(np.arange(low + 1, high), number, replace=False)
+        while np.any(lost := np.isin(codes, missing)):
+            codes = np.where(lost, codes + self.random.choice([-1.0, 1.0], len(codes)), codes)
+        return codes

@@ -1,0 +1,144 @@
+"""Any law on the phase clock: against the Eq. 8 engine, elliptic integrals, and its own order."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.sampling import sample_motion
+from pendpipe.effects import Pendulum
+
+Floats = NDArray[np.float64]
+OMEGA = 2.0 * math.pi * 0.9
+
+
+def undamped(clock: Clock, start: float = 1.0, omega: float = OMEGA) -> Motion:
+    """A motion to begin the iteration with."""
+    return Motion(clock, omega, np.full_like(clock.psi, math.log(abs(start))), clock.psi / omega)
+
+
+def eq8_motion(pendulum: Pendulum, start: float, count: int, order: int = 14) -> Motion:
+    guess = undamped(Clock(count, order), start, pendulum.angular_frequency)
+    return follow(pendulum.acceleration, pendulum.angular_frequency, start, 0.0, guess)
+
+
+def sine_law(motion: Motion) -> Floats:
+    return OMEGA**2 * (motion.angle - np.sin(motion.angle))
+
+
+@settings(deadline=None, max_examples=40, phases=[Phase.explicit, Phase.generate])
+@given(
+    quadratic=st.floats(0.0, 0.3),
+    hysteretic=st.floats(0.0, 0.1),
+    viscous=st.floats(0.0, 0.1),
+    friction=st.floats(0.0, 0.2),
+    start=st.floats(0.02, 0.5),
+    side=st.sampled_from([-1.0, 1.0]),
+)
+def test_eq8_as_the_engine_has_it(
+    quadratic: float, hysteretic: float, viscous: float, friction: float, start: float,
+    side: float,
+) -> None:  # fmt: skip
+    """The readings' error is 3e-4 of what a radian of phase loses (2e-7 at Q = 700)."""
+    # c such that Coulomb friction alone would take half of that part in the record.
+    duration = 8.0
+    coulomb = friction * start / (2.0 * duration)
+    pendulum = Pendulum(OMEGA, quadratic, hysteretic, viscous, coulomb)
+    motion = eq8_motion(pendulum, side * start, 16)
+    time = np.arange(0.0, duration, 0.037)
+    engine = Eq8(OMEGA, quadratic, hysteretic, viscous, coulomb)
+    expected = sample(engine, Release(0.0, side * start), time)
+    found = sample_motion(motion, time).angle
+    loss = (quadratic * start + hysteretic + viscous + coulomb / start) / OMEGA
+    assert np.max(np.abs(found - expected)) < (3e-4 * loss + 1e-8) * start
+
+
+def test_turning_points_of_eq8_over_a_long_record() -> None:
+    """The clock's ends of half cycles are the engine's turning points."""
+    pendulum = Pendulum(OMEGA, 7.2e-3, 3.1e-3, 4.7e-3, 1.3e-4)
+    motion = eq8_motion(pendulum, 0.15, 340)
+    engine = Eq8(OMEGA, 7.2e-3, 3.1e-3, 4.7e-3, 1.3e-4)
+    points = turning_points(engine, Release(0.0, 0.15), count=340)
+    count = min(len(points.angle_rad), 340)
+    assert count > 300
+    np.testing.assert_allclose(
+        motion.angle[:count, 0], points.angle_rad[:count], rtol=0.0, atol=1e-10
+    )
+    np.testing.assert_allclose(motion.time_s[:count, 0], points.time_s[:count], rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "order", "within"),
+    [(0.1, 14, 1e-11), (0.5, 14, 1e-8), (1.0, 14, 3e-8), (1.5, 20, 1e-8), (2.0, 28, 1e-9),
+     (2.5, 48, 1e-9), (2.8, 80, 1e-9)],
+)  # fmt: skip
+def test_the_period_of_sin_x_is_the_elliptic_integral(
+    amplitude: float, order: int, within: float
+) -> None:
+    """T = 4 K(sin^2(y/2))/omega, as far over as the clock goes, given nodes enough."""
+    motion = follow(sine_law, OMEGA, amplitude, 0.0, undamped(Clock(12, order), amplitude))
+    period = float(4 * mpmath.ellipk(mpmath.sin(amplitude / 2) ** 2)) / OMEGA
+    assert (motion.time_s[10, 0] / 5.0) / period == pytest.approx(1.0, abs=within)
+    assert np.abs(motion.turning_angle) == pytest.approx(amplitude, rel=100 * within)
+
+
+def test_more_nodes_gain_six_orders_of_the_reading() -> None:
+    """Readings come from six nodes: twice the nodes, an error some 2^6 times less."""
+    pendulum = Pendulum(OMEGA, 0.05, 0.01, 0.01, 1e-4)
+    time = np.arange(0.0, 20.0, 0.037)
+    engine = Eq8(OMEGA, 0.05, 0.01, 0.01, 1e-4)
+    expected = sample(engine, Release(0.0, 0.3), time)
+    errors = [
+        np.max(np.abs(sample_motion(eq8_motion(pendulum, 0.3, 40, order), time).angle - expected))
+        for order in (10, 20, 40)
+    ]
+    assert 20.0 < errors[0] / errors[1] < 200.0
+    assert 20.0 < errors[1] / errors[2] < 200.0
+
+
+def test_upside_down_it_does_not_turn() -> None:
+    with pytest.raises(NoMotionError):
+        follow(sine_law, OMEGA, 3.12, 0.0, undamped(Clock(12, 40), 3.12))
+
+
+def test_beyond_the_stop_there_is_no_motion() -> None:
+    """Coulomb friction of a third of the amplitude stops the pendulum in two half cycles."""
+    pendulum = Pendulum(OMEGA, coulomb=0.01 * OMEGA / 3.0)
+    with pytest.raises(NoMotionError):
+        eq8_motion(pendulum, 0.01, 8)
+
+
+def test_the_tangent_is_what_a_small_force_does() -> None:
+    """of_force, of_start and of_reset against motions followed with a little more of each."""
+    pendulum = Pendulum(OMEGA, 0.05, 0.01, 0.01, 1e-4)
+    base = eq8_motion(pendulum, 0.2, 40)
+    tangent = Tangent(pendulum.acceleration, base)
+    time = np.arange(0.0, 20.0, 0.05)
+    sampled = sample_motion(base, time)
+
+    def changed(law: Law, start: float = 0.2, late: float = 0.0) -> Floats:
+        return sample_motion(follow(law, OMEGA, start, late, base), time).angle - sampled.angle
+
+    small = 1e-5
+    pushed = changed(lambda m: pendulum.acceleration(m) + small * m.angle**2)
+    by_force = small * sampled.change(*tangent.of_force(base.angle**2))
+    assert np.linalg.norm(by_force - pushed) < 1e-3 * np.linalg.norm(pushed)
+    grown = changed(pendulum.acceleration, start=0.2 * math.exp(small))
+    by_start = small * sampled.change(*tangent.of_start())
+    assert np.linalg.norm(by_start - grown) < 1e-3 * np.linalg.norm(grown)
+
+
+def test_nodes_integrate_polynomials_of_the_phase_exactly() -> None:
+    clock = Clock(5, 12)
+    for power in range(12):
+        found = clock.integral(clock.psi**power)
+        exact = clock.psi ** (power + 1) / (power + 1)
+        np.testing.assert_allclose(found, exact, 0.0, 1e-13 * exact.max())

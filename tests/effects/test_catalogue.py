@@ -1,0 +1,232 @@
+"""The catalogue as a whole: complete, without effect at size zero, its derivatives right."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pendpipe.diagnose.model import OFFSET, OMEGA, START, TIME, A, B, C, Model, response
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.manual import page
+from pendpipe.errors import InputError
+
+from .pendulums import VALUES, baseline, times
+
+Floats = NDArray[np.float64]
+
+DYNAMICS = [
+    "circular-error",
+    "cubic-stiffness",
+    "quadratic-stiffness",
+    "coulomb-friction",
+    "quadratic-drag",
+    "drag-form",
+    "power-law-damping",
+    "cubic-damping",
+    "stribeck-friction",
+    "presliding-friction",
+    "backlash",
+    "history-force",
+    "vortex-shedding",
+    "second-mode",
+    "plane-coupling",
+    "periodic-drive",
+    "broadband-drive",
+    "frequency-drift",
+    "damping-drift",
+    "equilibrium-creep",
+    "equilibrium-step",
+    "amplitude-step",
+    "frequency-step",
+    "damping-step",
+    "impulse",
+    "release-transient",
+]
+MEASUREMENT = [
+    "sensor-quadratic",
+    "sensor-cubic",
+    "sensor-backlash",
+    "offset-drift",
+    "gain-drift",
+    "ac-coupling",
+    "tone-pickup",
+    "clipping",
+    "missing-codes",
+    "coarse-quantisation",
+    "clock-drift",
+    "jitter",
+    "dropped-samples",
+    "glitches",
+    "coloured-noise",
+]
+"""The identifiers that people outside rely on."""
+
+BASE = baseline(a=7.2e-3, b=7.8e-3, c=1.3e-4, share=0.4, offset=0.01)
+RECORD = times(60.0)
+WITH_TEMPLATE = [effect.identifier for effect in CATALOGUE if effect.template]
+
+
+def test_the_catalogue_holds_every_identifier_once() -> None:
+    found = [effect.identifier for effect in CATALOGUE]
+    assert sorted(found) == sorted([*DYNAMICS, *MEASUREMENT])
+    for effect in CATALOGUE:
+        assert effect.kind == ("dynamics" if effect.identifier in DYNAMICS else "measurement")
+        assert by_identifier(effect.identifier) is effect
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"m\.toml: .*'circular-eror'; did you mean 'circular-er"):
+        by_identifier("circular-eror", "m.toml")
+
+
+def test_every_declaration_is_whole() -> None:
+    for effect in CATALOGUE:
+        assert effect.name
+        assert effect.deciding
+        assert effect.equation.count("{") == effect.equation.count("}")
+        names = [parameter.name for parameter in effect.parameters]
+        assert len(names) == len(set(names))
+        assert all(parameter.low < parameter.high for parameter in effect.parameters)
+        assert effect.switch or len(names) >= effect.sizes
+
+
+def test_the_page_is_the_catalogues() -> None:
+    """Made by `pendpipe effects > docs/effects.md`; whoever changes an effect makes it anew."""
+    committed = Path(__file__).parents[2] / "docs/effects.md"
+    assert committed.read_text(encoding="utf-8") == page()
+
+
+def test_what_eq8_holds_is_left_out_of_its_catalogue() -> None:
+    inside = {effect.identifier for effect in CATALOGUE if "eq8" in effect.inside}
+    assert inside == {"coulomb-friction", "quadratic-drag"}
+
+
+@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+def test_at_size_zero_it_is_absent(identifier: str) -> None:
+    effect = by_identifier(identifier)
+    values = np.array(VALUES[identifier])
+    values[: effect.sizes] = 0.0
+    model = Model(RECORD, 0.05)
+    found = model.adding(effect).reading(np.append(BASE, values))
+    np.testing.assert_allclose(found, model.reading(BASE), rtol=0.0, atol=3e-10)
+
+
+@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+def test_it_changes_the_readings_in_proportion_to_its_size(identifier: str) -> None:
+    """Half the (small) size, half the change, to first order."""
+    effect = by_identifier(identifier)
+    model = Model(RECORD, 0.05)
+    own = model.reading(BASE)
+    changes = []
+    for part in (0.1, 0.05):
+        values = np.array(VALUES[identifier])
+        values[: effect.sizes] *= part
+        changes.append(model.adding(effect).reading(np.append(BASE, values)) - own)
+    assert np.linalg.norm(changes[0]) > 1e-7
+    # What is not linear in the size is of the order of the change over the amplitude.
+    within = 0.1 + 20.0 * float(np.max(np.abs(changes[0])))
+    assert np.linalg.norm(changes[0] - 2.0 * changes[1]) < within * np.linalg.norm(changes[0])
+
+
+def numerical(model: Model, value: Floats, index: int, step: float) -> Floats:
+    low, high = value.copy(), value.copy()
+    low[index] -= step
+    high[index] += step
+    return (model.reading(high) - model.reading(low)) / (2.0 * step)
+
+
+FREQUENCIES = ("f_2", "f_d", "f_a", "detuning")
+BASELINE_STEPS = {A: 1e-5, B: 1e-5, C: 1e-6, OMEGA: 1e-5, START: 1e-5, TIME: 1e-5, OFFSET: 1e-5}
+
+
+@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
+    """Model.jacobian against central differences, an instant's own neighbourhood apart."""
+    effect = by_identifier(identifier)
+    model = Model(RECORD, 0.05).adding(effect)
+    value = np.append(BASE, VALUES[identifier])
+    found = model.jacobian(value, model.evaluate(value))
+    for index in range(len(BASE), model.size):
+        name = ["size", *(p.name for p in effect.parameters)][index - len(BASE) + 1 - effect.switch]
+        step = 1e-2 * abs(value[index])
+        if name == "time":
+            step = 0.025
+        elif name in FREQUENCIES:
+            step = 1e-5
+        expected = numerical(model, value, index, step)
+        far = np.ones(len(RECORD), dtype=bool)
+        if effect.local and "time" in [p.name for p in effect.parameters]:
+            far = np.abs(RECORD - value[-1]) > 0.2
+        error = np.linalg.norm((found[:, index] - expected)[far])
+        # The instant of a pure jump of the amplitude hardly matters elsewhere.
+        assert error <= 0.02 * np.linalg.norm(expected[far]) + 1e-6, name
+
+
+@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+def test_derivatives_by_the_baselines_values(identifier: str) -> None:
+    """The same, of the baseline's columns where the effect is present.
+
+    What the effect itself adds to the readings is not followed into these columns: they are
+    off by as much as the effect is of the amplitude, which slows a fit a little.
+    """
+    effect = by_identifier(identifier)
+    model = Model(RECORD, 0.05).adding(effect)
+    value = np.append(BASE, VALUES[identifier])
+    found = model.jacobian(value, model.evaluate(value))
+    for index, step in BASELINE_STEPS.items():
+        expected = numerical(model, value, index, step)
+        error = np.linalg.norm(found[:, index] - expected)
+        assert error < 0.025 * np.linalg.norm(expected), index
+
+
+def projected(effect: Effect, shape: tuple[float, ...], model: Model, basis: Floats) -> Floats:
+    """Columns of an effect's sizes, what the baseline can do taken off; orthonormal."""
+    at = model.evaluate(BASE)
+    columns = []
+    for index in range(effect.sizes):
+        low = np.concatenate([np.zeros(effect.sizes), shape])
+        high = low.copy()
+        high[index] = 1e-6
+        columns.append(response(effect, low, high, at, model.pendulum(BASE)) / 1e-6)
+    tall = np.stack(columns, axis=1)
+    tall -= basis @ (basis.T @ tall)
+    tall -= basis @ (basis.T @ tall)
+    return np.linalg.qr(tall)[0]
+
+
+SCANNED = [
+    effect.identifier
+    for effect in CATALOGUE
+    if effect.template and not effect.spectral and effect.sizes < len(effect.parameters)
+]
+
+
+@pytest.mark.parametrize("identifier", SCANNED)
+def test_a_scan_keeps_most_of_what_lies_between_its_rows(identifier: str) -> None:
+    """The correlation with the best row, beyond what the baseline can do: 0.9 usually."""
+    effect = by_identifier(identifier)
+    model = Model(RECORD, 0.05)
+    at = model.evaluate(BASE)
+    jacobian = model.jacobian(BASE, at)
+    basis = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)[0]
+    rows = [tuple(row) for row in effect.shapes(at.span)]
+    assert all(len(row) == len(effect.parameters) - effect.sizes for row in rows)
+    bank = np.concatenate([projected(effect, row, model, basis) for row in rows], axis=1)
+    random = np.random.default_rng(5)
+    best = []
+    for _ in range(25):
+        low, high = rows[random.integers(len(rows) - 1)], None
+        high = rows[min(rows.index(low) + 1, len(rows) - 1)]
+        share = random.uniform()
+        between = tuple(a + share * (b - a) for a, b in zip(low, high, strict=True))
+        columns = projected(effect, between, model, basis)
+        mixture = columns @ random.standard_normal(columns.shape[1])
+        products = (bank.T @ (mixture / np.linalg.norm(mixture))).reshape(len(rows), -1)
+        best.append(math.sqrt(float(np.max(np.sum(products**2, axis=1)))))
+    assert float(np.median(best)) > 0.9
+    assert min(best) > 0.6

@@ -1,0 +1,147 @@
+"""What changes slowly, suddenly, or periodically."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pendpipe.effects.catalogue import by_identifier
+
+from .lock_in import lock_in
+from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
+
+TIME = times(60.0, 0.04)
+CYCLE = 2.0 * math.pi / OMEGA
+
+
+def test_a_drifting_frequency_runs_ahead_with_the_square_of_time() -> None:
+    """The phase is w (t + eps t^2/2)."""
+    eps = 1e-4
+    found = evaluated("frequency-drift", (eps,), baseline(b=0.01), TIME).reading
+    for start in (0.0, 20.0, 45.0):
+        window = lock_in(TIME, found, OMEGA, start, start + 8.0 * CYCLE)
+        assert window.angular_frequency / OMEGA - 1.0 == pytest.approx(
+            eps * window.time_s, rel=0.02, abs=2e-5 * eps * 60.0 + 1e-6
+        )
+
+
+def test_a_frequency_jumps() -> None:
+    found = reading("frequency-step", (3e-4, 30.0), baseline(b=0.01), TIME)
+    before = lock_in(TIME, found, OMEGA, 28.0 - 8.0 * CYCLE, 28.0)
+    after = lock_in(TIME, found, OMEGA, 32.0, 32.0 + 8.0 * CYCLE)
+    change = after.angular_frequency / before.angular_frequency - 1.0
+    assert change == pytest.approx(3e-4, rel=0.01)
+
+
+@pytest.mark.parametrize("exponential", [0.0, 1.0])
+def test_the_equilibrium_creeps(exponential: float) -> None:
+    """The level follows s ln(1 + t/tau), or s (1 - e^(-t/tau))."""
+    size, tau = 2e-3, 10.0
+    found = reading("equilibrium-creep", (size, tau, exponential), baseline(b=0.01), TIME)
+    for start in (5.0, 20.0, 45.0):
+        window = lock_in(TIME, found, OMEGA, start, start + 4.0 * CYCLE)
+        late = window.time_s / tau
+        law = 1.0 - math.exp(-late) if exponential else math.log1p(late)
+        assert window.level == pytest.approx(size * law, rel=0.01)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4])
+def test_a_jump_of_the_equilibrium_changes_amplitude_and_phase(phase: float) -> None:
+    """Changes are dy = -J cos(psi), dpsi = J sin(psi)/y; the level rises by J, without a jump."""
+    jump, instant = 5e-4, 27.0 * CYCLE + phase / OMEGA
+    base = baseline()
+    found = evaluated("equilibrium-step", (jump, instant), base, TIME)
+    before = lock_in(TIME, found.reading, OMEGA, instant - 8.0 * CYCLE, instant - 0.05)
+    after = lock_in(TIME, found.reading, OMEGA, instant + 0.05, instant + 8.0 * CYCLE)
+    assert after.level - before.level == pytest.approx(jump, rel=0.01)
+    assert after.amplitude - before.amplitude == pytest.approx(
+        -jump * math.cos(phase), abs=0.02 * jump
+    )
+    advance = after.phase - before.phase - OMEGA * (after.time_s - before.time_s)
+    advance = math.remainder(advance, 2.0 * math.pi)
+    assert advance == pytest.approx(jump * math.sin(phase) / 0.15, abs=0.02 * jump / 0.15)
+    fine = np.linspace(instant - 1e-3, instant + 1e-3, 2001)
+    across = reading("equilibrium-step", (jump, instant), base, fine)
+    assert np.max(np.abs(np.diff(across))) < 2e-6
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4])
+def test_a_knock_changes_amplitude_and_phase(phase: float) -> None:
+    """Changes are dy = -dv sin(psi)/w, dpsi = -dv cos(psi)/(w y); the level stays."""
+    dv, instant = 2e-3, 27.0 * CYCLE + phase / OMEGA
+    found = reading("impulse", (dv, instant), baseline(), TIME)
+    before = lock_in(TIME, found, OMEGA, instant - 8.0 * CYCLE, instant - 0.05)
+    after = lock_in(TIME, found, OMEGA, instant + 0.05, instant + 8.0 * CYCLE)
+    size = dv / OMEGA
+    assert after.level == pytest.approx(before.level, abs=1e-6)
+    assert after.amplitude - before.amplitude == pytest.approx(
+        -size * math.sin(phase), abs=0.02 * size
+    )
+    advance = after.phase - before.phase - OMEGA * (after.time_s - before.time_s)
+    advance = math.remainder(advance, 2.0 * math.pi)
+    assert advance == pytest.approx(-size * math.cos(phase) / 0.15, abs=0.02 * size / 0.15)
+
+
+def test_an_amplitude_jumps_and_nothing_else() -> None:
+    base = baseline(b=0.01)
+    found = reading("amplitude-step", (0.2, 30.0), base, TIME)
+    own = plain(base, TIME)
+    np.testing.assert_allclose(found[TIME < 30.0], own[TIME < 30.0], 0.0, 1e-9)
+    later = TIME > 30.0
+    np.testing.assert_allclose(found[later], math.exp(0.2) * own[later], 0.0, 1e-7)
+
+
+def test_a_drive_answers_as_an_undamped_oscillator_far_from_resonance() -> None:
+    """The tone is d/|w^2 - w_d^2|; a pendulum without loss keeps what rang at the start."""
+    drive, frequency = 2e-3, 1.3 * 0.9
+    base = baseline()
+    found = reading("periodic-drive", (drive, 0.0, frequency), base, TIME)
+    turn = 2.0 * math.pi * frequency
+    tone = drive / (OMEGA**2 - turn**2)
+    expected = tone * (np.cos(turn * TIME) - np.cos(OMEGA * TIME))
+    np.testing.assert_allclose(found - plain(base, TIME), expected, 0.0, 0.02 * abs(tone))
+
+
+def test_a_second_mode_rings_down_on_top() -> None:
+    base = baseline(b=0.01)
+    found = reading("second-mode", (1e-3, 5e-4, 4.3, 6.0), base, TIME)
+    turn = 2.0 * math.pi * 4.3 * TIME
+    expected = (1e-3 * np.cos(turn) + 5e-4 * np.sin(turn)) * np.exp(-TIME / 6.0)
+    np.testing.assert_allclose(found - plain(base, TIME), expected, 0.0, 1e-12)
+
+
+def test_a_second_plane_beats() -> None:
+    """The lock-in's amplitude swings by q about r at the detuning."""
+    q, detuning = 2e-3, 1.0 / 30.0
+    found = reading("plane-coupling", (q, 0.0, detuning), baseline(), TIME)
+    for start in np.arange(0.0, 50.0, 5.0):
+        window = lock_in(TIME, found, OMEGA, start, start + 4.0 * CYCLE)
+        beat = math.cos(2.0 * math.pi * detuning * window.time_s)
+        assert window.amplitude - 0.15 == pytest.approx(q * beat, abs=0.06 * q)
+
+
+def test_history_starts_from_rest() -> None:
+    """The law x'' + h D^(1/2) x' + w^2 x = 0 from rest, by inversion of its Laplace transform."""
+    mpmath = pytest.importorskip("mpmath")
+    h, start = 0.05, 0.15
+
+    def transform(s: object) -> object:
+        root = s ** mpmath.mpf(0.5)  # type: ignore[operator]
+        return start * (s + h * root) / (s**2 + h * s * root + OMEGA**2)  # type: ignore[operator]
+
+    time = times(4.0, 0.25)[1:]
+    model_time = times(6.0, 0.05)
+    found = np.interp(time, model_time, reading("history-force", (h,), baseline(), model_time))
+    exact = evaluated("history-force", (h,), baseline(), time).reading
+    with mpmath.workdps(30):
+        expected = [float(mpmath.invertlaplace(transform, t, method="talbot")) for t in time]
+    effect = np.max(np.abs(np.array(expected) - plain(baseline(), time)))
+    assert effect > 0.05 * start
+    assert np.max(np.abs(exact - expected)) < 0.01 * effect
+    assert np.max(np.abs(found - expected)) < 0.1 * effect
+
+
+def test_broadband_drive_has_no_template() -> None:
+    assert not by_identifier("broadband-drive").template

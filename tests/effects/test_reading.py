@@ -1,0 +1,108 @@
+"""What changes the readings and not the motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from .lock_in import lock_in
+from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
+
+TIME = times(40.0, 0.02)
+CYCLE = 2.0 * math.pi / OMEGA
+BASE = baseline(b=0.005)
+OWN = plain(BASE, TIME)
+
+
+def test_a_quadratic_sensor_shifts_the_mean_with_its_second_harmonic() -> None:
+    """Both s_2 y^2/2, and no change of the frequency."""
+    found = lock_in(TIME, reading("sensor-quadratic", (0.1,), baseline(), TIME), OMEGA, 0.0, 22.0)
+    assert found.level == pytest.approx(0.1 * 0.15**2 / 2.0, rel=1e-3)
+    assert found.lines[2].real == pytest.approx(0.1 * 0.15**2 / 2.0, rel=1e-3)
+    assert found.angular_frequency == pytest.approx(OMEGA, rel=1e-8)
+
+
+def test_a_cubic_sensor_has_a_third_harmonic_and_no_frequency_shift() -> None:
+    """s_3 y^3/4 in phase; the first grows by 3 s_3 y^2/4 of itself."""
+    found = lock_in(TIME, reading("sensor-cubic", (0.5,), baseline(), TIME), OMEGA, 0.0, 22.0)
+    assert found.lines[3].real == pytest.approx(0.5 * 0.15**3 / 4.0, rel=1e-3)
+    assert found.amplitude == pytest.approx(0.15 * (1.0 + 0.75 * 0.5 * 0.15**2), rel=1e-5)
+    assert found.angular_frequency == pytest.approx(OMEGA, rel=1e-8)
+
+
+def test_play_in_the_sensor_is_the_play_operator() -> None:
+    """Against the operator followed step by step on a fine grid."""
+    width = 2e-3
+    fine = times(8.0, 0.0005)
+    angle = plain(BASE, fine)
+    followed = np.empty_like(angle)
+    place = angle[0] - 0.5 * width
+    # Before the release the pendulum was brought up to its first angle.
+    for index, x in enumerate(angle):
+        place = min(max(place, x - 0.5 * width), x + 0.5 * width)
+        followed[index] = place
+    found = reading("sensor-backlash", (width,), BASE, fine)
+    np.testing.assert_allclose(found, followed, 0.0, 2e-6)
+    lines = lock_in(fine, found, OMEGA, 0.0, 6.0 * CYCLE)
+    # A square wave of b/2 in phase with the velocity, its corners rounded at the reversals.
+    assert lines.lines[3].imag == pytest.approx(-2.0 * width / (3.0 * math.pi), rel=0.1)
+
+
+def test_drifts_of_offset_and_gain() -> None:
+    np.testing.assert_allclose(
+        reading("offset-drift", (1e-4,), BASE, TIME), OWN + 1e-4 * TIME, 0.0, 1e-12
+    )
+    np.testing.assert_allclose(
+        reading("gain-drift", (1e-3,), BASE, TIME), OWN * (1.0 + 1e-3 * TIME), 0.0, 1e-12
+    )
+
+
+def test_drifts_count_from_the_first_reading() -> None:
+    """And so do not depend on when the clock of the record was set."""
+    for identifier, values in (("offset-drift", (1e-4,)), ("gain-drift", (1e-3,))):
+        early = reading(identifier, values, BASE, TIME)
+        late_base = BASE.copy()
+        late_base[6] += 1000.0
+        late = reading(identifier, values, late_base, TIME + 1000.0)
+        np.testing.assert_allclose(late, early, 0.0, 1e-9)
+
+
+def test_a_capacitor_lets_the_level_go() -> None:
+    """Against a first-order high-pass worked out reading by reading, lead and gain apart."""
+    tau, level = 5.0, 0.02
+    fine = times(20.0, 0.001)
+    angle = plain(BASE, fine)
+    held = -level
+    passed = np.empty_like(angle)
+    for index, x in enumerate(angle):
+        passed[index] = x - held
+        held += (x - held) * 0.001 / tau
+    # What is left of the motion itself: a lead and a gain, constant to a thousandth.
+    lead = 1.0 / (1.0 + 1.0 / (1j * OMEGA * tau))
+    sampled = evaluated("ac-coupling", (0.0, tau), BASE, fine).sampled
+    motion = np.real(lead * sampled.amplitude * np.exp(1j * sampled.phase))
+    start_up = passed[0] - motion[0]
+    found = reading("ac-coupling", (start_up, tau), BASE, fine) - angle
+    np.testing.assert_allclose(found, passed - motion, 0.0, 0.01 * level)
+
+
+def test_a_tone_is_a_line() -> None:
+    found = reading("tone-pickup", (2e-4, -1e-4, 3.3), BASE, TIME) - OWN
+    turn = 2.0 * math.pi * 3.3 * TIME
+    np.testing.assert_allclose(found, 2e-4 * np.cos(turn) - 1e-4 * np.sin(turn), 0.0, 1e-12)
+
+
+def test_a_drifting_clock_reads_later_and_later() -> None:
+    rate = 1e-5
+    late = plain(BASE, TIME + 0.5 * rate * TIME**2)
+    np.testing.assert_allclose(reading("clock-drift", (rate,), BASE, TIME), late, 0.0, 1e-7)
+
+
+def test_dropped_samples_are_the_readings_that_follow() -> None:
+    """Seven samples lost after the hundredth: from there on, the readings seven later."""
+    instant = float(0.5 * (TIME[100] + TIME[101]))
+    found = reading("dropped-samples", (7 * 0.02, instant), BASE, TIME)
+    np.testing.assert_allclose(found[:101], OWN[:101], 0.0, 1e-9)
+    np.testing.assert_allclose(found[101:-7], OWN[108:], 0.0, 1e-7)

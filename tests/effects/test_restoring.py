@@ -1,0 +1,76 @@
+"""What a changed restoring torque does: frequency against amplitude, and harmonics in phase."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from .lock_in import Lines, lock_in
+from .pendulums import OMEGA, baseline, reading, times
+
+TIME = times(24.0, 0.02)
+
+
+def lines(identifier: str, values: tuple[float, ...], amplitude: float, order: int = 20) -> Lines:
+    """The harmonics of a pendulum that loses nothing."""
+    found = reading(identifier, values, baseline(start=amplitude), TIME, order)
+    return lock_in(TIME, found, OMEGA, 0.0, 22.0)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4, 0.7])
+def test_circular_error_is_the_series_of_the_period(amplitude: float) -> None:
+    """T/T0 = 1 + y^2/16 + 11 y^4/3072 + 173 y^6/737280."""
+    found = lines("circular-error", (1.0,), amplitude)
+    series = amplitude**2 / 16 + 11 * amplitude**4 / 3072 + 173 * amplitude**6 / 737280
+    assert OMEGA / found.angular_frequency - 1.0 == pytest.approx(series, rel=1e-3)
+    assert found.lines[3].real == pytest.approx(-(amplitude**3) / 192, rel=0.5 * amplitude)
+    assert abs(found.lines[2]) < 1e-7
+    assert abs(found.lines[3].imag) < 1e-6
+
+
+@pytest.mark.parametrize("k3", [0.3, -0.2])
+def test_a_cubic_torque_shifts_the_frequency_by_twelve_times_its_third_harmonic(k3: float) -> None:
+    """3 k_3 y^2/8 and k_3 y^3/32."""
+    amplitude = 0.12
+    found = lines("cubic-stiffness", (k3,), amplitude)
+    shift = found.angular_frequency / OMEGA - 1.0
+    assert shift == pytest.approx(0.375 * k3 * amplitude**2, rel=0.01)
+    assert found.lines[3].real / found.amplitude == pytest.approx(shift / 12.0, rel=0.01)
+
+
+def test_a_quadratic_torque_shifts_the_mean_against_its_second_harmonic() -> None:
+    """-k_2 y^2/2, k_2 y^2/6 and dw/w = -5 k_2^2 y^2/12."""
+    k2, amplitude = 0.2, 0.1
+    found = lines("quadratic-stiffness", (k2,), amplitude)
+    y = found.amplitude
+    assert found.level == pytest.approx(-k2 * y**2 / 2.0, rel=0.01)
+    assert found.lines[2].real == pytest.approx(k2 * y**2 / 6.0, rel=0.01)
+    shift = found.angular_frequency / OMEGA - 1.0
+    assert shift == pytest.approx(-5.0 * k2**2 * y**2 / 12.0, rel=0.02)
+
+
+@pytest.mark.parametrize("amplitude", [0.05, 0.1, 0.2])
+def test_play_lowers_the_frequency_as_one_over_the_amplitude(amplitude: float) -> None:
+    """dw/w = -b/(pi y), third harmonic b/(12 pi) whatever the amplitude."""
+    b = 5e-4
+    found = lines("backlash", (b,), amplitude)
+    shift = found.angular_frequency / OMEGA - 1.0
+    assert shift == pytest.approx(-b / (math.pi * amplitude), rel=0.03)
+    assert found.lines[3].real == pytest.approx(b / (12.0 * math.pi), rel=0.1)
+
+
+def test_presliding_stiffens_below_its_breakaway_angle() -> None:
+    """dw/w = k_d/2 at amplitudes far below z_c."""
+    found = lines("presliding-friction", (1e-3, 1.0), 0.002)
+    assert found.angular_frequency / OMEGA - 1.0 == pytest.approx(0.5e-3, rel=0.01)
+
+
+def test_added_mass_and_friction_are_what_remains_of_the_history_force() -> None:
+    """Long after the release: b = h sqrt(w/2)/2 and dw/w = -h/(2 sqrt(2 w))."""
+    h = 2e-3
+    time = times(60.0, 0.05)
+    found = lock_in(time, reading("history-force", (h,), baseline(), time), OMEGA, 38.0, 60.0)
+    assert found.decay == pytest.approx(0.5 * h * math.sqrt(0.5 * OMEGA), rel=0.01)
+    shift = found.angular_frequency / OMEGA - 1.0
+    assert shift == pytest.approx(-0.5 * h / math.sqrt(2.0 * OMEGA), rel=0.01)

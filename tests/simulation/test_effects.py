@@ -1,0 +1,185 @@
+"""Simulated recordings with effects: each can be switched on, and what is wrong is said."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pendpipe.dynamics import Release, sample
+from pendpipe.effects.catalogue import CATALOGUE
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+from pendpipe.simulation.model import Model, read_model, simulate
+
+from ..effects.pendulums import VALUES
+
+FORENSIC: dict[str, dict[str, float]] = {
+    "broadband-drive": {"acceleration_density": 1e-8},
+    "clipping": {"upper_level": 0.12},
+    "missing-codes": {"number": 20},
+    "coarse-quantisation": {"step": 2e-3},
+    "jitter": {"sigma_t": 2e-3},
+    "glitches": {"number": 5, "rms": 0.02},
+    "coloured-noise": {"corner": 0.3, "exponent": 1.5},
+}
+
+TOML = """
+seed = 3
+noise_rad = 1e-5
+[pendulum]
+frequency_hz = 0.9
+quality_factor_viscous = 300.0
+a = 7e-3
+c = 1e-4
+release_angle_rad = 0.15
+release_time_s = -0.2
+[sampling]
+sample_rate_hz = 20.0
+duration_s = 40.0
+"""
+MEASURED = "[sensor]\nnoise_volts = 1e-4\n[converter]\n"
+
+
+def model(tmp_path: Path, more: str = "", text: str = TOML) -> Model:
+    path = tmp_path / "model.toml"
+    path.write_text(text + more, encoding="utf-8")
+    return read_model(path)
+
+
+def table(identifier: str, **values: float) -> str:
+    lines = [f"{name} = {value!r}" for name, value in values.items()]
+    return "\n".join(["[[effects]]", f'id = "{identifier}"', *lines, ""])
+
+
+def named(identifier: str) -> dict[str, float]:
+    if identifier in FORENSIC:
+        return FORENSIC[identifier]
+    effect = next(effect for effect in CATALOGUE if effect.identifier == identifier)
+    values = VALUES[identifier][1:] if effect.switch else VALUES[identifier]
+    return dict(zip((p.name for p in effect.parameters), values, strict=True))
+
+
+@pytest.mark.parametrize("identifier", [effect.identifier for effect in CATALOGUE])
+def test_each_effect_can_be_switched_on(identifier: str, tmp_path: Path) -> None:
+    """And changes the recording by more than its rounding."""
+    without = simulate(model(tmp_path, MEASURED))
+    found = simulate(model(tmp_path, MEASURED + table(identifier, **named(identifier))))
+    assert found.metadata["effects"] == identifier
+    change = np.abs(found.values - without.values)
+    assert np.max(change) > 2e-4, "about a code of 16 bits"
+    assert np.max(change) < 1.2
+
+
+def test_without_effects_it_is_eq8(tmp_path: Path) -> None:
+    described = model(tmp_path, text=TOML.replace("noise_rad = 1e-5", ""))
+    found = simulate(described)
+    expected = sample(described.pendulum.equation(), Release(-0.2, 0.15), found.time_s)
+    np.testing.assert_array_equal(found.values, expected)
+
+
+def test_effects_add_up(tmp_path: Path) -> None:
+    """A sensor's curvature on top of a jump of the pendulum's frequency."""
+    both = model(tmp_path, table("frequency-step", change=1e-3, time=20.0) +
+                 table("sensor-quadratic", s2=0.3), TOML.replace("1e-5", "0.0"))  # fmt: skip
+    one = model(tmp_path, table("frequency-step", change=1e-3, time=20.0),
+                TOML.replace("1e-5", "0.0"))  # fmt: skip
+    plain = simulate(one).values
+    np.testing.assert_allclose(simulate(both).values, plain + 0.3 * plain**2, 0.0, 1e-9)
+
+
+def test_friction_stops_it_near_eq8s_own_stop(tmp_path: Path) -> None:
+    """With an effect that does nothing, the motion is the engine's, and it rests within delta."""
+    text = TOML.replace("c = 1e-4", "c = 5e-3").replace("1e-5", "0.0")
+    described = model(tmp_path, table("cubic-stiffness", k3=0.0), text)
+    found = simulate(described)
+    expected = sample(described.pendulum.equation(), Release(-0.2, 0.15), found.time_s)
+    displacement = 0.5 * math.pi * 5e-3 / (2.0 * math.pi * 0.9)
+    assert np.ptp(found.values[-100:]) == 0.0
+    assert abs(found.values[-1]) < 2.0 * displacement
+    moving = np.abs(expected - expected[-1]) > 6.0 * displacement
+    last = int(np.flatnonzero(moving)[-1])
+    np.testing.assert_allclose(found.values[:last], expected[:last], 0.0, 1e-7)
+
+
+def tail(recording: Recording) -> NDArray[np.float64]:
+    return recording.values[len(recording.values) // 2 :]
+
+
+def test_broadband_drive_has_its_floor(tmp_path: Path) -> None:
+    """The variance at rest is S_a Q/(4 w^3)."""
+    density, omega, quality = 1e-8, 2.0 * math.pi * 0.9, 20.0
+    text = f"""
+seed = 5
+[pendulum]
+frequency_hz = 0.9
+quality_factor_viscous = {quality}
+release_angle_rad = 1e-9
+[sampling]
+sample_rate_hz = 20.0
+duration_s = 8000.0
+"""
+    shaken = simulate(model(tmp_path, table("broadband-drive", acceleration_density=density), text))
+    expected = math.sqrt(density * quality / (4.0 * omega**3))
+    # Half the record is some 570 correlation times: the rms is good to 3 %.
+    assert np.std(tail(shaken)) == pytest.approx(expected, rel=0.15)
+
+
+def test_jitter_is_noise_in_proportion_to_the_velocity(tmp_path: Path) -> None:
+    text = TOML.replace("1e-5", "0.0")
+    found = simulate(model(tmp_path, table("jitter", sigma_t=1e-3), text))
+    own = simulate(model(tmp_path, text=text))
+    velocity = np.gradient(own.values, own.time_s)
+    ratio = (found.values - own.values)[1:-1] / velocity[1:-1]
+    fast = np.abs(velocity[1:-1]) > 0.3
+    assert np.std(ratio[fast]) == pytest.approx(1e-3, rel=0.1)
+
+
+def test_coloured_noise_has_its_density(tmp_path: Path) -> None:
+    text = TOML.replace("1e-5", "1e-3").replace("0.15\n", "1e-9\n")
+    text = text.replace("duration_s = 40.0", "duration_s = 4000.0")
+    own = simulate(model(tmp_path, text=text))
+    found = simulate(model(tmp_path, table("coloured-noise", corner=1.0, exponent=2.0), text))
+    frequency = np.fft.rfftfreq(len(found.values), 0.05)
+    power = np.abs(np.fft.rfft(found.values)) ** 2 / np.abs(np.fft.rfft(own.values)) ** 2
+    low = (frequency > 0.05) & (frequency < 9.0)
+    np.testing.assert_allclose(power[low], 1.0 + frequency[low] ** -2.0, 1e-6)
+
+
+def test_clipping_glitches_steps_and_codes(tmp_path: Path) -> None:
+    clipped = simulate(model(tmp_path, table("clipping", upper_level=0.12))).values
+    assert clipped.max() == 0.12
+    assert clipped.min() < -0.13
+    stepped = simulate(model(tmp_path, table("coarse-quantisation", step=2e-3))).values
+    np.testing.assert_allclose(stepped / 2e-3, np.round(stepped / 2e-3), 0.0, 1e-9)
+    own = simulate(model(tmp_path)).values
+    glitched = simulate(model(tmp_path, table("glitches", number=7, rms=0.05))).values
+    assert np.count_nonzero(glitched != own) == 7
+    coarse = MEASURED + "bits = 8\n"
+    own_codes = set(simulate(model(tmp_path, coarse)).values)
+    fewer = set(simulate(model(tmp_path, coarse + table("missing-codes", number=2))).values)
+    assert len(own_codes) - len(fewer) == 2
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('[[effects]]\nid = "circular-eror"\n', "no effect 'circular-eror'; did you mean 'circ"),
+        ("[[effects]]\nk3 = 1.0\n", "effects 1: its id is missing"),
+        (table("cubic-stiffness", k4=1.0), "unknown parameter 'k4'; known are k3"),
+        (table("impulse", dv=1.0), "'time' is missing; add it, in s"),
+        (table("quadratic-drag", a=-1.0), "'a' is -1; give a number from 0 to 100, in 1/"),
+        ('[[effects]]\nid = "cubic-stiffness"\nk3 = "x"\n', "'k3' is no number"),
+        (table("missing-codes", number=3), "missing-codes without a converter"),
+        (table("coulomb-friction", c=1.0), "the pendulum does not swing"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(more: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        simulate(model(tmp_path, more), place="m.toml")
+    assert message in str(caught.value)
+    assert "m.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
