@@ -65,9 +65,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     return _described(data, fit, lattice, clipped, p_value)
 
 
-def _end(
-    data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str
-) -> End:
+def _end(data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str) -> End:
     sign = 1.0 if side == "upper" else -1.0
     named: Side = "upper" if side == "upper" else "lower"
     used = data.weight > 0.0
@@ -117,7 +115,7 @@ def _described(
     step = lattice.step if lattice is not None else 0.0
     for end in ends:
         mask |= end.at
-        parameters[f"{end.side}_level"] = Estimate(
+        parameters["high" if end.side == "upper" else "low"] = Estimate(
             end.level, step / math.sqrt(12.0), data.unit
         )
         if lattice is not None:

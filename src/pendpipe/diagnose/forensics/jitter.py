@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import read_codes
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
@@ -119,7 +119,7 @@ def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
     )
 
 
-def _speeds(fit: Fit, index: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _speeds(fit: Fit, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
     sampled = fit.at.sampled
     top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
     double = -top * np.cos(2.0 * sampled.phase[index])
@@ -144,20 +144,23 @@ def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = No
     share = float(np.mean(off**2 * squares.inverse)) / float(
         np.mean(squares.variance * squares.inverse)
     )
-    stretch = math.sqrt(share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights)))
+    stretch = math.sqrt(
+        share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights))
+    )
     total = float(rest @ off)
     return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
 
 
 def _fitted(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit the variance by columns, the first its level; sizes and their covariance."""
-    size, matrix = np.zeros(columns.shape[1]), np.eye(columns.shape[1])
+    size = np.zeros(columns.shape[1])
+    matrix: FloatArray = np.eye(columns.shape[1])
     size[0] = 1.0
     square = np.minimum(squares.square, 25.0 * _smooth_model(squares, columns, size))
     for _ in range(_ROUNDS):
         model = _smooth_model(squares, columns, size)
         weight = squares.inverse / (model / squares.expected) ** 2
-        matrix = np.linalg.inv(columns.T @ (weight[:, None] * columns))
+        matrix = np.asarray(np.linalg.inv(columns.T @ (weight[:, None] * columns)))
         size = matrix @ (columns.T @ (weight * square))
     return size, matrix
 
