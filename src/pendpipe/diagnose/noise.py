@@ -175,8 +175,8 @@ def _best_shape(power: FloatArray, frequency: FloatArray, interval: float) -> Fl
     white = np.array([math.log(level), -60.0, 1.0, 0.0])
     white[0] = math.log(_clipped_mean(power, level))
     best, least = white, cost(white)
-    # Without bounds the search now and then tries a level of exp(-1000).
-    bounds = [(white[0] - 12.0, white[0] + 12.0), (-12.0, 12.0), (0.3, _STEEPEST), (-0.95, 0.95)]
+    # Far below the powers all of them are clipped, and the cost would fall without end.
+    bounds = [(white[0] - 8.0, white[0] + 4.0), (-12.0, 12.0), (0.3, _STEEPEST), (-0.95, 0.95)]
     for start, frozen in (
         (np.array([white[0], 0.0, 1.0, 0.0]), (3,)),
         (np.array([white[0], -60.0, 1.0, 0.3]), (1, 2)),
