@@ -178,7 +178,8 @@ def _best_shape(power: FloatArray, frequency: FloatArray, interval: float) -> Fl
     white = np.array([math.log(level), -60.0, 1.0, 0.0])
     white[0] = math.log(_clipped_mean(power, level))
     best, least = white, cost(white)
-    bounds = [(white[0] - 5.0, white[0] + 5.0), (-12.0, 8.0), (0.3, _STEEPEST), (-0.95, 0.95)]
+    # Far below the powers all of them are clipped, and the cost would fall without end.
+    bounds = [(white[0] - 8.0, white[0] + 4.0), (-12.0, 8.0), (0.3, _STEEPEST), (-0.95, 0.95)]
     for start, frozen, worth in (
         (np.array([white[0], 0.0, 1.0, 0.0]), (3,), _WORTH[0]),
         (np.array([white[0], -60.0, 1.0, 0.3]), (1, 2), _WORTH[1]),

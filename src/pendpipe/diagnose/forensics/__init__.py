@@ -6,6 +6,7 @@ Every module has ``find(data, fit, noise, samples) -> Finding``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from pendpipe.analysis.turning_points.samples import Samples
@@ -49,8 +50,14 @@ def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Findin
     for find in TESTS.values():
         finding = find(data, fit, noise, samples)
         findings.append(finding)
-        if finding.mask is not None and finding.p_value < _SURE:
+        if finding.p_value > _SURE:
+            continue
+        if finding.mask is not None:
             data = data.masked((data.weight == 0.0) | finding.mask)
+        if finding.time_s is not None:
+            # To first order, the readings that the false stamps' moments would have had.
+            late = data.time_s - finding.time_s
+            data = replace(data, values=data.values + fit.at.sampled.velocity * late)
     return findings
 
 

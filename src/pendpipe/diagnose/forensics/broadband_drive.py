@@ -68,7 +68,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         np.append(amplitude.weight, phase.weight), np.append(amplitude.square, phase.square)
     )
     size, sd, gain = _likelihood(both)
-    gain = 0.0 if p_value > _SHOWN else min(gain, _BOTH * min(_likelihood(amplitude)[2], _likelihood(phase)[2]))
+    less = min(_likelihood(amplitude)[2], _likelihood(phase)[2])
+    gain = min(gain, _BOTH * less) if p_value < _SHOWN else 0.0
     return _described(data, fit, p_value, size / per_kick, sd / per_kick, gain)
 
 
@@ -136,7 +137,7 @@ def _described(
     floor = math.sqrt(best / (8.0 * omega**2 * linear))
     return Finding(
         "broadband-drive", p_value, gain,
-        {"acceleration_density": Estimate(best, sd, "(rad/s^2)^2/Hz")},
+        {"S_a": Estimate(best, sd, "rad^2/(s^4 Hz)")},
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(sampled.amplitude.min()), float(sampled.amplitude.max())),

@@ -22,7 +22,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 
-_FEWEST: Final = 3
+_FEWEST: Final = 2
 """Readings at the very end of the range that make a flat top."""
 _SHARED: Final = 0.1
 """Error in steps of the true angle that a window's readings share, where rounding is coarse."""
@@ -50,7 +50,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
         p = product over j of Phi((m + q/2 - x_j)/sigma_j),
 
-    the distribution of the largest reading. It counts only where at least three readings
+    the distribution of the largest reading. It counts only where two readings or more
     are the very same, as at the end of a converter's range.
     """
     if data.time_noise or data.used < 60 or not whole_readings(data, samples):
@@ -65,9 +65,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     return _described(data, fit, lattice, clipped, p_value)
 
 
-def _end(
-    data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str
-) -> End:
+def _end(data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str) -> End:
     sign = 1.0 if side == "upper" else -1.0
     named: Side = "upper" if side == "upper" else "lower"
     used = data.weight > 0.0
@@ -117,7 +115,7 @@ def _described(
     step = lattice.step if lattice is not None else 0.0
     for end in ends:
         mask |= end.at
-        parameters[f"{end.side}_level"] = Estimate(
+        parameters["high" if end.side == "upper" else "low"] = Estimate(
             end.level, step / math.sqrt(12.0), data.unit
         )
         if lattice is not None:

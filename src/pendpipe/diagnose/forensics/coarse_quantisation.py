@@ -15,8 +15,10 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 
-_DITHERED: Final = 0.5
-"""Noise before rounding, in steps, from which the errors know nothing of the codes."""
+_WELL_BELOW: Final = 0.25
+"""Noise before rounding, in steps, above which the step does not rule."""
+_RANDOM: Final = 20.0
+"""Amplitude in steps above which rounding errors are as good as random."""
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
@@ -26,9 +28,10 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
         (q/pi) sum over m of (-1)^m exp(-2 (pi m s/q)^2) sin(2 pi m x/q)/m,
 
-    which is nothing from s = q/2 on. The score is the errors' inner product with its first
-    term, of the sign that rounding has; white noise, or a step that noise dithers, gives a
-    standard normal number.
+    which is nothing from s = q/2 on. The size of its first term is measured by the errors'
+    inner product with it, and held against what a noise of a quarter step would leave: the
+    null is any noise above that. Where the amplitude stays above twenty steps the errors are
+    pseudo-random, do the fit no harm, and are a property of the record.
     """
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 60:
@@ -38,14 +41,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     error = coded.error - coded.error.mean()
     size = float(wave @ error) / float(wave @ wave)
     sd = math.sqrt(float(np.mean(error**2)) / float(wave @ wave))
-    score = size / sd
-    p_value = 0.5 * math.erfc(score / math.sqrt(2.0))
-    if coded.ratio >= _DITHERED:
-        p_value = max(p_value, 0.5 * math.erfc(2.0 / math.sqrt(2.0)))
+    allowed = math.exp(-2.0 * (math.pi * _WELL_BELOW) ** 2) / math.pi
+    p_value = 0.5 * math.erfc((size - allowed) / sd / math.sqrt(2.0))
     step, end = coded.lattice.step, float(fit.at.sampled.amplitude[-1])
     amplitude = fit.at.sampled.amplitude
     return Finding(
-        "coarse-quantisation", p_value, max(score, 0.0) ** 2,
+        "coarse-quantisation", p_value, max(size / sd, 0.0) ** 2,
         {
             "step": Estimate(step, 0.0, data.unit),
             "noise_over_step": Estimate(coded.ratio, 0.2 * coded.ratio, ""),
@@ -57,4 +58,5 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         ),
         summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
         f" that errors follow the codes; the amplitude ends at {end / step:.2g} steps",
+        kind="fault" if end < _RANDOM * step else "property",
     )  # fmt: skip

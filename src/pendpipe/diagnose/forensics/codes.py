@@ -90,7 +90,8 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     else:
         true = values - local.left
         blur = local.rms / step * math.sqrt(float(np.mean(np.abs(local.leverage[used]))))
-    return Coded(lattice, lattice.code[good], lattice.position(true[good]), blur, ratio, index[good])
+    position = lattice.position(true[good])
+    return Coded(lattice, lattice.code[good], position, blur, ratio, index[good])
 
 
 def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:

@@ -66,13 +66,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     gain -= 2.0 * (lines * math.log(near) + others * math.log(rest))
     slope, slope_sd = _slope(spectrum)
     word = "stronger" if ratio > 1.0 else "weaker"
+    parameters = {
+        "slope": Estimate(slope, slope_sd, ""),
+        "density_ratio": Estimate(ratio, ratio * sd, ""),
+    }
     return Finding(
-        "coloured-noise", min(p_value, 1.0), max(gain, 0.0),
-        {
-            "density_ratio": Estimate(ratio, ratio * sd, ""),
-            "exponent": Estimate(slope, slope_sd, ""),
-            "memory": Estimate(noise.memory, 0.02, ""),
-        },
+        "coloured-noise", min(p_value, 1.0), max(gain, 0.0), parameters,
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             frequency_hz=(_NEAR[0] * frequency_hz, _NEAR[1] * frequency_hz),
@@ -85,8 +84,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 def _spectrum(data: Data, residual: FloatArray, frequency_hz: float) -> Spectrum:
     count = len(residual)
     window = 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
-    power = np.abs(np.fft.rfft(residual * window)) ** 2
-    frequency = np.fft.rfftfreq(count, data.interval_s)
+    power = np.asarray(np.abs(np.fft.rfft(residual * window)) ** 2, dtype=np.float64)
+    frequency: FloatArray = np.asarray(np.fft.rfftfreq(count, data.interval_s), dtype=np.float64)
     kept = (frequency > _LOW * frequency_hz) & (frequency > 0.05)
     kept &= np.arange(len(frequency)) < len(frequency) - 2
     for harmonic in range(1, _HARMONICS + 1):

@@ -90,9 +90,7 @@ def own_error(local: Local) -> FloatArray:
 def _largest_about(error: FloatArray) -> FloatArray:
     """The largest of each reading and its neighbours."""
     padded = np.pad(error, _NEAR)
-    return np.asarray(
-        np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1).max(axis=1)
-    )
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1).max(axis=1))
 
 
 def _smallest(sorted_error: FloatArray) -> float:
@@ -128,9 +126,14 @@ def _described(
     amplitude = sampled.amplitude[mask]
     largest = int(np.argmax(np.abs(size)))
     number = int(np.count_nonzero(mask))
+    own = math.sqrt(float(np.mean(reading**2)))
     rms = math.sqrt(float(np.mean(residual[~mask & (data.weight > 0.0)] ** 2)))
     parameters = {
-        "number": Estimate(float(number), math.sqrt(number) if number > 1 else 0.0, ""),
+        "number": Estimate(float(number), 0.0, ""),
+        "share": Estimate(number / data.used, math.sqrt(number) / data.used, ""),
+        "rms": Estimate(
+            own, max(own / math.sqrt(2.0 * number), rms / math.sqrt(number)), data.unit
+        ),
         "largest": Estimate(float(reading[largest]), rms, data.unit),
         "largest_time": Estimate(float(when[largest]), 0.0, "s"),
     }

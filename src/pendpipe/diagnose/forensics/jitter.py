@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import read_codes
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
@@ -26,6 +26,7 @@ _AGREE: Final = 2.6
 _DITHERED: Final = 0.7
 """Noise before rounding, in steps, from which rounding is part of the noise."""
 _ROUNDS: Final = 6
+_STEP: Final = 0.05
 
 
 class Squares(NamedTuple):
@@ -37,6 +38,8 @@ class Squares(NamedTuple):
         In units of the usual variance `unit`.
     expected, variance
         What they are, and vary by, without jitter.
+    gain
+        By how much `expected` grows with the variance before rounding (1 where dithered).
     mean, double
         The parts of v^2 that follow the amplitude, (omega A)^2/2, and twice the frequency,
         -(omega A)^2 cos(2 psi)/2; in units of `speed`.
@@ -44,15 +47,20 @@ class Squares(NamedTuple):
         Variance of one reading, rad^2.
     speed
         Mean of v^2, (rad/s)^2.
+    shared
+        Part of the freedom that the local fits have taken: by it fewer squares are
+        independent.
     """
 
     square: FloatArray
     expected: FloatArray
     variance: FloatArray
+    gain: FloatArray
     mean: FloatArray
     double: FloatArray
     unit: float
     speed: float
+    shared: float = 0.0
 
     @property
     def inverse(self) -> FloatArray:
@@ -75,8 +83,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if len(squares.square) < 50:
         return nothing("jitter")
     p_value = _chance(squares, squares.mean + squares.double)
-    columns = np.stack([squares.expected, squares.mean, squares.double], axis=1)
-    size, covariance = _fitted(squares, columns)
+    size, covariance = _fitted(squares, [squares.mean, squares.double])
     spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
     if size[2] - size[1] < -_AGREE * spread:
         p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
@@ -88,11 +95,13 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares:
     sampled, used = fit.at.sampled, data.weight > 0.0
     residual = residual_of(data, fit)
     white = whitened_in_time(residual, noise)
-    scaled = local_residual(sampled.phase, white, used).scaled[used]
+    local = local_residual(sampled.phase, white, used)
+    scaled = local.scaled[used]
     unit = noise.white_rms**2
     mean, double, speed = _speeds(fit, np.flatnonzero(used))
     ones = np.ones(len(scaled))
-    return Squares(scaled**2, ones, 2.0 * ones, mean, double, unit, speed)
+    shared = float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5))
+    return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit, speed, shared)
 
 
 def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
@@ -109,17 +118,28 @@ def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
     if np.count_nonzero(moving) < 50:
         moving[:] = True
     place = coded.position[moving] - np.round(coded.position[moving])
-    expected, variance = rounding_moments(place, coded.ratio, coded.blur)
+    before = math.hypot(coded.ratio, coded.blur)
+    expected, variance = rounding_moments(place, before)
+    more, less = (1.0 + _STEP) * before, (1.0 - _STEP) * before
+    gain = rounding_moments(place, more)[0] - rounding_moments(place, less)[0]
+    gain /= more**2 - less**2
     square = coded.error[moving] ** 2
     unit = float(np.mean(square))
     mean, double, speed = _speeds(fit, index[moving])
     step = coded.lattice.step
     return Squares(
-        square / unit, expected / unit, variance / unit**2, mean, double, unit * step**2, speed
+        square / unit,
+        expected / unit,
+        variance / unit**2,
+        np.maximum(gain, 0.0),
+        mean,
+        double,
+        unit * step**2,
+        speed,
     )
 
 
-def _speeds(fit: Fit, index: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _speeds(fit: Fit, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
     sampled = fit.at.sampled
     top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
     double = -top * np.cos(2.0 * sampled.phase[index])
@@ -130,47 +150,50 @@ def _speeds(fit: Fit, index: FloatArray) -> tuple[FloatArray, FloatArray, float]
 def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
     """Chance of a weighted sum of squares as large, the noise's own level unknown."""
     capped = np.minimum(squares.square, _FAR**2 * squares.expected.mean())
-    columns = [squares.expected] if beside is None else [squares.expected, beside]
+    columns = [squares.gain] if beside is None else [squares.gain, squares.gain * beside]
     # What the level (and what stands beside) can do is taken off, by least squares.
     basis, inverse = np.stack(columns, axis=1), squares.inverse
-    solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * weight))
-    rest = (weight - basis @ solved) * inverse
-    level = float(np.sum(capped * squares.expected * inverse)) / float(
-        np.sum(squares.expected**2 * inverse)
+    wanted = squares.gain * weight
+    solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * wanted))
+    rest = (wanted - basis @ solved) * inverse
+    off = capped - squares.expected
+    level = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
+    off = off - level * squares.gain
+    weights = rest * squares.expected
+    # How much wider or narrower than independent squares of normal numbers.
+    share = (
+        float(np.mean(off**2 * squares.inverse))
+        / float(np.mean(squares.variance * squares.inverse))
+        / (1.0 - squares.shared)
     )
-    off = capped - level * squares.expected
-    weights = rest * squares.expected * level
-    # How much wider or narrower than squares of normal numbers: tails, or rounding.
-    share = float(np.mean(off**2 * squares.inverse)) / float(
-        np.mean(squares.variance * squares.inverse)
+    stretch = math.sqrt(
+        share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights))
     )
-    stretch = math.sqrt(share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights)))
     total = float(rest @ off)
     return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
 
 
-def _fitted(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit the variance by columns, the first its level; sizes and their covariance."""
-    size, matrix = np.zeros(columns.shape[1]), np.eye(columns.shape[1])
-    size[0] = 1.0
-    square = np.minimum(squares.square, 25.0 * _smooth_model(squares, columns, size))
+def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Fit what adds to the variance: a level, and parts; sizes and their covariance."""
+    columns = squares.gain[:, None] * np.stack([np.ones(len(squares.gain)), *parts], axis=1)
+    size = np.zeros(columns.shape[1])
+    matrix: FloatArray = np.eye(columns.shape[1])
+    off = np.minimum(squares.square, 25.0 * squares.expected.mean()) - squares.expected
     for _ in range(_ROUNDS):
-        model = _smooth_model(squares, columns, size)
+        model = np.maximum(squares.expected + columns @ size, 0.1 * squares.expected)
         weight = squares.inverse / (model / squares.expected) ** 2
-        matrix = np.linalg.inv(columns.T @ (weight[:, None] * columns))
-        size = matrix @ (columns.T @ (weight * square))
+        matrix = np.asarray(np.linalg.inv(columns.T @ (weight[:, None] * columns)))
+        size = matrix @ (columns.T @ (weight * off))
     return size, matrix
 
 
-def _smooth_model(squares: Squares, columns: FloatArray, size: FloatArray) -> FloatArray:
-    return np.asarray(np.maximum(columns @ size, 0.1 * squares.expected))
-
-
 def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
-    columns = np.stack([squares.expected, squares.mean + squares.double], axis=1)
-    size, covariance = _fitted(squares, columns)
-    model = _smooth_model(squares, columns, size)
-    plain = float(squares.square.mean() / squares.expected.mean()) * squares.expected
+    speed = squares.mean + squares.double
+    size, covariance = _fitted(squares, [speed])
+    lowest = 0.1 * squares.expected
+    model = squares.expected + squares.gain * (size[0] + size[1] * speed)
+    plain = squares.expected + squares.gain * _fitted(squares, [])[0][0]
+    model, plain = np.maximum(model, lowest), np.maximum(plain, lowest)
     gain = np.log(plain / model) + squares.square * (1.0 / plain - 1.0 / model)
     to_seconds = squares.unit / squares.speed
     share = max(float(size[1]), 0.0)
@@ -180,7 +203,7 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
     error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
     sampled = fit.at.sampled
     omega = sampled.motion.angular_frequency
-    factor = 1.0 + share / max(float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
+    factor = 1.0 + share / max(1.0 + float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
     return Finding(
         "jitter", p_value, max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
         {"sigma_t": Estimate(seconds, error, "s")},

@@ -103,9 +103,7 @@ def noise_before_rounding(local: Local, step: float) -> float:
     return best * step
 
 
-def rounding_moments(
-    fraction: FloatArray, ratio: float, blur: float = 0.0
-) -> tuple[FloatArray, FloatArray]:
+def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
     """Mean square, and its variance, of what rounding and noise add to a value.
 
     Parameters
@@ -114,8 +112,6 @@ def rounding_moments(
         The value's place between codes, in steps: 0 at a code; shape (n,).
     ratio
         Noise before rounding, in steps.
-    blur
-        Error of the value itself, in steps.
 
     Returns
     -------
@@ -125,7 +121,6 @@ def rounding_moments(
     from scipy.special import ndtr
 
     grid = np.linspace(-0.5, 0.5, 65)
-    ratio = math.hypot(ratio, blur)
     reach = int(np.ceil(5.0 * ratio)) + 1
     codes = np.arange(-reach, reach + 1)
     chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(

@@ -84,7 +84,7 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
     # (S^-1)_jj = (2/n) sum of cos^2(pi k (2 j + 1)/(2 n))/S_k, from a sum of cosines.
     doubled = np.fft.rfft(inverse, n=2 * count).real
     odd = 2 * np.arange(count) + 1
-    diagonal = (inverse.sum() - inverse[0] + doubled[np.where(odd <= count, odd, 2 * count - odd)])
+    diagonal = inverse.sum() - inverse[0] + doubled[np.where(odd <= count, odd, 2 * count - odd)]
     return np.asarray(filtered / np.sqrt(diagonal / count))
 
 

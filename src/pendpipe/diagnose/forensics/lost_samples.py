@@ -109,9 +109,7 @@ def _trend(step: FloatArray) -> FloatArray:
     )
 
 
-def _instant(
-    data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle: int
-) -> float:
+def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle: int) -> float:
     """The reading from which the later phase fits better than the earlier one."""
     sampled = fit.at.sampled
     inside = (sampled.phase > centre[cycle - 1]) & (sampled.phase < centre[cycle + 1])

@@ -55,7 +55,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if p_value > 0.01:
         return Finding("missing-codes", p_value, summary="codes come as often as they should")
     bad = np.minimum(chance * looked, 1.0) < _FEW
-    return _described(data, fit, coded, occupation, bad, bit if bits <= single else None, p_value)
+    return _described(data, coded, occupation, bad, bit if bits <= single else None, p_value)
 
 
 def occupied(coded: Coded) -> Occupation:
@@ -65,20 +65,19 @@ def occupied(coded: Coded) -> Occupation:
     spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
     shift = _DOUBT + 2.0 * coded.blur
     size = last - first + 1
-    shapes = [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
+    shapes = [
+        _expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)
+    ]
     inside = slice(2, -2)
     codes = np.arange(first, last + 1)
     low, high = np.min(shapes, axis=0), np.max(shapes, axis=0)
-    return Occupation(
-        codes[inside], found[inside], low[inside], high[inside], shapes[1][inside]
-    )
+    return Occupation(codes[inside], found[inside], low[inside], high[inside], shapes[1][inside])
 
 
 def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
     """Sum over readings of P(code), by a fine histogram of the angles."""
-    from scipy.special import ndtr
-
     from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.special import ndtr
 
     fine = 10 if spread < 1.0 else 4
     cells = np.bincount(
@@ -147,36 +146,39 @@ def _halves(residue: FloatArray, run: int) -> FloatArray:
 
 def _in_a_half(coded: Coded, run: int) -> float:
     """How many readings in a row are in the same half."""
-    changes = np.count_nonzero(np.diff(np.floor(coded.position / run)))
+    changes = int(np.count_nonzero(np.diff(np.floor(coded.position / run))))
     return len(coded.position) / max(changes, 1)
 
 
 def _described(
-    data: Data, fit: Fit, coded: Coded, occupation: Occupation, bad: BoolArray,
+    data: Data, coded: Coded, occupation: Occupation, bad: BoolArray,
     bit: tuple[int, float] | None, p_value: float,
 ) -> Finding:  # fmt: skip
     step = coded.lattice.step
     found, expected = occupation.found[bad], occupation.expected[bad]
-    codes = occupation.code[bad]
     likely = np.where(found > 0.0, found * np.log(np.maximum(found, 1e-9) / expected), 0.0)
     gain = 2.0 * float(np.sum(likely - found + expected))
-    seldom = codes[found < expected]
+    fewer = found < expected
+    seldom = occupation.code[bad][fewer]
+    due, came = float(expected[fewer].sum()), float(found[fewer].sum())
+    readings = len(coded.code)
     parameters = {
+        "share": Estimate((due - came) / readings, math.sqrt(max(due, 1.0)) / readings, ""),
         "number": Estimate(float(len(seldom)), 0.0, ""),
-        "found": Estimate(float(found.sum()), math.sqrt(max(float(found.sum()), 1.0)), ""),
-        "expected": Estimate(float(expected.sum()), 0.0, ""),
+        "found": Estimate(came, math.sqrt(max(came, 1.0)), ""),
+        "expected": Estimate(due, 0.0, ""),
     }
     if bit is not None:
         parameters["bit"] = Estimate(float(bit[0]), 0.0, "")
+        parameters["share"] = Estimate(0.5, 0.5 / math.sqrt(readings), "")
+        gain = max(gain, -2.0 * math.log(max(p_value, 1e-300)))
         summary = f"bit {bit[0]} of the converter is stuck or sticky: {100 * bit[1]:.0f} % of the"
         summary += " readings lie in one half of its codes"
     else:
         named = ", ".join(str(code) for code in seldom[:5]) + (", ..." if len(seldom) > 5 else "")
         summary = f"{len(seldom)} code(s) ({named}, in steps of {step:.4g} {data.unit}) came"
-        summary += f" {int(occupation.found[bad][found < expected].sum())} times where"
-        summary += f" {occupation.expected[bad][found < expected].sum():.0f} were due"
-    shown = seldom if len(seldom) else codes
+        summary += f" {came:.0f} times where {due:.0f} were due"
     return Finding(
         "missing-codes", p_value, gain, parameters,
-        Location(adc_codes=tuple(int(code) for code in shown[:_SHOWN])), summary=summary,
+        Location(adc_codes=tuple(int(code) for code in seldom[:_SHOWN])), summary=summary,
     )  # fmt: skip

@@ -1,0 +1,240 @@
+"""Each fault of the measurement is found, measured, and taken for no other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import gather
+from pendpipe.diagnose.forensics import TESTS, Finding, examine, find_lost_samples
+from pendpipe.diagnose.model import Model
+from pendpipe.diagnose.refine import refine
+from pendpipe.effects.cubic_stiffness import CubicStiffness
+
+from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
+from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
+
+FOUND = 1e-3
+
+
+@pytest.fixture(scope="module")
+def clean() -> FloatArray:
+    return AIR.model().reading(AIR.values())
+
+
+def generator(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng([17, seed])
+
+
+def found(record: Fitted) -> dict[str, Finding]:
+    findings = examine(record.data, record.fit, record.noise, record.samples)
+    return {
+        name: finding
+        for name, finding in zip(TESTS, findings, strict=True)
+        if finding.p_value < FOUND
+    }
+
+
+@pytest.mark.parametrize("fault", list(FAULTS))
+def test_a_fault_is_found_and_no_other(fault: str, clean: FloatArray) -> None:
+    test, make = FAULTS[fault]
+    findings = found(make(clean, generator(1)))
+    assert list(findings) == [test]
+    assert findings[test].delta_chi2 > 10.0
+    assert findings[test].summary
+
+
+def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
+    where = np.array([5, 700, 701, 2000, 3998])
+    readings = clean + white(generator(), AIR.count)
+    readings[where] += np.array([1.0, -1.0, 1.0, 1.0, -1.0]) * 15.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+    assert finding.parameters["number"].value == len(where)
+    assert finding.parameters["rms"].value == pytest.approx(15.0 * NOISE, rel=0.15)
+    assert finding.location.time_s == (AIR.times()[5], AIR.times()[3998])
+
+
+def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:
+    noisy, where = FAULTS["memory 0.5"].make(clean, generator()), [300, 2500]
+    readings = noisy.data.values.copy()
+    readings[where] += 20.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where
+
+
+def test_a_step_of_the_level_is_no_glitch(clean: FloatArray) -> None:
+    readings = clean + white(generator(), AIR.count)
+    readings[1500:] += 10.0 * NOISE
+    finding = found(fitted(AIR, readings)).get("glitches")
+    assert finding is None or finding.mask is None or np.count_nonzero(finding.mask) < 3
+
+
+def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None:
+    readings = rounded(np.clip(clean + white(generator(), AIR.count), -0.125, 0.13), STEP_16)
+    finding = found(fitted(AIR, readings))["clipping"]
+    assert finding.parameters["high"].value == pytest.approx(0.13, abs=STEP_16)
+    assert finding.parameters["low"].value == pytest.approx(-0.125, abs=STEP_16)
+    assert finding.mask is not None
+    assert np.array_equal(finding.mask, (readings > 0.1299) | (readings < -0.1249))
+    ends = [round(level / STEP_16) for level in (0.13, -0.125)]
+    assert finding.location.adc_codes == pytest.approx(ends, abs=1)
+
+
+@pytest.mark.parametrize("codes", [(20,), (-40, -7, 11)])
+def test_codes_that_never_come_are_named(codes: tuple[int, ...], clean: FloatArray) -> None:
+    exact = np.round((clean + 10.0 * white(generator(), AIR.count)) / STEP_12).astype(np.int64)
+    finding = found(fitted(AIR, STEP_12 * (exact - np.isin(exact, codes))))["missing-codes"]
+    assert finding.location.adc_codes == codes
+    missed = np.mean(np.isin(exact, codes))
+    assert finding.parameters["share"].value == pytest.approx(missed, abs=4e-3)
+    assert finding.parameters["found"].value == 0.0
+
+
+@pytest.mark.parametrize("bit", [2, 4])
+def test_a_stuck_bit_is_named(bit: int, clean: FloatArray) -> None:
+    code = np.round((clean + white(generator(), AIR.count)) / STEP_16).astype(np.int64)
+    finding = found(fitted(AIR, STEP_16 * (code & ~(1 << bit))))["missing-codes"]
+    assert finding.parameters["bit"].value == bit
+
+
+def test_a_step_is_said_to_rule_only_where_it_does(clean: FloatArray) -> None:
+    noise = generator().standard_normal(AIR.count)
+    coarse = fitted(AIR, rounded(clean + 0.1 * STEP_12 * noise, STEP_12))
+    finding = TESTS["coarse-quantisation"](coarse.data, coarse.fit, coarse.noise, coarse.samples)
+    assert finding.p_value < 1e-10
+    # The amplitude ends at 12 steps.
+    assert finding.kind == "fault"
+    assert finding.parameters["step"].value == pytest.approx(STEP_12, rel=1e-6)
+    assert finding.parameters["noise_over_step"].value == pytest.approx(0.1, rel=0.3)
+    fine = fitted(AIR, rounded(clean + 0.1 * STEP_16 * noise, STEP_16))
+    finding = TESTS["coarse-quantisation"](fine.data, fine.fit, fine.noise, fine.samples)
+    assert finding.kind == "property"
+
+
+@pytest.mark.parametrize("sigma_t", [1.5e-4, 1e-3])
+@pytest.mark.parametrize("step", [0.0, STEP_16, 0.25 * STEP_12])
+def test_jitter_is_measured(sigma_t: float, step: float, clean: FloatArray) -> None:
+    pulls = []
+    for seed in range(4):
+        draw = generator(seed)
+        readings = clean + white(draw, AIR.count)
+        readings = readings + sigma_t * speed(clean) * draw.standard_normal(AIR.count)
+        record = fitted(AIR, rounded(readings, step) if step else readings)
+        finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
+        estimate = finding.parameters["sigma_t"]
+        pulls.append((estimate.value - sigma_t) / estimate.sd)
+        assert finding.variance is not None
+        assert finding.variance.shape == (AIR.count,)
+        assert finding.variance.min() >= 1.0
+    assert np.mean(np.abs(pulls)) < 2.0
+
+
+def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> None:
+    draw = generator()
+    envelope = 0.15 * np.exp(-AIR.times() / 60.0)
+    readings = clean + white(draw, AIR.count) * (1.0 + 10.0 * envelope)
+    assert "jitter" not in found(fitted(AIR, readings))
+
+
+def test_gain_noise_is_no_jitter(clean: FloatArray) -> None:
+    draw = generator()
+    readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + white(draw, AIR.count)
+    assert "jitter" not in found(fitted(AIR, readings))
+
+
+def test_colour_is_measured(clean: FloatArray) -> None:
+    finding = found(FAULTS["memory 0.5"].make(clean, generator(3)))["coloured-noise"]
+    # AR(1) of 0.5: at 0.9 Hz of 20, S/mean = 0.75/(1.25 - cos(2 pi 0.045)) = 2.57; the band
+    # reaches to three times that.
+    assert 1.9 < finding.parameters["density_ratio"].value < 2.8
+
+
+def test_a_random_torque_is_measured(clean: FloatArray) -> None:
+    pulls = []
+    for seed in range(4):
+        finding = found(FAULTS["torque of 1e-8"].make(clean, generator(seed)))["broadband-drive"]
+        estimate = finding.parameters["S_a"]
+        pulls.append((estimate.value - 1e-8) / estimate.sd)
+    assert np.mean(np.abs(pulls)) < 2.0
+
+
+def test_stiffness_left_out_is_no_random_torque() -> None:
+    stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (CubicStiffness(),))
+    readings = stiff.reading(np.append(AIR.values(), 3e-3)) + white(generator(), AIR.count)
+    record = fitted(AIR, readings)
+    assert record.fit.chi2 > 1.1 * AIR.count
+    assert found(record) == {}
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_stamps_are_believed_where_they_are_true(share: float, clean: FloatArray) -> None:
+    draw = generator()
+    stamps = AIR.times() + draw.uniform(-5e-4, 5e-4, AIR.count)
+    true = stamps + share * (AIR.times() - stamps)
+    readings = Model(true, 1.0 / AIR.rate_hz).reading(AIR.values()) + white(draw, AIR.count)
+    record = fitted(AIR, readings, stamps)
+    finding = TESTS["time-stamps"](record.data, record.fit, record.noise, record.samples)
+    estimate = finding.parameters["share"]
+    assert estimate.value == pytest.approx(share, abs=4.0 * estimate.sd)
+    assert (finding.time_s is not None) == (share == 1.0)
+    if finding.time_s is not None:
+        assert finding.time_s == pytest.approx(AIR.times(), abs=5e-5)
+
+
+def test_gaps_in_the_stamps_are_said_and_no_fault(clean: FloatArray) -> None:
+    kept = np.ones(AIR.count, dtype=bool)
+    kept[1000:1050] = kept[3000] = False
+    record = fitted(AIR, (clean + white(generator(), AIR.count))[kept], AIR.times()[kept])
+    findings = found(record)
+    assert list(findings) == ["gaps"]
+    gaps = findings["gaps"]
+    assert gaps.kind == "property"
+    assert gaps.identifier == "dropped-samples"
+    assert gaps.parameters["missing_samples"].value == 51
+    assert gaps.parameters["longest"].value == pytest.approx(51 / AIR.rate_hz)
+
+
+@pytest.mark.parametrize("lost", [{1234: 1}, {200: 1, 900: 1, 1500: 2, 2600: 1}, {1500: -1}])
+def test_lost_samples_are_found_before_they_spoil_the_rest(lost: dict[int, int]) -> None:
+    longer = Pendulum(count=AIR.count + 10)
+    motion, row = longer.model().reading(longer.values()), np.arange(AIR.count)
+    for place, number in lost.items():
+        row = row + number * (row >= place)
+    readings = motion[row] + white(generator(), AIR.count)
+    record = fitted(AIR, readings)
+    candidates = find_lost_samples(record.data, record.fit)
+    assert [candidate.number for candidate in candidates] == list(lost.values())
+    begun = np.flatnonzero(np.diff(row) != 1) + 1
+    for candidate, place in zip(candidates, begun, strict=True):
+        assert candidate.measured == pytest.approx(candidate.number, abs=0.1)
+        assert candidate.time_s == pytest.approx(AIR.times()[place], abs=2.1 / AIR.rate_hz)
+
+
+def test_means_of_many_readings_are_judged_by_the_readings() -> None:
+    fast = Pendulum(rate_hz=400.0, count=20_000)
+    draw = generator()
+    motion = fast.model().reading(fast.values())
+    exact = np.round((motion + 1e-3 * draw.standard_normal(fast.count)) / STEP_12).astype(np.int64)
+    readings = STEP_12 * (exact + np.isin(exact, (30,)))
+    record = fitted(fast, readings)
+    folded = gather(
+        record.samples.time_s, readings, step=STEP_12, unit="rad", counts=False,
+        period_s=1.0 / FREQUENCY_HZ, most=5000,
+    )  # fmt: skip
+    assert len(folded) < fast.count // 3
+    model = Model(folded.time_s, folded.interval_s)
+    noise = replace(
+        record.noise, variance=record.noise.variance[: len(folded)], weight=folded.weight
+    )
+    fit = refine(model, folded, noise, fast.values())
+    samples: Samples = record.samples
+    finding = TESTS["missing-codes"](folded, fit, noise, samples)
+    assert finding.p_value < FOUND
+    assert finding.location.adc_codes == (30,)

@@ -1,0 +1,87 @@
+"""Noise alone is taken for no fault, whatever its kind."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.forensics import TESTS, find_lost_samples
+from pendpipe.diagnose.forensics.tails import fit_tail
+from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
+
+from .decays import Pendulum
+from .faults import NOISES, null
+
+_RECORDS = 6
+CLEAN: dict[Pendulum, FloatArray] = {}
+
+
+def p_values(kind: str) -> dict[str, FloatArray]:
+    found: dict[str, list[float]] = {name: [] for name in TESTS}
+    for seed in range(_RECORDS):
+        record = null(seed, kind, CLEAN)
+        assert find_lost_samples(record.data, record.fit) == []
+        for name, find in TESTS.items():
+            finding = find(record.data, record.fit, record.noise, record.samples)
+            found[name].append(finding.p_value if finding.kind == "fault" else 1.0)
+    return {name: np.array(values) for name, values in found.items()}
+
+
+@pytest.mark.parametrize("kind", list(NOISES))
+def test_noise_is_no_fault(kind: str) -> None:
+    for name, values in p_values(kind).items():
+        assert values.shape == (_RECORDS,)
+        assert np.all((values >= 0.0) & (values <= 1.0)), name
+        # Six records and nine tests: one in twenty suites would see p < 1e-3 once.
+        assert values.min() > 2e-4, name
+
+
+def test_the_jitter_test_says_p_as_often_as_p() -> None:
+    values = np.concatenate([p_values(kind)["jitter"] for kind in ("white", "Student, nu = 5")])
+    # Kolmogorov and Smirnov's distance from the diagonal, at 1 %.
+    ordered, steps = np.sort(values), np.arange(1, len(values) + 1) / len(values)
+    distance = np.max(np.maximum(steps - ordered, ordered - (steps - 1.0 / len(values))))
+    assert distance < 1.63 / math.sqrt(len(values))
+
+
+@pytest.mark.parametrize("freedom", [1e9, 8.0])
+def test_the_largest_of_many_errors_is_judged_by_their_tail(freedom: float) -> None:
+    generator = np.random.default_rng(4)
+    chances = []
+    for _ in range(300):
+        size = np.sort(np.abs(generator.standard_t(freedom, 3000)))
+        chances.append(-math.expm1(3000.0 * math.log1p(-float(fit_tail(size, 1).beyond(size[-1])))))
+    for level in (0.3, 0.1):
+        expected = level * len(chances)
+        assert np.sum(np.array(chances) < level) < expected + 3.3 * math.sqrt(expected)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (5.0, 1.0, 0.2, 0.1), (2.0, -1.0, 0.5)])
+def test_weighted_squares_are_as_large_as_often_as_drawn_ones(weights: tuple[float, ...]) -> None:
+    weight = np.array(weights)
+    drawn = np.random.default_rng(0).standard_normal((400_000, len(weight))) ** 2 @ weight
+    for share in (0.9, 0.5, 0.1, 0.01, 0.001):
+        total = float(np.quantile(drawn, 1.0 - share))
+        assert tail_of_squares(total, weight) == pytest.approx(share, rel=0.12)
+
+
+def test_one_square_of_many_is_chi_squared() -> None:
+    from scipy.stats import chi2
+
+    for total in (20.0, 60.0, 120.0, 300.0):
+        wanted = float(chi2.sf(total, 60))
+        assert tail_of_squares(total, np.ones(60)) == pytest.approx(wanted, rel=0.02)
+
+
+def test_an_encoders_counts_have_no_codes_and_no_jitter() -> None:
+    from dataclasses import replace
+
+    record = null(0, "12 bit, 0.8 steps", CLEAN)
+    samples: Samples = replace(record.samples, counts=True, step=None)
+    data = replace(record.data, time_noise=True)
+    for name in ("missing-codes", "coarse-quantisation", "jitter", "clipping", "coloured-noise"):
+        assert TESTS[name](data, record.fit, record.noise, samples).p_value == 1.0
