@@ -54,11 +54,10 @@ class Shown:
 
     @property
     def extended_name(self) -> str:
-        """For legends: what was added, by its identifiers."""
+        """For legends: what was added."""
         found = [effect.identifier for effect in self.diagnosis.effects]
-        if len(found) > 2:
-            return f"with {found[0]} and {len(found) - 1} more"
-        return "with " + " and ".join(found)
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        return f"with {found[0]}{more}"
 
     def residual(self, fit: Fit) -> FloatArray:
         """Readings minus model, NaN where a reading is masked; shape (n,)."""
