@@ -40,6 +40,16 @@ class Cycles:
     phase: FloatArray
     sd: FloatArray
 
+    def at(self, time_s: FloatArray) -> Cycles:
+        """Return the same at other times: amplitude and frequency change slowly."""
+        known = self.time_s
+        pace = (self.phase[-1] - self.phase[0]) / (known[-1] - known[0])
+        slow = self.phase - pace * known
+        return Cycles(
+            time_s, np.exp(np.interp(time_s, known, np.log(self.amplitude))),
+            pace * time_s + np.interp(time_s, known, slow), np.interp(time_s, known, self.sd),
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Spans:

@@ -140,7 +140,7 @@ def _tone_leads(scanner: Scanner, residual: FloatArray) -> list[Lead]:
     leads = []
     for effect in scanner.spectral:
         found = []
-        for scan, dying in zip(scanner.scans, (None, *_DYING), strict=True):
+        for scan, dying in zip(scanner.scans, (None, *_DYING), strict=False):
             scores = scan.scores(residual)
             index = int(np.argmax(scores))
             score = float(scores[index])

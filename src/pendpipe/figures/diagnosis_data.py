@@ -61,7 +61,7 @@ class Shown:
 
     def residual(self, fit: Fit) -> FloatArray:
         """Readings minus model, NaN where a reading is masked; shape (n,)."""
-        left = self.data.values - fit.at.reading
+        left = self.data.residual(fit.at.reading)
         return np.where(self.data.weight > 0.0, left, math.nan)
 
     @cached_property
@@ -84,9 +84,9 @@ class Shown:
         return between(self._measured, self._ends)
 
     def of_model(self, fit: Fit) -> Spans:
-        """The same of a model's readings, between the same cycles."""
-        found = cycles(fit.at.reading, self.data.weight, self.clock, 0.0)
-        return between(found, self._ends)
+        """The same of a model's readings, between the same times."""
+        own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
+        return between(own.at(self._measured.time_s), self._ends)
 
 
 def shown(outcome: Outcome) -> Shown:

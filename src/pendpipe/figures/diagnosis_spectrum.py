@@ -50,11 +50,12 @@ def draw(content: Shown) -> Figure:
 
 
 def _plain(axes: Axes) -> None:
-    """Numbers instead of powers of ten along the frequency."""
+    """Numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     axes.tick_params(which="minor", length=0)
 
 
