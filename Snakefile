@@ -1,5 +1,5 @@
 # The campaign: acquire -> calibrate -> turning points -> fit -> separate -> compare ->
-# figures -> report. A stage's rule is in workflow/rules, its work in src/pendpipe.
+# figures -> report, and beside the fit the diagnosis. A stage's rule is in workflow/rules, its work in src/pendpipe.
 from snakemake.utils import min_version
 
 min_version("9.8")
@@ -13,6 +13,7 @@ include: "workflow/rules/acquire.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/turning_points.smk"
 include: "workflow/rules/fit.smk"
+include: "workflow/rules/diagnose.smk"
 include: "workflow/rules/separate.smk"
 include: "workflow/rules/compare.smk"
 include: "workflow/rules/figures.smk"

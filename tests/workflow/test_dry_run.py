@@ -31,17 +31,17 @@ def jobs(output: str) -> dict[str, int]:
     return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", output, flags=re.MULTILINE)}
 
 
-def test_the_default_campaign_has_a_job_a_record_in_each_stage_up_to_the_fit(
+def test_the_default_campaign_has_a_job_a_record_in_each_of_its_stages(
     tmp_path: Path,
 ) -> None:
     done = dry_run(tmp_path / "results")
     assert done.returncode == 0, done.stdout + done.stderr
     counted = jobs(done.stdout + done.stderr)
-    for stage in ("acquire", "calibrate", "turning_points", "fit"):
+    for stage in ("acquire", "calibrate", "turning_points", "fit", "diagnose"):
         assert counted[stage] == 27
     for stage in ("separate", "compare", "figures", "report"):
         assert counted[stage] == 1
-    assert counted["total"] == 114
+    assert counted["total"] == 141
 
 
 def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:

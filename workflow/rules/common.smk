@@ -7,6 +7,7 @@ from pendpipe.configuration import jobs
 from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
 from pendpipe.provenance import code_version
+from pendpipe.stages.diagnose import DIAGNOSIS_FIGURES
 
 jobs.prepare_environment()
 
@@ -44,6 +45,20 @@ def of_all_records(name):
     return expand(
         "{results}/{record}/{name}", results=RESULTS, record=RECORDS, name=name
     )
+
+
+def diagnosis_figures():
+    """The figures that every record's diagnosis has, with `record` still to be put in."""
+    if CAMPAIGN.configuration.diagnose.figures == "none":
+        return []
+    folder = f"{RESULTS}/{{record}}/diagnosis"
+    return [f"{folder}/{name}.svg" for name in DIAGNOSIS_FIGURES]
+
+
+def diagnoses():
+    """Every record's diagnosis, where the campaign asks for it."""
+    asked = CAMPAIGN.configuration.diagnose.enabled
+    return of_all_records("diagnosis/diagnosis.json") if asked else []
 
 
 def figure_files():

@@ -3,6 +3,7 @@ rule report:
         comparison=f"{RESULTS}/comparison.json",
         campaign=f"{RESULTS}/campaign.json",
         figures=rules.figures.output.drawn,
+        diagnoses=diagnoses(),
     output:
         report(
             f"{RESULTS}/report.html",

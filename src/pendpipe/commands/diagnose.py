@@ -69,11 +69,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     question = Question(
         arguments.baseline, parse_fixed(arguments.fix), arguments.seed, arguments.level,
-        arguments.figures,
+        arguments.figures, arguments.record is not None,
     )  # fmt: skip
     earlier = refused_before(arguments.refused)
     if earlier is not None:
-        return _not_analysable(arguments, earlier, {})
+        return _not_analysable(arguments, question, earlier, {})
     return _diagnose(arguments, question)
 
 
@@ -94,7 +94,7 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
     except InputError as fault:
         if not Path(arguments.file).is_file():
             raise
-        return _not_analysable(arguments, str(fault), provenance)
+        return _not_analysable(arguments, question, str(fault), provenance)
     content = write_diagnosis(arguments.out, outcome, question, _say)
     for warning in content["warnings"]:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
@@ -103,11 +103,13 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
     return FOUND if asked else 0
 
 
-def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
+def _not_analysable(
+    arguments: argparse.Namespace, question: Question, reason: str, provenance: dict[str, Any]
+) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
     from pendpipe.stages.diagnose import write_not_analysable
 
-    write_not_analysable(arguments.out, arguments.baseline, reason, provenance)
+    write_not_analysable(arguments.out, question, reason, provenance)
     print(f"pendpipe: {reason}", file=sys.stderr)
     return 2 if arguments.refused is None else 0
 

@@ -162,6 +162,21 @@ class Fit(Section):
     )
 
 
+class Diagnose(Section):
+    """What is asked about physics that was left out, record by record."""
+
+    enabled: bool = Field(True, description="whether the records are diagnosed")
+    baseline: Literal["eq8", "viscous"] = Field(
+        "eq8", description="what they are held against: Eq. 8, or Eq. 3 (linear damping alone)"
+    )
+    level: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.01, description="how often a record that lacks nothing may be accused"
+    )
+    figures: Literal["all", "found", "none"] = Field(
+        "found", description="draw them for all records, or where something is missing, or never"
+    )
+
+
 class Configuration(Section):
     """A campaign."""
 
@@ -175,6 +190,9 @@ class Configuration(Section):
         False, description="whether a record that can't be used stops the campaign"
     )
     fit: Fit = Field(default_factory=Fit, description="how a, b and c are found")
+    diagnose: Diagnose = Field(
+        default_factory=Diagnose, description="the search for physics that was left out"
+    )
     apparatus: Apparatus | None = Field(None, description="the compound pendulum; none: no theory")
     geometries: dict[str, Geometry] = Field(
         {}, description="where the weights are clamped, by name"

@@ -12,6 +12,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.model import Evaluated
 
 _FEWEST: Final = 5
+_WHOLE: Final = 0.85
+"""Part of a cycle's readings that must be there."""
 _CERTAIN: Final = 0.03
 """Relative error of a loss at which a span is long enough."""
 _FALL: Final = 0.8
@@ -37,6 +39,16 @@ class Cycles:
     amplitude: FloatArray
     phase: FloatArray
     sd: FloatArray
+
+    def at(self, time_s: FloatArray) -> Cycles:
+        """Return the same at other times: amplitude and frequency change slowly."""
+        known = self.time_s
+        pace = (self.phase[-1] - self.phase[0]) / (known[-1] - known[0])
+        slow = self.phase - pace * known
+        return Cycles(
+            time_s, np.exp(np.interp(time_s, known, np.log(self.amplitude))),
+            pace * time_s + np.interp(time_s, known, slow), np.interp(time_s, known, self.sd),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -77,9 +89,11 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
         Standard deviation of one reading; 0 for a model's.
     """
     sampled = clock.sampled
+    motion = sampled.motion
     number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
-    number -= number.min()
-    carrier = sampled.motion.upwards * sampled.amplitude
+    origin = int(number.min())
+    number -= origin
+    carrier = motion.upwards * sampled.amplitude
     parts = [np.ones_like(reading), carrier * sampled.cosine, carrier * sampled.sine]
     count = int(number.max()) + 1
 
@@ -87,17 +101,19 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
         return np.bincount(number, weights=weight * values, minlength=count)
 
     size = total(parts[0])
-    good = size >= max(_FEWEST, 0.6 * float(np.median(size[size > 0.0])))
+    # The middle of a cycle is a turning point of the model, where all about it is known.
+    middle = 2 * (np.arange(count) + origin) + 1
+    whole = size >= max(_FEWEST, _WHOLE * float(np.median(size[size > 0.0])))
+    good = whole & (middle >= 0) & (middle < len(motion.time_s))
     normal = np.array([[total(one * other) for one in parts] for other in parts])[..., good]
     right = np.array([total(one * reading) for one in parts])[..., good]
     solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
     _, p, q = solved.T
-    middle = total(sampled.phase)[good] / size[good]
-    at = np.interp(middle, sampled.phase, sampled.time_s)
-    grown = np.interp(middle, sampled.phase, sampled.amplitude)
-    ratio = np.maximum(np.hypot(p, q), 1e-12)
-    sd = noise_rms * np.sqrt(2.0 / size[good]) / (grown * ratio)
-    return Cycles(at, grown * ratio, middle + np.unwrap(np.arctan2(-q, p)), sd)
+    turning = middle[good]
+    amplitude = motion.amplitude[turning, 0] * np.maximum(np.hypot(p, q), 1e-12)
+    sd = noise_rms * np.sqrt(2.0 / size[good]) / amplitude
+    phase = math.pi * turning + np.unwrap(np.arctan2(-q, p))
+    return Cycles(motion.time_s[turning, 0], amplitude, phase, sd)
 
 
 def span_ends(found: Cycles) -> list[int]:

@@ -13,6 +13,7 @@ import numpy as np
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning, begin, read_samples
+from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.faults import Fault
 from pendpipe.diagnose.freed import FreedParameter, freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
@@ -26,6 +27,7 @@ from pendpipe.diagnose.search import Search, Step, is_gross, search
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import effect_parameters, parameters_of
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.curves import Curve
 from pendpipe.recording import Recording
 
 LEVEL: Final = 0.01
@@ -160,6 +162,8 @@ def _named(
         tuple((mate.identifier, float(weight)) for mate, weight in
               zip(mates, weights[1:], strict=False)),
         effect.deciding, locate(without, found.improved, found.data, effect),
+        curve_values(found.improved, effect, found.data.unit)
+        if isinstance(effect, Curve) else None,
     )  # fmt: skip
 
 

@@ -79,6 +79,10 @@ class Curve(Effect):
         """Return the curve's value, in its reasonable units."""
         return np.asarray(np.interp(at, self.knots, self.mixing @ values))
 
+    def scale(self, pendulum: Pendulum) -> float:
+        """Return the reasonable unit in that of `ordinate`."""
+        raise NotImplementedError
+
     def small(self, span: Span) -> float:
         """A thousandth of what is reasonable."""
         return 1e-3
@@ -104,9 +108,13 @@ class RestoringCurve(Curve):
         return _positions(span)
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -omega^2 F(x), in units of a tenth of the amplitude."""
-        scale = 0.1 * self.span.first_amplitude * pendulum.angular_frequency**2
+        """Return -omega^2 F(x)."""
+        scale = self.scale(pendulum) * pendulum.angular_frequency**2
         return -scale * self.curve(values, motion.angle)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """A tenth of the amplitude."""
+        return 0.1 * self.span.first_amplitude
 
 
 class DampingCurve(Curve):
@@ -115,7 +123,7 @@ class DampingCurve(Curve):
     identifier = "unnamed-damping"
     name = "a loss that depends on the amplitude in an unknown way"
     equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
-    argument, ordinate = "amplitude, rad", "extra loss rate over b"
+    argument, ordinate = "amplitude, rad", "extra loss rate, 1/s"
     flavour = "amplitude"
     deciding = (
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
@@ -127,10 +135,17 @@ class DampingCurve(Curve):
         return np.asarray(np.geomspace(*ends, 9))
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 beta(r) v, in units of the usual loss rate."""
-        rate = _loss_rate(pendulum, self.span)
-        beta = np.interp(np.log(motion.amplitude), np.log(self.knots), self.mixing @ values)
-        return np.asarray(-2.0 * rate * beta * motion.velocity)
+        """Return -2 beta(r) v."""
+        beta = self.scale(pendulum) * self.curve(values, motion.amplitude)
+        return np.asarray(-2.0 * beta * motion.velocity)
+
+    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return beta: straight between the knots over ln y."""
+        return np.asarray(np.interp(np.log(at), np.log(self.knots), self.mixing @ values))
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """The usual loss rate."""
+        return _loss_rate(pendulum, self.span)
 
 
 class FrictionCurve(Curve):
@@ -148,10 +163,14 @@ class FrictionCurve(Curve):
         return _positions(span)
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -g(x) sgn(v), in units of the usual friction."""
+        """Return -g(x) sgn(v)."""
+        friction = self.scale(pendulum) * self.curve(values, motion.angle)
+        return np.asarray(-motion.direction * friction)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """The usual friction."""
         usual = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
-        scale = usual * self.span.first_amplitude
-        return np.asarray(-scale * motion.direction * self.curve(values, motion.angle))
+        return usual * self.span.first_amplitude
 
 
 class ProfileCurve(Curve):
@@ -160,7 +179,7 @@ class ProfileCurve(Curve):
     identifier = "unnamed-damping"
     name = "a friction of unknown form along each half swing"
     equation = r"\ddot x \to \ddot x + y\,h(\psi)\,\mathrm{sgn}\,\dot x"
-    argument, ordinate = "phase since the last turning point, rad", "extra friction over amplitude"
+    argument, ordinate = "phase since the last turning point, rad", "extra friction over amplitude, 1/s^2"
     flavour = "profile"
     deciding = "sample the swing faster, and look at the velocity about the turning points"
 
@@ -172,8 +191,12 @@ class ProfileCurve(Curve):
         """Return -r h(psi) sgn(v)."""
         phase = np.mod(motion.clock.psi, np.pi)
         phase[:, -1] = np.pi
-        scale = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
-        return np.asarray(-scale * motion.direction * motion.amplitude * self.curve(values, phase))
+        profile = self.scale(pendulum) * self.curve(values, phase)
+        return np.asarray(-motion.direction * motion.amplitude * profile)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """The usual friction over the amplitude."""
+        return _loss_rate(pendulum, self.span) * pendulum.angular_frequency
 
 
 class DriveCurve(Curve):
@@ -194,14 +217,17 @@ class DriveCurve(Curve):
         return 2 * len(self.knots)
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return p(t) omega^2 x + q(t) omega v, in units of a hundredth."""
+        """Return p(t) omega^2 x + q(t) omega v."""
         both = self.mixing @ values
         count, omega = len(self.knots), pendulum.angular_frequency
         in_phase = np.interp(motion.time_s, self.knots, both[:count])
         quadrature = np.interp(motion.time_s, self.knots, both[count:])
-        return np.asarray(
-            0.01 * omega * (in_phase * omega * motion.angle + quadrature * motion.velocity)
-        )
+        force = in_phase * omega * motion.angle + quadrature * motion.velocity
+        return np.asarray(self.scale(pendulum) * omega * force)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """A hundredth."""
+        return 0.01
 
 
 class ReadingCurve(Curve):
@@ -219,8 +245,12 @@ class ReadingCurve(Curve):
         return _positions(span)
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return s(x), in units of a twentieth of the amplitude."""
-        return 0.05 * self.span.first_amplitude * self.curve(values, sampled.angle)
+        """Return s(x)."""
+        return self.scale(pendulum) * self.curve(values, sampled.angle)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """A twentieth of the amplitude."""
+        return 0.05 * self.span.first_amplitude
 
 
 class BaselineCurve(Curve):
@@ -238,8 +268,12 @@ class BaselineCurve(Curve):
         return np.linspace(span.start_s, span.stop_s, 14)
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return s(t), in units of a twentieth of the amplitude."""
-        return 0.05 * self.span.first_amplitude * self.curve(values, sampled.time_s)
+        """Return s(t)."""
+        return self.scale(pendulum) * self.curve(values, sampled.time_s)
+
+    def scale(self, pendulum: Pendulum) -> float:
+        """A twentieth of the amplitude."""
+        return 0.05 * self.span.first_amplitude
 
 
 def _loss_rate(pendulum: Pendulum, span: Span) -> float:

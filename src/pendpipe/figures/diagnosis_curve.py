@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,7 +12,7 @@ from pendpipe.diagnose.result import Named
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREEN, INK, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import prefixed
+from pendpipe.figures.units import prefixed, pretty_unit
 
 
 @styled
@@ -20,13 +22,17 @@ def draw(content: Shown) -> Figure:
     if not unnamed:
         raise NothingToDrawError("every effect has a name")
     rows = sum(2 if _exponents(effect) else 1 for effect in unnamed)
-    height = 2.3 * rows + 0.5
-    figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
+    height = 2.7 * rows
+    figure = Figure(figsize=(WIDTH_IN, height))
+    figure.subplots_adjust(
+        left=0.15, right=0.975, bottom=0.5 / height, top=1.0 - 0.45 / height, hspace=0.5
+    )
     panels = iter(figure.subplots(rows, 1, squeeze=False)[:, 0])
     for effect in unnamed:
         panel = next(panels)
         _curve(panel, effect)
-        panel.set_title(effect.identifier)
+        if not panel.get_legend():
+            panel.set_title(effect.identifier)
         if _exponents(effect):
             _exponent(next(panels), effect)
     return figure
@@ -42,7 +48,7 @@ def _curve(axes: Axes, effect: Named) -> None:
     at, argument = _scaled(curve["at"], curve["argument"])
     sizes = [curve["value"], *([curve["quadrature"]] if "quadrature" in curve else [])]
     largest = max(float(np.max(np.abs(size))) for size in sizes)
-    name, _, unit = str(curve["ordinate"]).partition(", ")
+    name, _, unit = str(curve["ordinate"]).replace("omega^2", "ω²").partition(", ")
     factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
     looks = [("value", "sd", BLUE, "-", "in phase" if len(sizes) > 1 else "")]
     if len(sizes) > 1:
@@ -52,12 +58,11 @@ def _curve(axes: Axes, effect: Named) -> None:
         value, half = factor * np.asarray(curve[key]), 1.96 * factor * np.asarray(curve[sd])
         axes.fill_between(at, value - half, value + half, color=colour, alpha=0.22, linewidth=0.0)
         axes.plot(at, value, color=colour, linestyle=dashes, label=label or None)
-    axes.set(xlabel=argument, ylabel=f"{name} ({short})" if short else name)
-    axes.yaxis.label.set_fontsize(8.5)
+    label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
+    axes.set(xlabel=argument, ylabel="\n".join(textwrap.wrap(label, 30)))
     axes.margins(x=0.01)
     if len(sizes) > 1:
         key_above(axes, 2)
-        axes.title.set_visible(False)
 
 
 def _exponent(axes: Axes, effect: Named) -> None:

@@ -38,7 +38,7 @@ def draw_damping(content: Shown) -> Figure:
     for _, colour, dashes, spans in curves:
         lower.plot(x, factor * (2.0 * spans.loss / omega - expected), color=colour,
                    linestyle=dashes, linewidth=1.2)  # fmt: skip
-    lower.set_ylabel(f"less {content.baseline_name}'s ({power})")
+    lower.set_ylabel(f"1/Q − {content.baseline_name}'s ({power})")
     _amplitude_axis(lower, x, unit)
     key_above(upper, 3 if content.extended is None else 2)
     figure.align_ylabels([upper, lower])
@@ -63,8 +63,7 @@ def draw_frequency(content: Shown) -> Figure:
     for name, colour, dashes, spans in curves:
         axes.plot(x, factor * (spans.frequency_hz / origin - 1.0), color=colour, linestyle=dashes,
                   label=name, linewidth=1.2)  # fmt: skip
-    axes.set_ylabel(f"Frequency less {origin:.6g} Hz, over it ({power})")
-    axes.yaxis.label.set_fontsize(8.5)
+    axes.set_ylabel(f"Frequency/({origin:.6g} Hz) − 1 ({power})")
     _amplitude_axis(axes, x, unit)
     key_above(axes, 3 if content.extended is None else 2)
     return figure

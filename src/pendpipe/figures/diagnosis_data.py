@@ -54,15 +54,14 @@ class Shown:
 
     @property
     def extended_name(self) -> str:
-        """For legends: what was added, by its identifiers."""
+        """For legends: what was added."""
         found = [effect.identifier for effect in self.diagnosis.effects]
-        if len(found) > 2:
-            return f"with {found[0]} and {len(found) - 1} more"
-        return "with " + " and ".join(found)
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        return f"with {found[0]}{more}"
 
     def residual(self, fit: Fit) -> FloatArray:
         """Readings minus model, NaN where a reading is masked; shape (n,)."""
-        left = self.data.values - fit.at.reading
+        left = self.data.residual(fit.at.reading)
         return np.where(self.data.weight > 0.0, left, math.nan)
 
     @cached_property
@@ -85,9 +84,9 @@ class Shown:
         return between(self._measured, self._ends)
 
     def of_model(self, fit: Fit) -> Spans:
-        """The same of a model's readings, between the same cycles."""
-        found = cycles(fit.at.reading, self.data.weight, self.clock, 0.0)
-        return between(found, self._ends)
+        """The same of a model's readings, between the same times."""
+        own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
+        return between(own.at(self._measured.time_s), self._ends)
 
 
 def shown(outcome: Outcome) -> Shown:

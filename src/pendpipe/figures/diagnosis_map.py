@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.ticker import FixedFormatter
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
@@ -17,8 +18,10 @@ from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, VERMILION, WIDTH_IN, styled
 from pendpipe.figures.units import compact
 
-PHASES: Final = 36
+PHASES: Final = 24
 _COLUMNS: Final = 90
+_IN_A_CELL: Final = 4
+"""Readings, usually: fewer would leave holes."""
 _COLOURS = LinearSegmentedColormap.from_list("residual", [BLUE, "#FFFFFF", VERMILION])
 _COLOURS.set_bad("#E3E6EA")
 
@@ -30,12 +33,12 @@ def draw(content: Shown) -> Figure:
     if content.extended is not None:
         models.append((content.extended_name, content.extended))
     maps = [residual_map(content, fit) for _, fit in models]
-    largest = max(4.0, *(float(np.nanmax(np.abs(each))) for each in maps))
+    largest = max([4.0] + [float(np.nanmax(np.abs(each))) for each in maps])
     norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
     figure = Figure(figsize=(WIDTH_IN, 2.0 * len(maps) + 0.95))
     height = figure.get_figheight()
     figure.subplots_adjust(
-        left=0.115, right=0.86, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
+        left=0.105, right=0.845, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
     )
     rows = figure.subplots(len(maps), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (name, fit), values in zip(rows, models, maps, strict=True):
@@ -43,10 +46,12 @@ def draw(content: Shown) -> Figure:
         rms = math.sqrt(float(np.nanmean(content.residual(fit) ** 2)))
         axes.set_title(f"{name}: residual {compact(rms, content.data.unit)} rms")
     rows[-1].set_xlabel("Time (s)")
-    place = figure.add_axes((0.88, 0.2, 0.022, 0.6))
-    bar = figure.colorbar(image, cax=place, ticks=_ticks(largest))
+    low = rows[-1].get_position().y0
+    place = figure.add_axes((0.865, low, 0.02, rows[0].get_position().y1 - low))
+    ticks = _ticks(largest)
+    bar = figure.colorbar(image, cax=place, ticks=ticks, format=FixedFormatter(_signed(ticks)))
     bar.ax.minorticks_off()
-    bar.set_label("data − model (standard errors)", labelpad=2)
+    bar.set_label("Data − model (standard errors)", labelpad=1)
     return figure
 
 
@@ -66,11 +71,14 @@ def _panel(axes: Axes, content: Shown, values: FloatArray, norm: AsinhNorm) -> A
 
 def _ticks(largest: float) -> list[float]:
     """Round numbers, both signs."""
-    steps = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6]
+    steps = [2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6]
     inside = [step for step in steps if step <= largest]
-    every = max(1, math.ceil(len(inside) / 5))
-    kept = inside[::-1][::every]
+    kept = inside[:: max(1, math.ceil(len(inside) / 4))]
     return sorted([-step for step in kept] + [0.0] + kept)
+
+
+def _signed(ticks: list[float]) -> list[str]:
+    return [f"{tick:+.0f}".replace("-", "−") if tick else "0" for tick in ticks]
 
 
 def residual_map(content: Shown, fit: Fit) -> FloatArray:
@@ -90,7 +98,7 @@ def residual_map(content: Shown, fit: Fit) -> FloatArray:
     phase = np.mod(sampled.phase + turned, 2.0 * math.pi) / (2.0 * math.pi)
     time = content.data.time_s
     turns = float(sampled.phase[-1] - sampled.phase[0]) / (2.0 * math.pi)
-    columns = int(min(max(turns, 1.0), _COLUMNS))
+    columns = max(1, int(min(turns, _COLUMNS, len(time) / (_IN_A_CELL * PHASES))))
     row = np.minimum((phase * PHASES).astype(np.int64), PHASES - 1)
     share = (time - time[0]) / (time[-1] - time[0])
     column = np.minimum((share * columns).astype(np.int64), columns - 1)

@@ -25,10 +25,10 @@ _HARMONICS: Final = 8
 def draw(content: Shown) -> Figure:
     """Draw the amplitude spectral density of what each model leaves."""
     frequency, baseline = spectrum(content, content.baseline)
-    curves = [(content.baseline_name, baseline, VERMILION, 0.9)]
+    curves = [(content.baseline_name, baseline, VERMILION, 1.3)]
     if content.extended is not None:
         extended = spectrum(content, content.extended)[1]
-        curves.append((content.extended_name, extended, BLUE, 0.9))
+        curves.append((content.extended_name, extended, BLUE, 0.8))
     level = noise_level(content, frequency)
     factor, unit = axis_unit(np.array([float(np.max(each)) for _, each, _, _ in curves]),
                              content.data.unit)  # fmt: skip
@@ -50,11 +50,12 @@ def draw(content: Shown) -> Figure:
 
 
 def _plain(axes: Axes) -> None:
-    """Numbers instead of powers of ten along the frequency."""
+    """Numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     axes.tick_params(which="minor", length=0)
 
 
@@ -103,7 +104,7 @@ def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     lines = np.fft.rfft((residual - np.mean(residual)) * window)
     density = 2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2)
     frequency = np.fft.rfftfreq(count, interval)
-    return _banded(frequency[2:], density[2:])
+    return _banded(frequency[2:-1], density[2:-1])
 
 
 def _banded(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:

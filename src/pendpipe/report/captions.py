@@ -79,6 +79,15 @@ CAPTIONS: Final = {
         "The later a fit begins, the less it knows: bars of one standard deviation grow until"
         " they leave the panel, first in a, then in b and c. Fit whole records.",
     ),
+    "residual_map": Caption(
+        "Residual, before and after",
+        "Data minus model against time and phase of the cycle, in standard errors of a cell: the"
+        " baseline above, with what was left out below.",
+        "Phase 0 is the turning point on the positive side, π that on the negative. Bands along"
+        " the time at the crossings (π/2, 3π/2) are a phase that runs away, at the turning points"
+        " an amplitude that does; upright stripes are sudden. What is left below should look"
+        " like noise.",
+    ),
     "decay": Caption(
         "Decay",
         "Amplitudes of the turning points, with Eq. 14 from the fitted a, b, c and, for contrast,"

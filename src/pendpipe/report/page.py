@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS
+from pendpipe.report.diagnoses import Diagnosed, diagnoses
 from pendpipe.report.findings import findings
 from pendpipe.report.glossary import GLOSSARY
 from pendpipe.report.headline import headline
@@ -55,6 +56,9 @@ def render(
     has_theory = bool(comparison.get("has_theory"))
     table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
     decays, outside = _decays(folder, table.lines, spent=sum(map(len, drawn.values())))
+    spent = sum(map(len, [*drawn.values(), *decays.values()]))
+    asked = configuration.get("diagnose") or {}
+    diagnosed = _diagnoses(asked, folder, entries, spent)
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
     environment = Environment(
@@ -72,6 +76,9 @@ def render(
         columns=table.columns,
         has_fluid=any(line.fluid for line in table.lines),
         has_branch=any(line.branch for line in table.lines),
+        diagnosed=diagnosed,
+        diagnosis_baseline="Eq. 3" if asked.get("baseline") == "viscous" else "Eq. 8",
+        diagnosis_level=asked.get("level", 0.01),
         records=table.lines,
         counts=_counts(table.lines),
         chi2_range=CHI2_RANGE,
@@ -122,6 +129,16 @@ def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Mark
         else:
             decays[line.name] = svg
     return decays, outside
+
+
+def _diagnoses(
+    asked: Content, folder: Path, entries: list[Content], spent: int
+) -> list[Diagnosed]:
+    """The records' diagnoses, where the campaign asks for them."""
+    if not asked.get("enabled", True):
+        return []
+    names = [str(entry["record"]) for entry in entries]
+    return diagnoses(folder, names, spent=spent, budget=BUDGET_BYTES - _RESERVE_BYTES)
 
 
 def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:

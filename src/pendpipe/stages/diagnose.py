@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pendpipe.diagnose.progress import Progress, silent
-from pendpipe.files import write_json
+from pendpipe.files import replaced, write_json
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import Baseline
@@ -16,8 +17,14 @@ if TYPE_CHECKING:
     from pendpipe.recording import Recording
 
 RESULT: Final = "diagnosis.json"
-FIGURES: Final = ("residual_map", "residual_spectrum", "damping", "frequency", "codes", "curve")
+DIAGNOSIS_FIGURES: Final = ("residual_map", "residual_spectrum", "damping", "frequency")
+"""The figures that the diagnosis of every record has."""
+FIGURES: Final = (*DIAGNOSIS_FIGURES, "codes", "curve")
 """The figures' names; `codes` and `curve` are drawn where they have something to show."""
+_EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
+<text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
+{}</text></svg>
+"""
 Figures = Literal["all", "found", "none"]
 """Of every recording, of those in which something is missing, or of none."""
 
@@ -34,6 +41,8 @@ class Question:
         Of the draws that count trials; global p-value of an accusation.
     figures
         Which are drawn.
+    in_campaign
+        Whether a workflow waits for the figures: one that is not drawn then says so.
     """
 
     baseline: Baseline = "eq8"
@@ -41,6 +50,7 @@ class Question:
     seed: int = 0
     level: float = 0.01
     figures: Figures = "all"
+    in_campaign: bool = False
 
 
 def diagnose_motion(
@@ -82,7 +92,8 @@ def write_diagnosis(
 
         progress("drawing")
         drawn = draw_diagnosis(outcome, folder)
-        diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
+        diagnosis = dataclasses.replace(diagnosis, figures=tuple(path.name for path in drawn))
+    _say_what_is_not_drawn(folder, question, "Not drawn: nothing is missing here.")
     content = diagnosis.as_json()
     write_json(folder / RESULT, content)
     return content
@@ -95,14 +106,26 @@ def _forget_figures(folder: Path) -> None:
             folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
 
+def _say_what_is_not_drawn(folder: Path, question: Question, reason: str) -> None:
+    """Put a line in the place of each figure that a workflow waits for."""
+    if not question.in_campaign or question.figures == "none":
+        return
+    for name in DIAGNOSIS_FIGURES:
+        path = folder / f"{name}.svg"
+        if not path.exists():
+            with replaced(path) as stream:
+                stream.write(_EMPTY.format(reason))
+
+
 def write_not_analysable(
-    folder: Path, baseline: str, reason: str, provenance: Mapping[str, Any]
+    folder: Path, question: Question, reason: str, provenance: Mapping[str, Any]
 ) -> None:
     """Write the result of a recording that can't be analysed."""
     from pendpipe.diagnose.not_analysable import not_analysable
 
     _forget_figures(folder)
-    write_json(folder / RESULT, not_analysable(baseline, reason, provenance))
+    _say_what_is_not_drawn(folder, question, "Not drawn: this record can't be analysed.")
+    write_json(folder / RESULT, not_analysable(question.baseline, reason, provenance))
 
 
 def refused_before(refused: Path | None) -> str | None:

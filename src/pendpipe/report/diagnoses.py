@@ -1,0 +1,118 @@
+"""What the diagnoses of a campaign's records have found, for the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from markupsafe import Markup
+
+from pendpipe.figures.data import number
+from pendpipe.figures.units import compact
+from pendpipe.files import read_json
+from pendpipe.report.captions import CAPTIONS
+from pendpipe.report.health import Health
+from pendpipe.report.records import without_folders
+from pendpipe.report.vector import inline_svg
+
+VERDICTS: Final = {
+    "consistent": Health("consistent", "✔", "good", "the noise explains what the model leaves"),
+    "missing-physics": Health("missing physics", "▲", "look", "something was left out"),
+    "not-analysable": Health("not analysable", "○", "none", "there is no diagnosis"),
+}
+"""How each verdict is shown."""
+
+
+class Diagnosed(NamedTuple):
+    """A record's diagnosis, ready for the page."""
+
+    name: str
+    anchor: str
+    light: Health
+    p_value: str
+    effects: list[str]
+    residual: str
+    noise: str
+    chi2: str
+    statement: str
+    figure: Markup | None
+
+
+def diagnoses(folder: Path, names: list[str], *, spent: int, budget: int) -> list[Diagnosed]:
+    """Read every record's diagnosis; none where the campaign was not diagnosed.
+
+    Parameters
+    ----------
+    folder
+        The campaign's results.
+    names
+        Of the records.
+    spent, budget
+        Bytes of the page that other figures take, and that it may have: a figure beyond it
+        is left out.
+    """
+    found = []
+    for index, name in enumerate(names, start=1):
+        place = folder / name / "diagnosis"
+        if not (place / "diagnosis.json").is_file():
+            continue
+        content = read_json(place / "diagnosis.json")
+        figure = None
+        if content["verdict"] == "missing-physics":
+            figure = _figure(place / "residual_map.svg", f"diagnosis-{index}", name)
+            spent += len(figure.encode()) if figure is not None else 0
+            figure = figure if spent < budget else None
+        found.append(_diagnosed(name, f"diagnosis-{index}", content, figure))
+    return found
+
+
+def _figure(path: Path, anchor: str, name: str) -> Markup | None:
+    if not path.is_file():
+        return None
+    words = f"{CAPTIONS['residual_map'].shows} Record {name}."
+    text = path.read_text(encoding="utf-8")
+    return inline_svg(text, anchor, f"Residual of {name} before and after", words)
+
+
+def _diagnosed(
+    name: str, anchor: str, content: Mapping[str, Any], figure: Markup | None
+) -> Diagnosed:
+    before, after = content["baseline"], content["improved"]
+    unit = str(((before["parameters"] or {}).get("amplitude") or {}).get("unit", "rad"))
+    sizes = [
+        compact(size, unit)
+        for model in (before, after)
+        if math.isfinite(size := number(model["residual_rms_rad"]))
+    ]
+    chi2 = [
+        _three_digits(value)
+        for model in (before, after)
+        if math.isfinite(value := number(model["chi2_per_dof"]))
+    ]
+    shown = slice(None) if content["effects"] else slice(1)
+    noise = number(content["noise_rms_rad"])
+    p_value = number(content["p_value"])
+    return Diagnosed(
+        name, anchor, VERDICTS[content["verdict"]],
+        f"{p_value:.2g}" if math.isfinite(p_value) else "–",
+        [_effect(effect) for effect in content["effects"]],
+        " → ".join(sizes[shown]) or "–", compact(noise, unit) if math.isfinite(noise) else "–",
+        " → ".join(chi2[shown]) or "–", without_folders(str(content["statement"])), figure,
+    )  # fmt: skip
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:.3g}" if value < 1e4 else f"{value:.0f}"
+
+
+def _effect(effect: Mapping[str, Any]) -> str:
+    """An effect with its probability and what can't be told from it."""
+    rest = ", ".join(
+        f"{other['id']} {100.0 * other['probability']:.0f} %"
+        for other in effect["indistinguishable_from"]
+    )
+    chance = number(effect["probability"])
+    own = f"{effect['id']} {100.0 * chance:.0f} %" if math.isfinite(chance) else str(effect["id"])
+    return f"{own} (or {rest})" if rest else own
