@@ -12,17 +12,21 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials, draw_chance
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
-from pendpipe.diagnose.spectrum import ToneScan, tone_scan
+from pendpipe.diagnose.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
 
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""
 
 _TURNS: Final = 3.0
-"""Cycles in the record that make a tone; what is slower is a drift."""
+"""Cycles in the record that make a tone; what is slower is a drift. So many are also needed
+to tell a tone from the motion itself: what is nearer beats (a second plane)."""
+_ABOVE: Final = 1.3
+"""Of the motion's frequency: where second modes are looked for."""
 
 
 @dataclass(frozen=True)
@@ -81,11 +85,13 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     bank = build_bank(fit, noise, others)
     scans: list[ToneScan] = []
     if spectral and data.uniform:
-        slowest = _TURNS / (data.time_s[-1] - data.time_s[0])
-        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), slowest))
+        duration = float(data.time_s[-1] - data.time_s[0])
+        own = fit.value[OMEGA] / (2.0 * math.pi)
+        steady = Band(_TURNS / duration, own, _TURNS / duration)
+        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), steady))
         since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
         scans += [
-            tone_scan(data, noise, bank.basis, np.exp(-since / dying), slowest)
+            tone_scan(data, noise, bank.basis, np.exp(-since / dying), Band(_ABOVE * own))
             for dying in _DYING
         ]
     return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))

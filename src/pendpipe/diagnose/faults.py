@@ -18,6 +18,7 @@ from pendpipe.diagnose.refine import refine
 from pendpipe.estimate import Estimate
 
 if TYPE_CHECKING:
+    from pendpipe.diagnose.naming import Rival
     from pendpipe.diagnose.progress import Progress
     from pendpipe.diagnose.search import _State
 
@@ -29,6 +30,8 @@ _BEHIND: Final = (
 )  # fmt: skip
 _EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
+_BEFORE_CURVES: Final = 15.0
+"""By how much random kicks are preferred to a curve in time, which follows any of them."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class Forensics:
 
         if is_gross(state.fit, state.data):
             return
-        for name in _BEHIND:
+        known = [fault.finding.identifier for fault in state.faults]
+        for name in [name for name in _BEHIND if name not in known]:
             self._examine(name, state, progress)
 
     def _examine(self, name: str, state: _State, progress: Progress) -> bool:
@@ -125,3 +129,23 @@ class Forensics:
         state.faults.append(Fault(found, 0.0))
         self.p_value = 0.0
         state.fit, state.data, state.noise = settled(fit, mended, state.noise, state.holding)
+
+
+def kicked_at_random(
+    state: _State, rival: Rival, forensics: Forensics, progress: Progress
+) -> bool:
+    """Ask whether random kicks explain more than the best effect of the catalogue does."""
+    from pendpipe.diagnose.naming import equivalent
+
+    name = "broadband-drive"
+    finding = TESTS[name](state.data, state.fit, state.noise, forensics.samples)
+    p_value = min(finding.p_value / _EACH, 1.0)
+    lead = _BEFORE_CURVES if rival.lead.effect.kind == "unnamed" else 0.0
+    if p_value > forensics.level:
+        return False
+    if equivalent(p_value, finding.delta_chi2) + lead < rival.evidence:
+        return False
+    progress(f"{name}: {finding.summary}")
+    state.faults.append(Fault(finding, p_value))
+    forensics.p_value = min(forensics.p_value, p_value)
+    return True

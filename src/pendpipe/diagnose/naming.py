@@ -21,7 +21,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
-_MOST: Final = 8
+_MOST: Final = 9
 _NEAR: Final = 16.0
 _ALIKE: Final = 0.98
 _MUCH: Final = 0.5
@@ -58,11 +58,11 @@ class Rival:
 
 def refit_leads(
     base: Fit, data: Data, noise: Noise, detection: Detection, *, held: Sequence[int],
-    gross: bool,
+    gross: bool, most: int = _MOST,
 ) -> list[Rival]:  # fmt: skip
     """Refit the leading effects nonlinearly; the best first."""
     fits = []
-    for lead in _worth_refitting(detection, gross):
+    for lead in _worth_refitting(detection, gross, most):
         fit = _refitted(base, data, noise, lead, held)
         if fit is not None:
             fits.append((lead, fit))
@@ -91,14 +91,14 @@ def _named_first(rivals: list[Rival]) -> list[Rival]:
     return [*named, *(rival for rival in rivals if rival not in named)]
 
 
-def _worth_refitting(detection: Detection, gross: bool) -> list[Lead]:
+def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]:
     """The leads that may win, or be in the winner's class."""
     leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
     if not leads:
         return []
     best = _rank(leads[0])
     near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.6 if gross else 0.3) * best]
-    return near[: _MOST + 4 if gross else _MOST]
+    return near[: most + 2 if gross else most]
 
 
 def _rank(lead: Lead) -> float:

@@ -102,7 +102,9 @@ def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Nois
     return Noise(variance, False if slope is not None else data.uniform, rms, data.weight)
 
 
-def estimate_noise(data: Data, residual: FloatArray, frequency_hz: float, floor: float) -> Noise:
+def estimate_noise(
+    data: Data, residual: FloatArray, frequency_hz: float, floor: float, *, red: bool = True
+) -> Noise:
     """Estimate the noise from what a model leaves.
 
     Bands about the harmonics of the motion and the slowest cosines are left out, since a
@@ -116,7 +118,9 @@ def estimate_noise(data: Data, residual: FloatArray, frequency_hz: float, floor:
     frequency_hz
         Of the motion.
     floor
-        The rms below which no reading is believed: step/sqrt(12).
+        The rms below which no reading is believed.
+    red
+        Whether the noise may be red.
     """
     if not data.uniform:
         rms = max(_robust_rms(residual[data.weight > 0.0]), floor)
@@ -130,14 +134,14 @@ def estimate_noise(data: Data, residual: FloatArray, frequency_hz: float, floor:
     quiet = _quiet(frequency, frequency_hz)
     if np.count_nonzero(quiet) < 40:
         quiet = np.arange(count) >= _FIRST
-    shape = _best_shape(power[quiet], frequency[quiet], data.interval_s)
+    shape = _best_shape(power[quiet], frequency[quiet], data.interval_s, red=red)
     variance = _spectrum(shape, frequency, data.interval_s)
     white = math.exp(0.5 * shape[0])
     low = floor * floor / variance.mean()
     if low > 1.0:
         variance, white = variance * low, white * math.sqrt(low)
-    red = math.exp(shape[1]) if shape[1] > -50.0 else 0.0
-    return Noise(variance, True, white, data.weight, red, float(shape[2]), float(shape[3]))
+    share = math.exp(shape[1]) if shape[1] > -50.0 else 0.0
+    return Noise(variance, True, white, data.weight, share, float(shape[2]), float(shape[3]))
 
 
 def _robust_rms(values: FloatArray) -> float:
@@ -163,7 +167,9 @@ def _spectrum(shape: FloatArray, frequency: FloatArray, interval: float) -> Floa
     return np.asarray(np.exp(white) * coloured)
 
 
-def _best_shape(power: FloatArray, frequency: FloatArray, interval: float) -> FloatArray:
+def _best_shape(
+    power: FloatArray, frequency: FloatArray, interval: float, *, red: bool
+) -> FloatArray:
     """Maximise Whittle's likelihood, from white to coloured."""
     from scipy.optimize import minimize
 
@@ -186,7 +192,7 @@ def _best_shape(power: FloatArray, frequency: FloatArray, interval: float) -> Fl
     ):
         limits = [(start[k], start[k]) if k in frozen else bounds[k] for k in range(4)]
         found = minimize(cost, start, method="L-BFGS-B", bounds=limits)
-        if found.fun < least - worth:
+        if found.fun < least - worth and (red or 1 in frozen):
             best, least = found.x, float(found.fun)
     return np.asarray(best)
 

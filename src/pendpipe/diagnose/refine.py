@@ -18,6 +18,8 @@ from pendpipe.dynamics.any_law import NoMotionError
 _ROUNDS: Final = 14
 _SETTLED: Final = 0.02
 """Of chi^2: a step that promises less is the last."""
+_PULL: Final = 3.0
+"""Standard deviations beyond a bound from which it is the bound that is believed."""
 _SHARE_SD: Final = 0.3
 """The hysteretic share of b is hardly seen in one record: any between 0 and 1 may be."""
 
@@ -67,6 +69,24 @@ class Fit:
         return matrix
 
 
+def pulled(fit: Fit) -> list[int]:
+    """Indices of fitted values that are at a bound and would be far beyond it, if they could."""
+    low, high = fit.model.bounds()
+    found = []
+    for index in fit.free:
+        if low[index] < fit.value[index] < high[index]:
+            continue
+        column = fit.jacobian[:, index]
+        length = float(np.linalg.norm(column))
+        others = [k for k in fit.free if k != index and low[k] < fit.value[k] < high[k]]
+        part = fit.jacobian[:, others]
+        rest = column - part @ np.linalg.lstsq(part, column, rcond=1e-11)[0]
+        alone = float(np.linalg.norm(rest))
+        if alone > 1e-9 * length and abs(float(rest @ fit.residual)) > _PULL * alone:
+            found.append(index)
+    return found
+
+
 def refine(
     model: Model, data: Data, noise: Noise, start: FloatArray, *, held: Iterable[int] = (),
     rounds: int = _ROUNDS,
@@ -88,10 +108,9 @@ def refine(
     at = model.evaluate(value)
     residual, slip = _residual(data, noise, at, value)
     converged = False
-    damping = 0.0
     for _ in range(rounds):
         jacobian = _jacobian(model, noise, value, at)
-        step = _step(jacobian, residual, free, value, low, high, damping)
+        step = _step(jacobian, residual, free, value, low, high)
         promised = float(residual @ residual - np.sum((residual - jacobian @ step) ** 2))
         accepted = False
         for shrink in (1.0, 0.3, 0.1, 0.02):
@@ -138,34 +157,33 @@ def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> F
 
 def _step(
     jacobian: FloatArray, residual: FloatArray, free: FloatArray, value: FloatArray,
-    low: FloatArray, high: FloatArray, damping: float,
+    low: FloatArray, high: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """The Gauss-Newton step; values that would leave their bounds go to them and stay."""
+    """The Gauss-Newton step, the best within the bounds."""
     step = np.zeros(len(value))
-    moving = list(free)
-    rest = residual
-    for _ in range(4):
-        if not moving:
-            break
-        part = jacobian[:, moving]
-        scale = np.linalg.norm(part, axis=0)
-        scale[scale == 0.0] = 1.0
-        solved = np.linalg.lstsq(part / scale, rest, rcond=1e-11)[0] / scale
-        target = value[moving] + solved
-        out = (target < low[moving]) | (target > high[moving])
-        step[moving] = solved
-        if not out.any():
-            break
-        for index, wrong in zip(list(moving), out, strict=True):
-            if wrong:
-                bound = low[index] if value[index] + step[index] < low[index] else high[index]
-                step[index] = bound - value[index]
-                rest = rest - jacobian[:, index] * step[index]
-                moving.remove(index)
+    part = jacobian[:, free]
+    scale = np.linalg.norm(part, axis=0)
+    scale[scale == 0.0] = 1.0
+    left, small = np.linalg.qr(part / scale)
+    right = left.T @ residual
+    solved = np.linalg.lstsq(small, right, rcond=1e-11)[0]
+    floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
+    if np.any(solved < floor) or np.any(solved > ceiling):
+        solved = _bounded(small, right, floor, ceiling)
+    step[free] = solved / scale
     limit = 0.05 * value[OMEGA]
     if abs(step[OMEGA]) > limit:
         step *= limit / abs(step[OMEGA])
     return step
 
 
-__all__ = ["Fit", "refine"]
+def _bounded(
+    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
+) -> FloatArray:
+    """Linear least squares within bounds."""
+    from scipy.optimize import lsq_linear
+
+    # A value on its bound has no room to one side; the solver asks for some.
+    room = 1e-9 * (1.0 + np.abs(right).max())
+    found = lsq_linear(matrix, right, bounds=(floor - room, ceiling + room), method="bvls")
+    return np.clip(found.x, floor, ceiling)

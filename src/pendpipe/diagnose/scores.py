@@ -18,7 +18,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import responses
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.refine import Fit, pulled
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 
@@ -81,8 +81,13 @@ class Bank:
 
 
 def tangent_basis(fit: Fit) -> FloatArray:
-    """Orthonormal basis of what the fitted values can do, those at a bound included."""
-    part = fit.jacobian[:, list(fit.free)]
+    """Orthonormal basis of what the fitted values can do.
+
+    Those at a bound are included, unless the readings pull them far beyond it: then they
+    are known.
+    """
+    known = pulled(fit)
+    part = fit.jacobian[:, [index for index in fit.free if index not in known]]
     scale = np.linalg.norm(part, axis=0)
     scale[scale == 0.0] = 1.0
     left, sizes, _ = np.linalg.svd(part / scale, full_matrices=False)

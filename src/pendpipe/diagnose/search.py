@@ -12,7 +12,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection, detect, prepare
-from pendpipe.diagnose.faults import CATALOGUE_SHARE, Fault, Forensics
+from pendpipe.diagnose.faults import CATALOGUE_SHARE, Fault, Forensics, kicked_at_random
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.naming import Rival, refit_leads
@@ -29,6 +29,8 @@ _SLIP: Final = 0.1
 _MOST: Final = 6
 _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
+_DOUBT: Final = 10.0
+"""By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
 _PART: Final = 0.03
 """Part of a gross misfit that an effect must explain to be worth naming."""
 _LEAST_STEP: Final = 0.1
@@ -146,7 +148,7 @@ def search(
     forensics = Forensics(samples, level)
     while len(state.steps) < _MOST:
         forensics.before(state, progress)
-        if not _add_one(state, catalogue, freed, baseline, level, seed, progress):
+        if not _add_one(state, forensics, catalogue, freed, baseline, level, seed, progress):
             break
     forensics.after(state, progress)
     assert state.first is not None and state.now is not None
@@ -159,8 +161,8 @@ def search(
 
 
 def _add_one(
-    state: _State, catalogue: Sequence[Effect], freed: Sequence[FreedParameter], baseline: str,
-    level: float, seed: int, progress: Progress,
+    state: _State, forensics: Forensics, catalogue: Sequence[Effect],
+    freed: Sequence[FreedParameter], baseline: str, level: float, seed: int, progress: Progress,
 ) -> bool:  # fmt: skip
     """Scan the catalogue, and add the best effect if it is needed; say whether to go on."""
     gross = is_gross(state.fit, state.data)
@@ -170,12 +172,16 @@ def _add_one(
     scanner = prepare(state.fit, state.data, state.noise, [*effects, *open_parameters])
     state.now = detect(scanner, state.fit, seed=seed)
     state.first = state.first or state.now
+    if state.now.p_value > level * CATALOGUE_SHARE and state.noise.red > 0.0 and not gross:
+        _doubt_redness(state, [*effects, *open_parameters], level, seed, progress)
     if state.now.p_value > level * CATALOGUE_SHARE or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
     rivals = refit_leads(
         state.fit, state.data, state.noise, state.now, held=state.holding, gross=gross
     )
+    if not gross and rivals and kicked_at_random(state, rivals[0], forensics, progress):
+        return False
     if not rivals or rivals[0].gain <= max(_NEEDED, _PART * state.fit.chi2 if gross else 0.0):
         return False
     state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit))
@@ -187,6 +193,38 @@ def _add_one(
         winner.fit, state.data, state.noise, state.holding
     )
     return True
+
+
+def _doubt_redness(
+    state: _State, effects: Sequence[Effect], level: float, seed: int, progress: Progress
+) -> None:
+    """Ask whether what passes for red noise is an effect: a step or a drift is red as well.
+
+    The noise is judged again by what the best effect leaves, were the noise not red; that
+    judgement is taken where effect and noise together are clearly likelier.
+    """
+    progress("the noise is red: is it an effect?")
+    effects = [effect for effect in effects if effect.kind != "unnamed"]
+    fit, data, noise = settled(state.fit, state.data, state.noise, state.holding, red=False)
+    other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    if other.p_value > level * CATALOGUE_SHARE:
+        return
+    rivals = refit_leads(fit, data, noise, other, held=state.holding, gross=False, most=3)
+    if not rivals:
+        return
+    extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
+    cost = _DOUBT + 2.0 * rivals[0].lead.effect.count
+    if _badness(extended, noise) + cost > _badness(state.fit, state.noise):
+        return
+    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
+    state.fit, state.data, state.noise = fit, data, noise
+    state.now = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    state.first = state.now if not state.steps else state.first
+
+
+def _badness(fit: Fit, noise: Noise) -> float:
+    """Minus twice the log-likelihood, the noise's part included."""
+    return fit.chi2 + float(np.sum(np.log(noise.variance)))
 
 
 def _drawn(state: _State) -> bool:
@@ -203,17 +241,21 @@ def first_noise(beginning: Beginning) -> Noise:
     return white_noise(data, beginning.noise_rms, slope)
 
 
+def noise_left(fit: Fit, data: Data, *, red: bool = True) -> Noise:
+    """Judge the noise by what a fit leaves."""
+    frequency = fit.value[OMEGA] / (2.0 * np.pi)
+    residual = data.residual(fit.at.reading)
+    return estimate_noise(data, residual, frequency, _LEAST_STEP * data.step, red=red)
+
+
 def settled(
-    fit: Fit, data: Data, noise: Noise, held: Sequence[int]
+    fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Judge the noise anew where the model is near enough, and refit."""
     if is_gross(fit, data) or data.time_noise:
         return fit, data, noise
     data = with_lattice(data, fit.at.reading)
-    residual = data.residual(fit.at.reading)
-    noise = estimate_noise(
-        data, residual, fit.value[OMEGA] / (2.0 * np.pi), _LEAST_STEP * data.step
-    )
+    noise = noise_left(fit, data, red=red)
     return refine(fit.model, data, noise, fit.value, held=held), data, noise
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,14 @@ _FINER: Final = 2
 """Frequencies in 1/(duration)."""
 _SEEN: Final = 0.02
 """Part of a tone's square that the model's own parameters must leave."""
+
+
+class Band(NamedTuple):
+    """Which frequencies are looked at: above one, and not about another."""
+
+    above_hz: float
+    not_hz: float = 0.0
+    width_hz: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,7 @@ class ToneScan:
 
 
 def tone_scan(
-    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, above_hz: float = 0.0
+    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, band: Band
 ) -> ToneScan:
     """Prepare a scan: what the model's tangent space leaves of a tone at each frequency."""
     count = len(data)
@@ -83,7 +91,8 @@ def tone_scan(
     determinant = h11 * h22 - h12**2
     seen = (
         (determinant > (_SEEN * 0.25 * (g11 + g22) ** 2))
-        & (frequency > above_hz)
+        & (frequency > band.above_hz)
+        & (np.abs(frequency - band.not_hz) > band.width_hz)
         & (frequency < 0.98 * frequency[-1])
     )
     safe = np.where(seen, determinant, 1.0)
