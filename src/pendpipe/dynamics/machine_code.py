@@ -91,7 +91,12 @@ def _provide(name: str) -> None:
     if llvm.address_of_symbol(name) is not None:
         return
     library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
-    # Numba's ways to raise exceptions: the engine never does, though its entry declares them.
-    raising = name.startswith(("numba_", "NRT_", "Py"))
-    function = getattr(library, "abort" if raising else name)
+    if name.startswith("Py"):
+        # Named for the whole process: Numba, should it come later, will call it by this name.
+        function = getattr(ctypes.pythonapi, name)
+    else:
+        # Numba's ways to raise: the engine never does, though its entry declares them, and
+        # Numba names its own when it is imported.
+        raising = name.startswith(("numba_", "NRT_"))
+        function = getattr(library, "abort" if raising else name)
     llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
