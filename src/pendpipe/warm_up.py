@@ -2,11 +2,15 @@
 
 numba keeps compiled functions on disk, so only the first call on a machine waits for the
 compiler. The set-up makes that call, lest the first jobs of a campaign all do it at once.
+Python's own byte code is written for the same reason: pip does so for what it copies, not
+for an editable installation, and where PYTHONDONTWRITEBYTECODE is set nobody else would.
 """
 
 from __future__ import annotations
 
+import compileall
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -31,4 +35,5 @@ def warm_up() -> None:
 
 if __name__ == "__main__":
     print("compiling (once on a machine, a minute or two)", file=sys.stderr)
+    compileall.compile_dir(Path(__file__).parent, quiet=2)
     warm_up()

@@ -10,7 +10,7 @@ from pendpipe.analysis.turning_points import kernels
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.sums import HARMONICS
+from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.arrays import FloatArray
 
 _PHASE_WANTED: Final = 0.01

@@ -8,10 +8,8 @@ import numpy as np
 from numba import njit
 
 from pendpipe.analysis.turning_points.kernels import solve_in_place
+from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.arrays import FloatArray, IntArray
-
-HARMONICS = 3
-"""How many odd harmonics above the first the shape may hold (3, 5, 7)."""
 
 
 @njit(cache=True, inline="always")
