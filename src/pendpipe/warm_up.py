@@ -18,6 +18,7 @@ import numpy as np
 def warm_up() -> None:
     """Sample, measure and fit a short decay, by every way that uses compiled code."""
     from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit.rounding import best_noise
     from pendpipe.dynamics import Eq8, Release, sample, turning_points
     from pendpipe.recording import Recording
 
@@ -31,6 +32,7 @@ def warm_up() -> None:
     recording = Recording(time, angle + noise, "angle_rad")
     fit_recording(recording, method="turning-points")
     fit_recording(recording, method="waveform")
+    best_noise(noise, 1e-3, 1e-4)  # of coarse readings
 
 
 if __name__ == "__main__":
