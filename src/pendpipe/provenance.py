@@ -14,8 +14,9 @@ PACKAGE: Final = Path(__file__).parent
 def code_version(module: str) -> str:
     """Hash the source of a module and of everything of ours that it imports.
 
-    Imports inside functions count too. The hash is a parameter of the rule that calls the
-    module, so Snakemake reruns the rule when, and only when, its code has changed.
+    Imports inside functions count too, and those by a name known only at run time. The hash
+    is a parameter of the rule that calls the module, so Snakemake reruns the rule when, and
+    only when, its code has changed.
 
     Parameters
     ----------
@@ -82,6 +83,22 @@ def _imports(module: str) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             found.add(node.module)
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call):
+            found.update(_imported_by_name(node))
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
+
+
+def _imported_by_name(call: ast.Call) -> set[str]:
+    """What ``importlib.import_module(f"pendpipe.formats.{name}")`` may import: each of them."""
+    if ast.unparse(call.func) != "importlib.import_module":
+        return set()
+    match call.args[0]:
+        case ast.Constant(value=str(name)):
+            return {name}
+        case ast.JoinedStr(values=[ast.Constant(value=str(start)), *_]):
+            package = start.rpartition(".")[0]
+            folder = PACKAGE.joinpath(*package.split(".")[1:])
+            return {f"{package}.{path.stem}" for path in folder.glob("*.py")}
+    raise ValueError(f"no name to follow in {ast.unparse(call)}")

@@ -2,11 +2,15 @@
 
 numba keeps compiled functions on disk, so only the first call on a machine waits for the
 compiler. The set-up makes that call, lest the first jobs of a campaign all do it at once.
+Python's own byte code is written for the same reason: pip does so for what it copies, not
+for an editable installation, and where PYTHONDONTWRITEBYTECODE is set nobody else would.
 """
 
 from __future__ import annotations
 
+import compileall
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +18,7 @@ import numpy as np
 def warm_up() -> None:
     """Sample, measure and fit a short decay, by every way that uses compiled code."""
     from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit.rounding import best_noise
     from pendpipe.dynamics import Eq8, Release, sample, turning_points
     from pendpipe.recording import Recording
 
@@ -27,8 +32,10 @@ def warm_up() -> None:
     recording = Recording(time, angle + noise, "angle_rad")
     fit_recording(recording, method="turning-points")
     fit_recording(recording, method="waveform")
+    best_noise(noise, 1e-3, 1e-4)  # of coarse readings
 
 
 if __name__ == "__main__":
     print("compiling (once on a machine, a minute or two)", file=sys.stderr)
+    compileall.compile_dir(Path(__file__).parent, quiet=2)
     warm_up()

@@ -44,3 +44,18 @@ def test_a_template_counts_as_code_of_its_package(library: Path) -> None:
     before = version()
     template.write_text("after")
     assert version() != before
+
+
+@pytest.mark.parametrize("name", ['"pendpipe.readers.text"', 'f"pendpipe.readers.{kind}"'])
+def test_a_module_imported_by_name_counts(library: Path, name: str) -> None:
+    """Which reader a file needs is known only at run time: each of them counts."""
+    (library / "stage.py").write_text(
+        f"import importlib\nkind = 'text'\nreader = importlib.import_module({name})\n"
+    )
+    (library / "readers").mkdir()
+    (library / "readers/__init__.py").write_text("")
+    reader = library / "readers/text.py"
+    reader.write_text("x = 1\n")
+    before = version()
+    reader.write_text("x = 2\n")
+    assert version() != before

@@ -18,12 +18,29 @@ points = turning_points(Eq8(3.0, coulomb=1e-3), Release(0.0, 0.01))
 print(points.time_s.size, "numba" in sys.modules, "scipy" in sys.modules)
 """
 
+NUMBA_AFTERWARDS = """
+import numpy as np
+from numba import njit
 
-def first_call(folder: Path) -> list[str]:
+@njit
+def third(x):
+    if x[0] == 0.0:
+        raise ValueError("zero")
+    return x[2]
+
+print(third(np.arange(1.0, 4.0)))
+try:
+    third(np.zeros(3))
+except ValueError as fault:
+    print(fault)
+"""
+
+
+def first_call(folder: Path, more: str = "") -> list[str]:
     """Call the engine in a new process that keeps its code in `folder`."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder), "OPENBLAS_NUM_THREADS": "1"}
     run = subprocess.run(
-        [sys.executable, "-c", FIRST_CALL], env=environment, capture_output=True, text=True,
+        [sys.executable, "-c", FIRST_CALL + more], env=environment, capture_output=True, text=True,
         check=True,
     )  # fmt: skip
     return run.stdout.split()
@@ -44,6 +61,11 @@ def kept(tmp_path: Path) -> Path:
 
 def test_a_new_process_runs_the_kept_code_without_numba(kept: Path) -> None:
     assert first_call(kept) == ["11", "False", "False"]
+
+
+def test_numba_works_in_a_process_that_has_loaded_the_kept_code(kept: Path) -> None:
+    """What the kept code is linked with is named for the whole process; Numba finds it sound."""
+    assert first_call(kept, NUMBA_AFTERWARDS) == ["11", "False", "False", "3.0", "zero"]
 
 
 @pytest.mark.slow

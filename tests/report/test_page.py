@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from pendpipe.cli import main
+from pendpipe.report.headline import as_text, headline, typical_record
 from pendpipe.report.page import BUDGET_BYTES, render
 
 VOID = {"meta", "link", "br", "hr", "img", "input", "path", "use", "rect", "image", "line"}
@@ -116,6 +117,19 @@ def test_headline_has_campaign_paper_and_hidden_truth(page: str) -> None:
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group())
     # (1.1165 - 1.117)/0.0062 rounds to -0.1.
     assert cells == ["1.1165 ± 0.0062", "1.13 (176/156)", "−1.0 %", "1.117", "−0.1"]
+
+
+def test_the_terminal_shows_the_headline_s_numbers(example: Any) -> None:
+    """1 + a/δ of the typical record among them, beside the paper's and the hidden truth."""
+    rows = headline(example.content, {"drag_factor": 1.117})
+    lines = as_text(rows).splitlines()
+    assert all(row.found in line for row, line in zip(rows, lines, strict=True))
+    drag = next(line for line in lines if line.startswith("Drag measured over Eq. 16"))
+    assert re.search(r" 1\.1165 ± 0\.0062 +paper 1\.13 \(176/156\); truth 1\.117$", drag)
+    typical = typical_record(example.content)
+    assert typical is not None
+    shown = next(line for line in lines if "1 + a/δ" in line)
+    assert float(shown.split()[-1]) == pytest.approx(1.0 + typical["a_over_delta"], abs=0.05)
 
 
 def test_a_simulated_campaign_says_so_and_a_real_one_does_not(example: Any, page: str) -> None:

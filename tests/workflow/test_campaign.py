@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -29,12 +30,14 @@ class Campaign:
         self.configuration = folder / "config.yaml"
         self.configuration.write_text(yaml.safe_dump(content), encoding="utf-8")
 
-    def snakemake(self, *arguments: str) -> str:
-        """Run Snakemake and return what it said; it must end well."""
+    def snakemake(self, *arguments: str, library: Path | None = None) -> str:
+        """Run Snakemake, with another copy of the library if one is given; it must end well."""
+        elsewhere = {} if library is None else {"PYTHONPATH": str(library)}
         command = [sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"]
         done = subprocess.run(
             [*command, "--configfile", str(self.configuration), *arguments],
             cwd=ROOT,
+            env=os.environ | elsewhere,
             capture_output=True,
             text=True,
             check=False,
@@ -42,9 +45,9 @@ class Campaign:
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
-    def planned(self, *arguments: str) -> dict[str, int]:
+    def planned(self, *arguments: str, library: Path | None = None) -> dict[str, int]:
         """Count the jobs that Snakemake would run."""
-        said = self.snakemake("-n", *arguments)
+        said = self.snakemake("-n", *arguments, library=library)
         return {
             name: int(count)
             for name, count in re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
@@ -130,6 +133,22 @@ def test_an_added_row_runs_its_own_jobs_and_the_campaigns(campaign: Campaign) ->
         assert planned[stage] == 1
     for stage in ("separate", "compare", "figures", "report"):
         assert planned[stage] == 1
+
+
+def test_a_change_in_the_library_reruns_what_depends_on_it(
+    campaign: Campaign, tmp_path: Path
+) -> None:
+    """A change of the fit reruns the fits and what follows; an untouched copy nothing."""
+    library = tmp_path / "src"
+    shutil.copytree(ROOT / "src", library, ignore=shutil.ignore_patterns("__pycache__"))
+    assert "Nothing to be done" in campaign.snakemake("-n", library=library)
+    with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
+        source.write("# changed\n")
+    planned = campaign.planned(library=library)
+    records = len(campaign.records.read_text(encoding="utf-8").splitlines()) - 1
+    assert planned["fit"] == records
+    assert planned["separate"] == planned["compare"] == planned["report"] == 1
+    assert not {"acquire", "caliper", "calibrate", "turning_points"} & set(planned)
 
 
 def test_the_results_name_no_path_of_the_machine(campaign: Campaign) -> None:

@@ -129,6 +129,17 @@ def test_a_faulty_table_is_refused_with_its_line(
     assert said in str(caught.value)
 
 
+def test_the_jobs_get_numbers_where_the_command_line_gave_text(
+    content: dict[str, Any], tmp_path: Path
+) -> None:
+    """Snakemake's --config hands on a number within braces as text."""
+    content["simulated"]["drag_factor"] = "1.0"
+    stored = read_configuration(jobs.store(load_campaign(content, "--config"), tmp_path))
+    assert stored["simulated"]["drag_factor"] == 1.0
+    again = load_campaign(stored, "stored")
+    assert jobs.store(again, tmp_path) == jobs.store(load_campaign(content, "--config"), tmp_path)
+
+
 def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str, Any]) -> None:
     """Another water changes the water records' acquisition and leaves the air's."""
     before = load_campaign(content, "config.yaml")

@@ -28,7 +28,7 @@ FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
 # The rules hand it on as a resource: unlike a parameter, that is nothing to rerun for. What
 # a rule takes from the configuration is digested in its own parameters.
-CONFIGURATION = jobs.store(config, ".snakemake/pendpipe")
+CONFIGURATION = jobs.store(CAMPAIGN, ".snakemake/pendpipe")
 
 
 wildcard_constraints:

@@ -73,9 +73,6 @@ def _fit(arguments: argparse.Namespace) -> None:
         points = read_turning_points(arguments.turning_points)
         part = recording.between(points.start_s, points.stop_s)
     else:
-        from pendpipe.commands._compiled import start_numba
-
-        start_numba()
         from pendpipe.analysis.turning_points.recorded import measure_recording
 
         points, part = measure_recording(recording, arguments.file)

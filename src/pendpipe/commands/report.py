@@ -1,7 +1,8 @@
 """Write the page about a campaign: one self-contained HTML file.
 
 It opens without a network, prints, and can be read without a script. Figures are taken
-from the folder `figures` beside the page, where pendpipe figures has put them.
+from the folder `figures` beside the page, where pendpipe figures has put them. The
+campaign's numbers go to standard output too, beside the paper's and the simulated truth.
 """
 
 from __future__ import annotations
@@ -36,12 +37,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
     from pendpipe.figures.inputs import read_comparison, read_content, results_folder
     from pendpipe.files import replaced
+    from pendpipe.report.headline import as_text, headline
     from pendpipe.report.page import render
 
     configuration = read_content(arguments.campaign)
+    comparison = read_comparison(arguments.comparison)
     page = render(
         configuration,
-        read_comparison(arguments.comparison),
+        comparison,
         read_content(arguments.summary, "run pendpipe compare first"),
         results_folder(configuration),
         arguments.figures or arguments.out.parent / "figures",
@@ -49,4 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
     with replaced(arguments.out) as stream:
         stream.write(page)
     print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
+    if rows := headline(comparison, configuration.get("simulated") or {}):
+        print(as_text(rows))
     return 0

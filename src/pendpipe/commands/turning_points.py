@@ -39,9 +39,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _measure(arguments: argparse.Namespace) -> None:
-    from pendpipe.commands._compiled import start_numba
-
-    start_numba()
     from pendpipe.analysis.turning_points import write_turning_points
     from pendpipe.analysis.turning_points.recorded import measure_recording
     from pendpipe.commands._motion import read_motion

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,16 +32,18 @@ def digest(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def store(content: Mapping[str, Any], folder: str | Path) -> str:
-    """Write a configuration under a name made of its content, unless it is there.
+def store(campaign: Campaign, folder: str | Path) -> str:
+    """Write the checked configuration under a name made of its content, unless it is there.
 
-    Snakemake merges files and ``--config``; the jobs read what came out of it. The name
-    is not a parameter of the rules, so that a change reruns only what it touches.
+    Snakemake merges files and ``--config`` (which hands numbers on as text); the jobs read
+    what the check made of them, defaults and all. The name is not a parameter of the rules,
+    so that a change reruns only what it touches.
     """
+    content = campaign.configuration.model_dump(mode="json")
     path = Path(folder) / f"configuration-{digest(content)}.json"
     if not path.exists():
         with replaced(path) as stream:
-            json.dump(content, stream, indent=1, default=str)
+            json.dump(content, stream, indent=1)
     return path.as_posix()
 
 

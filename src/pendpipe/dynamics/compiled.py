@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pendpipe.dynamics import machine_code
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
 SOURCES = (
     "chebyshev.py", "emission.py", "entry.py", "half_cycle.py", "layout.py", "march.py",
@@ -29,11 +29,15 @@ _ENTRY = ctypes.CFUNCTYPE(
 
 def file_name() -> str:
     """Return a name that changes with the engine's sources and with the machine."""
-    folder = Path(__file__).parent
-    text = b"".join((folder / name).read_bytes() for name in SOURCES)
+    return name_of("engine", [Path(__file__).parent / name for name in SOURCES])
+
+
+def name_of(stem: str, paths: Iterable[Path]) -> str:
+    """Return a name that changes with these sources and with the machine."""
+    text = b"".join(path.read_bytes() for path in paths)
     sources = hashlib.blake2b(text, digest_size=8).hexdigest()
     machine = hashlib.blake2b(machine_code.platform().encode(), digest_size=8).hexdigest()
-    return f"engine-{machine}-{sources}.bin"
+    return f"{stem}-{machine}-{sources}.bin"
 
 
 def folders() -> Iterator[Path]:
@@ -50,22 +54,39 @@ def folders() -> Iterator[Path]:
         )
 
 
-def _compile() -> tuple[int, Any]:
-    """Compile the engine, and keep its code where that is allowed."""
-    from pendpipe.dynamics.entry import compiled_entry
+def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int], Any]:
+    """Return the addresses of compiled functions, and what must stay alive with them.
 
-    entry = compiled_entry()
-    name = file_name()
+    Parameters
+    ----------
+    name
+        Of the file that keeps them, from `name_of`.
+    compile_all
+        Makes Numba's cfuncs, if the file is not there.
+    """
+    for folder in folders():
+        loaded = machine_code.load(folder / name)
+        if loaded is not None:
+            return loaded
+    entries = compile_all()
+    parts = [(entry.inspect_llvm(), entry.native_name) for entry in entries]
     for folder in folders():
         try:
-            machine_code.keep(folder / name, entry.inspect_llvm(), entry.native_name)
+            machine_code.keep(folder / name, parts)
         except OSError:
             continue
         for old in folder.glob(f"{name.rpartition('-')[0]}-*.bin"):
             if old.name != name:
                 old.unlink(missing_ok=True)
         break
-    return entry.address, entry
+    return [entry.address for entry in entries], entries
+
+
+def _compile() -> list[Any]:
+    """Compile the engine."""
+    from pendpipe.dynamics.entry import compiled_entry
+
+    return [compiled_entry()]
 
 
 @cache
@@ -75,14 +96,7 @@ def engine() -> Callable[..., int]:
     The first call in a new installation compiles for half a minute; those in later processes
     take about a tenth of a second.
     """
-    name = file_name()
-    for folder in folders():
-        loaded = machine_code.load(folder / name)
-        if loaded is not None:
-            break
-    else:
-        loaded = _compile()
-    address, owner = loaded
+    (address,), owner = kept(file_name(), _compile)
     function = _ENTRY(address)
     function.owner = owner  # type: ignore[attr-defined]
     return function

@@ -17,6 +17,7 @@ import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 # What LLVM itself may call for, besides what the code declares.
@@ -45,31 +46,36 @@ def _target_machine() -> Any:
     )
 
 
-def keep(path: Path, assembly: str, name: str) -> None:
-    """Write the machine code of a module, whose function `name` will be called, to `path`."""
+def keep(path: Path, parts: Sequence[tuple[str, str]]) -> None:
+    """Write the machine code of modules, each with the function that will be called, to `path`."""
     machine = _target_machine()
-    module = llvm.parse_assembly(assembly)
-    declared = [
-        function.name
-        for function in module.functions
-        if function.is_declaration and not function.name.startswith("llvm.")
-    ]
-    code = machine.emit_object(module)
-    head = {"name": name, "needs": declared, "digest": hashlib.blake2b(code).hexdigest()}
+    heads, codes = [], []
+    for assembly, name in parts:
+        module = llvm.parse_assembly(assembly)
+        declared = [
+            function.name
+            for function in module.functions
+            if function.is_declaration and not function.name.startswith("llvm.")
+        ]
+        codes.append(machine.emit_object(module))
+        heads.append({"name": name, "needs": declared, "size": len(codes[-1])})
+    code = b"".join(codes)
+    head = {"parts": heads, "digest": hashlib.blake2b(code).hexdigest()}
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}")
     part.write_bytes(json.dumps(head).encode() + b"\n" + code)
     part.replace(path)
 
 
-def load(path: Path) -> tuple[int, Any] | None:
-    """Return the address of the function kept in `path`, and what must stay alive with it.
+def load(path: Path) -> tuple[list[int], Any] | None:
+    """Return the addresses of the functions kept in `path`, and what must stay alive with them.
 
     None if there is no such file, or it is damaged, or this process lacks what it needs.
     """
     try:
         line, code = path.read_bytes().split(b"\n", 1)
         head = json.loads(line)
+        parts = head["parts"]
         sound = hashlib.blake2b(code).hexdigest() == head["digest"]
     except (OSError, ValueError, KeyError):
         return None
@@ -77,12 +83,16 @@ def load(path: Path) -> tuple[int, Any] | None:
         return None
     machine = _target_machine()
     with contextlib.suppress(AttributeError):
-        for name in {*_LIBRARY, *head["needs"]}:
+        for name in {*_LIBRARY, *(need for part in parts for need in part["needs"])}:
             _provide(name)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        start = 0
+        for part in parts:
+            stop = start + part["size"]
+            engine.add_object_file(llvm.ObjectFileRef.from_data(code[start:stop]))
+            start = stop
         engine.finalize_object()
-        return engine.get_function_address(head["name"]), engine
+        return [engine.get_function_address(part["name"]) for part in parts], engine
     return None
 
 
@@ -91,7 +101,12 @@ def _provide(name: str) -> None:
     if llvm.address_of_symbol(name) is not None:
         return
     library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
-    # Numba's ways to raise exceptions: the engine never does, though its entry declares them.
-    raising = name.startswith(("numba_", "NRT_", "Py"))
-    function = getattr(library, "abort" if raising else name)
+    if name.startswith("Py"):
+        # Named for the whole process: Numba, should it come later, will call it by this name.
+        function = getattr(ctypes.pythonapi, name)
+    else:
+        # Numba's ways to raise: the engine never does, though its entry declares them, and
+        # Numba names its own when it is imported.
+        raising = name.startswith(("numba_", "NRT_"))
+        function = getattr(library, "abort" if raising else name)
     llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)

@@ -13,15 +13,17 @@ make_array: Any = arrayobj.make_array
 populate_array: Any = arrayobj.populate_array
 
 _ITEM = 8
+_INTEGERS = types.Array(types.int64, 1, "C")
 _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
 
 
 def _vector(_typing: Any, pointer: Any, size: Any) -> Any:
     """Return the array of `size` numbers at `pointer`."""
+    kind = _INTEGERS if pointer.dtype == types.int64 else _VECTOR
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        result = make_array(_VECTOR)(context, builder)
+        result = make_array(kind)(context, builder)
         item = context.get_constant(types.intp, _ITEM)
         populate_array(
             result, data=arguments[0], shape=[arguments[1]], strides=[item], itemsize=item,
@@ -29,7 +31,7 @@ def _vector(_typing: Any, pointer: Any, size: Any) -> Any:
         )  # fmt: skip
         return result._getvalue()
 
-    return _VECTOR(pointer, size), generate
+    return kind(pointer, size), generate
 
 
 def _matrix(_typing: Any, numbers: Any, rows: Any, columns: Any) -> Any:

@@ -76,7 +76,7 @@ def _rms(misfit: FloatArray, unit: str) -> str:
 
 def _plain_log_labels(axes: Axes) -> None:
     """Write 0.5, 1, 2, 5, ... on a logarithmic axis instead of powers of ten."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     low, high = axes.get_ylim()
     steps: tuple[float, ...] = (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
@@ -84,5 +84,4 @@ def _plain_log_labels(axes: Axes) -> None:
         steps = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
     axes.yaxis.set_major_locator(LogLocator(subs=steps))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(which="minor", length=0)
+    axes.yaxis.set_minor_locator(NullLocator())

@@ -153,4 +153,6 @@ def save(figure: Figure, stem: Path, *, dpi: int = 200) -> list[Path]:
             form = path.suffix[1:]
             with replaced(path, "wb") as stream:
                 figure.savefig(stream, format=form, dpi=dpi, metadata=metadata[form])
+            # Laid out once: both forms are alike, in half the time.
+            figure.set_layout_engine("none")
     return written

@@ -60,6 +60,17 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
     return [row for row in rows if row is not None]
 
 
+def as_text(rows: list[Row]) -> str:
+    """The same table for a terminal, a line a number."""
+    first, second = (max(len(row[column]) for row in rows) + 2 for column in (0, 1))
+    lines = []
+    for row in rows:
+        beside = {"paper": row.paper, "truth": row.truth}
+        told = "; ".join(f"{whose} {value}" for whose, value in beside.items() if value)
+        lines.append(f"{row.name:<{first}}{row.found:<{second}}{told}".rstrip())
+    return "\n".join(lines)
+
+
 def _row(name: str, found: Any, key: str, truth: float | None = None) -> Row | None:
     """A row for an estimate; none where the campaign has none."""
     value, sd = number(found), error(found)
@@ -108,6 +119,9 @@ def _typical(comparison: Comparison) -> Iterator[Row | None]:
         _row(f"{name}: {text}", entry.get(quantity), key)
         for text, (quantity, key) in estimates.items()
     ]
+    if entry.get("a_over_delta"):
+        ratio = number(entry["a_over_delta"])
+        rows.append(Row(f"{name}: 1 + a/δ of Eq. 2", f"{1.0 + ratio:.1f}"))
     rates = [number(entry.get(key)) for key in "abc"]
     if all(map(math.isfinite, rates)):
         largest = float(physics.largest_quality_factor(frequency, *rates))

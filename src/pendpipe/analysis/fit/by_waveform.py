@@ -25,7 +25,6 @@ from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
-from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
@@ -155,6 +154,9 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     rms = math.sqrt(float(np.mean(residual**2)))
     if step is None or not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
         return fitted
+    # Few recordings are so coarse; the others need no numba.
+    from pendpipe.analysis.fit.rounding import best_noise
+
     for _ in range(_ROUNDS):
         noise = best_noise(problem.residual(value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method
-from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
+from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.recording import Recording
 
 
@@ -49,13 +49,17 @@ def fit_recording(
     """
     if method == "turning-points":
         if points is None:
+            from pendpipe.analysis.turning_points import find_turning_points
+
             points = find_turning_points(recording, place)
         return fit_points(points, baseline=baseline, fixed=fixed)
     from pendpipe.analysis.fit.by_waveform import fit_waveform
-    from pendpipe.analysis.turning_points.find import turning_points_of
     from pendpipe.analysis.turning_points.samples import prepare
 
     samples = prepare(recording, place)
     if points is None:
+        # Numba comes along, which those who have the points need not wait for.
+        from pendpipe.analysis.turning_points.find import turning_points_of
+
         points = turning_points_of(samples, place)
     return fit_waveform(samples, points, baseline=baseline, fixed=fixed)

@@ -15,7 +15,6 @@ from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
-from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 
@@ -75,6 +74,9 @@ def _tracked(
     interval = _even_interval(samples.time_s)
     if interval is None:
         return None
+    # Numba comes along: it is little beside a record that is so long.
+    from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
+
     cores = min(os.cpu_count() or 1, _CORES, max(1, len(samples) // (2 * block)))
     starts = [len(samples) * k // cores for k in range(cores)]
     heads = [_start(samples, start, measure_block, block // 64) for start in starts]

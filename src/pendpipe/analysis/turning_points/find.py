@@ -17,12 +17,12 @@ from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough, rough_half_cycles
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.shape import (
+    HARMONICS,
     LossRates,
     half_cycle_shape,
     loss_rates,
     shape_error,
 )
-from pendpipe.analysis.turning_points.sums import HARMONICS
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError

@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import kernels
+from pendpipe.analysis.turning_points import compiled
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.sums import HARMONICS
+from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.arrays import FloatArray
 
 _PHASE_WANTED: Final = 0.01
@@ -26,7 +26,7 @@ def first_places(rough: Rough) -> Places:
     """
     at = np.arange(rough.number[0] - 1, rough.number[-1] + 1)
     weight = np.ones(len(rough.number))
-    centre, half_period = kernels.smooth_times(
+    centre, half_period = compiled.smooth_times(
         rough.number.astype(np.float64), rough.time_s, weight, 5.0, at.astype(np.float64)
     )
     return _places(at, centre, half_period, -int(rough.side[0]))
@@ -57,7 +57,7 @@ def resmoothed(places: Places, measured: Measured, noise: float) -> Places:
     time, weight = times_and_weights(places, measured, noise)
     known = weight > 0.0
     wanted = float(np.median(places.angular_frequency) / _PHASE_WANTED) ** 2
-    centre, half_period = kernels.smooth_times(
+    centre, half_period = compiled.smooth_times(
         places.number[known].astype(np.float64), time[known], weight[known], wanted,
         places.number.astype(np.float64),
     )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from pendpipe.analysis.noise import white_rms
 from pendpipe.analysis.turning_points.measure import Measured, Places, edges, measure
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.sums import HARMONICS
+from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.arrays import BoolArray, FloatArray
 
 _CLEARLY: Final = 0.02

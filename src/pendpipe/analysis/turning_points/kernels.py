@@ -1,34 +1,51 @@
-"""Loops over readings and extremes: find them, count them, smooth their times."""
+"""Loops over readings and extremes: find them, count them, smooth their times.
+
+Compiled to be kept (`compiled.py` calls them): they allocate nothing, but fill what they
+are given, and raise nothing.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
 
 from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.views import matrix
+
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 
-@njit(cache=True)
-def extremes(values: FloatArray, stride: int, start: float, least: float) -> tuple[IntArray, int]:
+def kernel(function: _F, *, fastmath: bool = False) -> _F:
+    """Compile a function that neither allocates nor raises."""
+    options: dict[str, Any] = {"_nrt": False, "error_model": "numpy", "fastmath": fastmath}
+    return njit(**options)(function)  # type: ignore[no-any-return]
+
+
+@kernel
+def extremes(
+    values: FloatArray, stride: int, start: float, least: float, found: IntArray, work: FloatArray
+) -> int:
     """Find alternating extremes: each is followed by a return of at least a threshold.
 
     Parameters
     ----------
-    values, stride
-        Readings, of which every `stride`-th is looked at; nothing need be known of level
-        or period.
-    start
-        The first threshold; later it is a quarter of the median of the last five swings.
-    least
-        Threshold that is never undercut (a multiple of the noise).
+    values, stride, start, least
+        See `compiled.extremes`.
+    found
+        To be filled: positions of the extremes.
+    work
+        Room for 10 numbers.
 
     Returns
     -------
-    index, first
-        Positions of the extremes; `first` is +1 if the first one is a maximum.
+    int
+        How many were found; negative if the first one is a minimum.
     """
-    found = np.empty(len(values) // (2 * stride) + 2, dtype=np.int64)
-    swings = np.full(5, np.nan)
+    swings, ordered = work[:5], work[5:10]
+    swings[:] = np.inf
     count, direction, first = 0, 0, 0
     threshold = max(start, least)
     high, low = 0, 0
@@ -51,20 +68,29 @@ def extremes(values: FloatArray, stride: int, start: float, least: float) -> tup
             first = -turned
         else:
             swings[count % 5] = abs(values[extreme] - values[found[count - 1]])
-            known = swings[~np.isnan(swings)]
-            threshold = max(least, 0.25 * np.median(known))
+            threshold = max(least, 0.25 * _median(swings, ordered, min(count, 5)))
         found[count] = extreme
         count += 1
         direction, high, low, top, bottom = turned, i, i, x, x
-    return found[:count].copy(), first
+    return first * count
 
 
-@njit(cache=True)
+@kernel
+def _median(values: FloatArray, ordered: FloatArray, known: int) -> float:
+    """Median of five values of which only `known` are finite; `ordered` is room for them."""
+    for i in range(5):
+        j = i
+        while j > 0 and ordered[j - 1] > values[i]:
+            ordered[j] = ordered[j - 1]
+            j -= 1
+        ordered[j] = values[i]
+    lower, upper = ordered[(known - 1) // 2], ordered[known // 2]
+    return float(0.5 * (lower + upper))
+
+
+@kernel
 def solve_in_place(matrix: FloatArray, right: FloatArray) -> None:
-    """Solve a small positive definite system; `right` becomes the solution.
-
-    numba's own ``linalg`` would import scipy, which costs more than all of this.
-    """
+    """Solve a small positive definite system; `right` becomes the solution."""
     size = len(right)
     for p in range(size):
         for q in range(p + 1, size):
@@ -78,26 +104,29 @@ def solve_in_place(matrix: FloatArray, right: FloatArray) -> None:
         right[p] /= matrix[p, p]
 
 
-@njit(cache=True)
+@kernel
 def smooth_times(
-    number: FloatArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    number: FloatArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: FloatArray,
+    centre: FloatArray, slope: FloatArray, work: FloatArray,
+) -> None:  # fmt: skip
     """Smooth the times of turning points over as many neighbours as it takes.
 
-    A weighted local parabola in the number of the half cycle; the window grows until the
-    weights sum to `wanted` (the inverse variance that is good enough), between 2 and 40
-    neighbours to each side.
-
-    Returns
-    -------
-    centre_s, half_period_s
-        Smoothed time and slope at each number in `at`.
+    Parameters
+    ----------
+    number, time_s, weight, wanted, at
+        See `compiled.smooth_times`.
+    centre, slope
+        To be filled: smoothed time and slope at each number in `at`.
+    work
+        Room for 15 numbers.
     """
-    centre = np.empty(len(at))
-    slope = np.empty(len(at))
     last = len(number) - 1
+    middle = 0
     for k in range(len(at)):
-        middle = np.searchsorted(number, at[k])
+        while middle > 0 and number[middle - 1] >= at[k]:
+            middle -= 1
+        while middle <= last and number[middle] < at[k]:
+            middle += 1
         lo, hi = max(middle - 2, 0), min(middle + 2, last)
         lo, hi = max(min(lo, hi - 3), 0), min(max(hi, lo + 3), last)
         total = weight[lo : hi + 1].sum()
@@ -108,47 +137,45 @@ def smooth_times(
             if hi < last:
                 hi += 1
                 total += weight[hi]
-        degree = 2 if hi - lo >= 4 else 1
-        normal = np.zeros((degree + 1, degree + 1))
-        right = np.zeros(degree + 1)
-        power = np.ones(degree + 1)
+        size = 3 if hi - lo >= 4 else 2
+        normal, right, power = matrix(work, size, size), work[9 : 9 + size], work[12 : 12 + size]
+        normal[:, :] = 0.0
+        right[:] = 0.0
+        power[0] = 1.0
         for j in range(lo, hi + 1):
             u = number[j] - at[k]
-            for p in range(1, degree + 1):
+            for p in range(1, size):
                 power[p] = power[p - 1] * u
-            for p in range(degree + 1):
+            for p in range(size):
                 right[p] += weight[j] * power[p] * (time_s[j] - time_s[lo])
-                for q in range(degree + 1):
+                for q in range(size):
                     normal[p, q] += weight[j] * power[p] * power[q]
         solve_in_place(normal, right)
         centre[k] = time_s[lo] + right[0]
         slope[k] = right[1]
-    return centre, slope
 
 
-@njit(cache=True)
+@kernel
 def count_half_cycles(
-    time_s: FloatArray, sign: IntArray, gap_before: IntArray
-) -> tuple[IntArray, int]:
+    time_s: FloatArray, sign: IntArray, gap_before: IntArray, period: float, number: IntArray
+) -> int:
     """Number the extremes, counting those that a gap in the data has swallowed.
 
     Parameters
     ----------
-    time_s, sign
-        Of each extreme; `sign` is +1 for a maximum.
-    gap_before
-        1 where samples are missing between an extreme and the one before it.
+    time_s, sign, gap_before
+        See `compiled.count_half_cycles`.
+    period
+        Half period at first.
+    number
+        To be filled: the number of each half cycle from 0.
 
     Returns
     -------
-    number, good
-        Number of each half cycle from 0; and how many extremes from the start hang
-        together (an interval of three half cycles without a gap ends the motion).
+    int
+        How many extremes from the start hang together.
     """
-    number = np.zeros(len(time_s), dtype=np.int64)
-    if len(time_s) < 2:
-        return number, len(time_s)
-    period = np.median(np.diff(time_s[: min(6, len(time_s))]))
+    number[0] = 0
     for k in range(1, len(time_s)):
         interval = time_s[k] - time_s[k - 1]
         odd = sign[k] != sign[k - 1]
@@ -157,8 +184,8 @@ def count_half_cycles(
             whole += 1 if interval / period > whole else -1
         whole = max(whole, 1 if odd else 2)
         if whole > 2 and gap_before[k] == 0:
-            return number, k
+            return k
         number[k] = number[k - 1] + whole
         if whole == 1:
             period += 0.3 * (interval - period)
-    return number, len(time_s)
+    return len(time_s)

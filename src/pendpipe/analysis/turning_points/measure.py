@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import sums
+from pendpipe.analysis.turning_points import compiled
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
@@ -132,17 +132,14 @@ def measure(
         samples.time_s, samples.values, stride, edges(samples, places, window),
         places.centre_s, places.angular_frequency, level, shape,
     )  # fmt: skip
-    if free or shape[:, 4:].any():
-        gram, right, square = sums.half_cycle_sums(*arguments, free)
-    else:
-        gram, right, square = sums.plain_sums(*arguments)
+    gram, right, square = compiled.half_cycle_sums(*arguments, free)
     prior = np.zeros(number)
     lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:
         size = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (size * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(lopsided, held, 0.0)
-    solution, inverse = sums.solve_half_cycles(gram, right, prior)
+    solution, inverse = compiled.solve_half_cycles(gram, right, prior)
     flat = gram[:, 1:, 0]
     best = solution[:, :, 0]
     return Measured(

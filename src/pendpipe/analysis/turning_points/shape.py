@@ -19,10 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.sums import HARMONICS
 from pendpipe.arrays import FloatArray
 
 HALF_PI = 0.5 * np.pi
+HARMONICS = 3
+"""How many odd harmonics above the first the shape may hold (3, 5, 7)."""
 
 
 class LossRates(NamedTuple):
