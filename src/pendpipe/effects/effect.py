@@ -38,6 +38,11 @@ class Kick(NamedTuple):
     log_amplitude: float = 0.0
     """Change of ln r at unchanged phase."""
 
+    @property
+    def acts(self) -> bool:
+        """Whether it changes anything."""
+        return bool(self.angle or self.velocity or self.log_amplitude)
+
 
 @dataclass(frozen=True)
 class Pendulum:
