@@ -155,7 +155,7 @@ def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
         name = ["size", *(p.name for p in effect.parameters)][index - len(BASE) + 1 - effect.switch]
         step = 1e-2 * abs(value[index])
         if name == "time":
-            step = 0.025
+            step = 0.0625 * 2.0 * math.pi / float(BASE[OMEGA])
         elif name in FREQUENCIES:
             step = 1e-5
         expected = numerical(model, value, index, step)

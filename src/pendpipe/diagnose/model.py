@@ -291,7 +291,7 @@ class Model:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
         if effect.parameters[index - effect.switch].name == "time":
             # Over several readings, or the one that is crossed decides.
-            return 2.0 * span.interval_s
+            return min(2.0 * span.interval_s, 0.0625 * span.period_s)
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 
