@@ -17,6 +17,7 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
 from pendpipe.diagnose.spectrum import ToneScan, tone_scan
 from pendpipe.effects import Effect
+from pendpipe.effects.tones import plane_band_hz
 
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""
@@ -82,11 +83,12 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     scans: list[ToneScan] = []
     if spectral and data.uniform:
         slowest = _TURNS / (data.time_s[-1] - data.time_s[0])
-        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), slowest))
+        own, band = 1.0 / fit.at.span.period_s, plane_band_hz(fit.at.span)
         since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
-        scans += [
-            tone_scan(data, noise, bank.basis, np.exp(-since / dying), slowest)
-            for dying in _DYING
+        envelopes = [np.ones(len(data)), *(np.exp(-since / dying) for dying in _DYING)]
+        scans = [
+            tone_scan(data, noise, bank.basis, envelope, slowest, (own - band, own + band))
+            for envelope in envelopes
         ]
     return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))
 

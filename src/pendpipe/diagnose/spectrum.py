@@ -56,9 +56,13 @@ class ToneScan:
 
 
 def tone_scan(
-    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, above_hz: float = 0.0
-) -> ToneScan:
-    """Prepare a scan: what the model's tangent space leaves of a tone at each frequency."""
+    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, above_hz: float = 0.0,
+    apart_hz: tuple[float, float] = (0.0, 0.0),
+) -> ToneScan:  # fmt: skip
+    """Prepare a scan: what the model's tangent space leaves of a tone at each frequency.
+
+    Tones at or below `above_hz`, and from the first to the second of `apart_hz`, are left out.
+    """
     count = len(data)
     size = int(2 ** np.ceil(np.log2(_FINER * count)))
     frequency = np.fft.rfftfreq(size, data.interval_s)[1:]
@@ -84,6 +88,7 @@ def tone_scan(
     seen = (
         (determinant > (_SEEN * 0.25 * (g11 + g22) ** 2))
         & (frequency > above_hz)
+        & ~((frequency > apart_hz[0]) & (frequency < apart_hz[1]))
         & (frequency < 0.98 * frequency[-1])
     )
     safe = np.where(seen, determinant, 1.0)
