@@ -161,6 +161,12 @@ class Effect:
         return self.identifier
 
     @property
+    def one_sided(self) -> bool:
+        """Whether it has one size, which is never negative."""
+        positive = self.switch or (bool(self.parameters) and self.parameters[0].low >= 0.0)
+        return self.sizes == 1 and positive
+
+    @property
     def count(self) -> int:
         """How many values describe it, a switch's size included."""
         return len(self.parameters) + (1 if self.switch else 0)
