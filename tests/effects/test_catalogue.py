@@ -101,6 +101,16 @@ def test_the_page_is_the_catalogues() -> None:
     assert committed.read_text(encoding="utf-8") == page()
 
 
+def test_frictions_have_one_sign() -> None:
+    """A size that can't be negative is looked for with its own sign only."""
+    one_sided = {effect.identifier for effect in CATALOGUE if effect.template and effect.one_sided}
+    assert one_sided == {
+        "circular-error", "coulomb-friction", "quadratic-drag", "drag-form", "power-law-damping",
+        "stribeck-friction", "presliding-friction", "backlash", "history-force",
+        "vortex-shedding", "sensor-backlash",
+    }  # fmt: skip
+
+
 def test_what_eq8_holds_is_left_out_of_its_catalogue() -> None:
     inside = {effect.identifier for effect in CATALOGUE if "eq8" in effect.inside}
     assert inside == {"coulomb-friction", "quadratic-drag"}
@@ -155,7 +165,7 @@ def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
         name = ["size", *(p.name for p in effect.parameters)][index - len(BASE) + 1 - effect.switch]
         step = 1e-2 * abs(value[index])
         if name == "time":
-            step = 0.025
+            step = 0.0625 * 2.0 * math.pi / float(BASE[OMEGA])
         elif name in FREQUENCIES:
             step = 1e-5
         expected = numerical(model, value, index, step)

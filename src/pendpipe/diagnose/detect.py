@@ -18,13 +18,13 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
 from pendpipe.diagnose.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
+from pendpipe.effects.tones import plane_band_hz
 
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""
 
 _TURNS: Final = 3.0
-"""Cycles in the record that make a tone; what is slower is a drift. So many are also needed
-to tell a tone from the motion itself: what is nearer beats (a second plane)."""
+"""Cycles in the record that make a tone; what is slower is a drift."""
 _ABOVE: Final = 1.3
 """Of the motion's frequency: where second modes are looked for."""
 
@@ -87,7 +87,7 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     if spectral and data.uniform:
         duration = float(data.time_s[-1] - data.time_s[0])
         own = fit.value[OMEGA] / (2.0 * math.pi)
-        steady = Band(_TURNS / duration, own, _TURNS / duration)
+        steady = Band(_TURNS / duration, own, plane_band_hz(fit.at.span))
         scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), steady))
         since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
         scans += [

@@ -46,18 +46,24 @@ class Evaluated:
         _, _, by_log, by_time = self._start
         return np.asarray(self.sampled.angle * by_log - self.sampled.velocity * by_time)
 
-    def after_kick(self, kick: Kick | None) -> FloatArray:
-        """Change of the readings by a small kick."""
-        if kick is None or not (kick.angle or kick.velocity or kick.log_amplitude):
-            return np.zeros(len(self.reading))
+    def after_kicks(self, kicks: Sequence[Kick | None]) -> FloatArray:
+        """Change of the readings by each of several small kicks, shape (kicks, n)."""
+        change = np.zeros((len(kicks), len(self.reading)))
+        rows = [row for row, kick in enumerate(kicks) if kick is not None and kick.acts]
+        acting = [kick for kick in kicks if kick is not None and kick.acts]
+        if not acting:
+            return change
+        instants = np.array([kick.time_s for kick in acting])
+        there = sample_motion(self.tangent.motion, instants)
+        log, late = kick_sizes(there, acting, there)
         node_log, node_time, by_log, by_time = self._start
-        there = sample_motion(self.tangent.motion, np.array([kick.time_s]))
-        log, late = kick_sizes(there, kick, self.tangent.motion)
-        then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))[:, 0]
-        scale = log / then_log
-        x, v = self.sampled.angle, self.sampled.velocity
-        change = x * by_log * scale - v * (late + (by_time - then_time) * scale)
-        return np.asarray(np.where(self.sampled.time_s > kick.time_s, change, 0.0))
+        then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
+        scale = (log / then_log)[:, None]
+        later = late[:, None] + (by_time - then_time[:, None]) * scale
+        sampled = self.sampled
+        after = sampled.angle * by_log * scale - sampled.velocity * later
+        change[rows] = np.where(sampled.time_s > instants[:, None], after, 0.0)
+        return change
 
 
 @dataclass(frozen=True)
@@ -158,9 +164,9 @@ class Model:
             # It takes effect before the instant, so that what follows is smooth there.
             whole = max(int(before.phase[0] // math.pi) - 1, 0)
             for _ in range(2):
-                log, late = kick_sizes(before, kick, motion)
-                by_log[whole:] += log
-                by_time[whole:] += late
+                log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
+                by_log[whole:] += log[0]
+                by_time[whole:] += late[0]
                 motion = follow(law, omega, start, begin, motion, (by_log, by_time))
             pieces.append((kick.time_s, motion))
         return pieces
@@ -285,7 +291,7 @@ class Model:
             return max(effect.small(span), 1e-4 * abs(float(values[index])))
         if effect.parameters[index - effect.switch].name == "time":
             # Over several readings, or the one that is crossed decides.
-            return 2.0 * span.interval_s
+            return min(2.0 * span.interval_s, 0.0625 * span.period_s)
         return max(1e-4 * abs(float(values[index])), 1e-9)
 
 
@@ -307,10 +313,10 @@ def responses(
     forces = [force for force in found if force is not None]
     if forces:
         total += sampled.change(*tangent.of_force(np.stack(forces)))
+    if effect.kick(changes[0][1]) is not None:
+        total += at.after_kicks([effect.kick(high) for _, high in changes])
+        total -= at.after_kicks([effect.kick(low) for low, _ in changes])
     for row, (low, high) in enumerate(changes):
-        kick = effect.kick(high)
-        if kick is not None:
-            total[row] += at.after_kick(kick) - at.after_kick(effect.kick(low))
         added = effect.reading(sampled, pendulum, high)
         before = effect.reading(sampled, pendulum, low)
         if added is not None and before is not None:
@@ -332,19 +338,22 @@ def _force_change(
     return np.asarray(after - before)
 
 
-def kick_sizes(before: Sampled, kick: Kick, now: Motion) -> tuple[float, float]:
+def kick_sizes(
+    before: Sampled, kicks: Sequence[Kick], now: Sampled
+) -> tuple[FloatArray, FloatArray]:
     """What a motion still lacks, in ln r and in t at fixed phase, to be the kicked one.
 
-    `before` is the unkicked motion at the kick's instant.
+    `before` is the unkicked motion at each kick's instant, `now` the motion as it is.
     """
-    omega = now.angular_frequency
-    there = sample_motion(now, before.time_s)
-    x, v = float(there.angle[0]), float(there.velocity[0]) / omega
-    grown = math.exp(kick.log_amplitude)
-    new_x = grown * (float(before.angle[0]) + kick.angle)
-    new_v = grown * (float(before.velocity[0]) + kick.velocity) / omega
-    by_log = 0.5 * math.log((new_x**2 + new_v**2) / (x**2 + v**2))
-    turned = math.remainder(math.atan2(-new_v, new_x) - math.atan2(-v, x), 2.0 * math.pi)
+    omega = now.motion.angular_frequency
+    angle, velocity, grown = np.array(
+        [(kick.angle, kick.velocity, kick.log_amplitude) for kick in kicks]
+    ).T
+    x, v = now.angle, now.velocity / omega
+    new_x, new_v = before.angle + angle, (before.velocity + velocity) / omega
+    by_log = grown + 0.5 * np.log((new_x**2 + new_v**2) / (x**2 + v**2))
+    turned = np.arctan2(-new_v, new_x) - np.arctan2(-v, x)
+    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
     return by_log, -turned / omega
 
 

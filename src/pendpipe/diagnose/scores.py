@@ -61,8 +61,13 @@ class Bank:
     lengths: FloatArray
 
     def scores(self, residual: FloatArray) -> FloatArray:
-        """Sum of squares of each candidate's inner products; shape (candidates, ...)."""
+        """Sum of squares of each candidate's inner products; shape (candidates, ...).
+
+        A size that can't be negative (a friction's) scores with its own sign only.
+        """
         products = self.columns.T @ residual.astype(np.float32)
+        signed = [c.first for c in self.candidates if c.effect.one_sided]
+        products[signed] = np.maximum(products[signed], 0.0)
         squares = products.astype(np.float64) ** 2
         starts = [candidate.first for candidate in self.candidates]
         return np.asarray(np.add.reduceat(squares, starts, axis=0))

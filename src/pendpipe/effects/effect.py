@@ -38,6 +38,11 @@ class Kick(NamedTuple):
     log_amplitude: float = 0.0
     """Change of ln r at unchanged phase."""
 
+    @property
+    def acts(self) -> bool:
+        """Whether it changes anything."""
+        return bool(self.angle or self.velocity or self.log_amplitude)
+
 
 @dataclass(frozen=True)
 class Pendulum:
@@ -154,6 +159,12 @@ class Effect:
     def key(self) -> str:
         """What tells it from other entries."""
         return self.identifier
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether it has one size, which is never negative."""
+        positive = self.switch or (bool(self.parameters) and self.parameters[0].low >= 0.0)
+        return self.sizes == 1 and positive
 
     @property
     def count(self) -> int:

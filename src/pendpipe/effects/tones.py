@@ -24,6 +24,15 @@ def _frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
     return np.geomspace(low, 0.45 / span.interval_s, count)
 
 
+def plane_band_hz(span: Span) -> float:
+    """Return how near the pendulum's frequency a tone is that of a second plane.
+
+    Within some lines' widths a steady or dying tone can imitate any slow change of phase or
+    amplitude; what swings there is a second plane, with the main motion's envelope.
+    """
+    return min(10.0 / span.duration_s, 0.3 / span.period_s)
+
+
 class SecondMode(Effect):
     """A mode of rod, bob or stand that rings down of its own, added to the reading.
 
@@ -93,7 +102,8 @@ class PlaneCoupling(Effect):
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """Detunings on both sides, half of 1/duration apart."""
-        beats = np.arange(0.25, 10.0, 0.5) / span.duration_s
+        last = plane_band_hz(span)
+        beats = np.arange(0.25 / span.duration_s, last, 0.5 / span.duration_s)
         return rows([*(-beats[::-1]), *beats])
 
 
