@@ -156,7 +156,7 @@ def moments(bench: Bench) -> IntArray:
     edge = max(3, int(0.02 * bench.count))
     blocks = np.linspace(edge, bench.count - edge - per_cycle, BLOCKS)
     found = (blocks[:, None] + per_cycle * np.arange(PHASES) / PHASES).astype(int)
-    return np.clip(found, 1, bench.count - 5)
+    return np.asarray(np.clip(found, 1, bench.count - 5))
 
 
 def steps(bench: Bench) -> Iterator[tuple[str, FloatArray]]:

@@ -65,7 +65,7 @@ def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict
                 "effects": [first, second],
                 "cancelling": cancelling,
                 "delta_chi2": list(PAIR_SIZES[(i // len(PAIRS) + i) % len(PAIR_SIZES)]),
-            }  # fmt: skip
+            }
         )
     for i in range(number["tie"]):
         size = (50.0, 100.0, 400.0)[i % 3]
@@ -80,7 +80,7 @@ def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict
         effect = ("circular-error", "coulomb-friction", "quadratic-drag")[i % 3]
         recipes.append({"family": "withheld", "effects": [effect], "delta_chi2": [1e4]})
     recipes += [{"family": "real", "number": i} for i in range(number["real"])]
-    random.shuffle(recipes)  # type: ignore[arg-type]
+    random.shuffle(recipes)
     return recipes
 
 

@@ -60,7 +60,20 @@ def judge(bench: Bench, point: Point, scenario: Scenario, codes: IntArray) -> Ve
     oracle = about(bench, point)
     residual = oracle.bench.residual(angle)
     more = {"dropped-samples": shift_score(bench, angle, residual)}
-    return oracle.judge(residual, codes, more)
+    verdict = oracle.judge(residual, codes, more)
+    return replace(verdict, whiteness_p=whiteness(oracle.bench.off(residual)))
+
+
+def whiteness(residual: FloatArray, lags: int = 20) -> float:
+    """Ljung and Box's test of a residual: the p-value of its first autocorrelations."""
+    from scipy.stats import chi2
+
+    count = len(residual)
+    centred = residual - residual.mean()
+    square = float(centred @ centred)
+    found = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / square
+    statistic = count * (count + 2.0) * np.sum(found**2 / (count - np.arange(1, lags + 1)))
+    return float(chi2.sf(statistic, lags))
 
 
 def effect_truth(sized: Sized) -> dict[str, Any]:
@@ -121,5 +134,6 @@ def oracle_truth(verdict: Verdict, effect: str) -> dict[str, Any]:
         "named": verdict.ranking[0],
         "top3": list(verdict.ranking[:3]),
         "class": list(verdict.members),
+        "whiteness_p": verdict.whiteness_p,
         "scores": {name: verdict.scores[name] for name in best},
     }

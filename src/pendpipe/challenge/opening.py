@@ -58,7 +58,7 @@ def open_set(places: Places) -> Path:
             "truth_sha256": manifest["truth_sha256"],
             "answers_sha256": seals["answers_sha256"],
             "items": items,
-        },  # fmt: skip
+        },
     )
     return opened
 

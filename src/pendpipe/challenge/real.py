@@ -70,7 +70,8 @@ def make_real(folder: Path, number: int, random: np.random.Generator) -> RealIte
     noise = _roughness(angle)
     changed, parameters = _conceal(effect, time, angle, noise, random)
     step = float(np.median(np.diff(time)))
-    grid = step * np.arange(len(changed))
+    grid = step * np.arange(len(changed), dtype=np.float64)
+    whole = step * np.arange(len(angle), dtype=np.float64)
     truth = {
         "family": "real",
         "baseline": "eq8",
@@ -85,7 +86,7 @@ def make_real(folder: Path, number: int, random: np.random.Generator) -> RealIte
     }  # fmt: skip
     return RealItem(
         plain_text(grid, changed, {}, quantity),
-        plain_text(step * np.arange(len(angle)), angle, {}, quantity),
+        plain_text(whole, angle, {}, quantity),
         truth,
     )
 
@@ -145,9 +146,9 @@ def _conceal(
         return step * np.rint(values / step), {"step": step}
     if effect == "offset-drift":
         return values + sign * 3.0 * size * time / span, {"drift": sign * 3.0 * size / span}
-    at = random.choice(np.arange(50, len(values) - 50), 3, replace=False)
+    wild = random.choice(np.arange(50, len(values) - 50), 3, replace=False)
     changed = values.copy()
-    changed[at] += sign * (8.0 * noise + 0.1 * top)
+    changed[wild] += sign * (8.0 * noise + 0.1 * top)
     return changed, {"number": 3.0}
 
 
