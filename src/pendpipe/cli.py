@@ -28,6 +28,7 @@ COMMANDS: Final = {
     "fit": "a, b, c and the rest of one recording",
     "diagnose": "what physics was left out: located, named, modelled",
     "diagnose-campaign": "the same over a campaign's records (not available yet)",
+    "challenge": "conceal effects in recordings, have them diagnosed, open and score",
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
     "figures": "the figures 3 to 10 of a campaign",

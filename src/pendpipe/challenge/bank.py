@@ -1,5 +1,4 @@
-"""The catalogue as signatures: what each effect would add to the reading, whitened and
-with the baseline's tangent space taken out.
+"""The catalogue as signatures in the reading, whitened and without what the baseline absorbs.
 
 An effect may have several shapes (exponents, moments, frequencies): each is a subspace of
 one or two directions, and the effect's score is the largest of them.
@@ -13,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.challenge.bench import Bench
 from pendpipe.challenge.filters import play
 
@@ -145,17 +144,19 @@ def beats(bench: Bench) -> Iterator[Shape]:
         for sign in (-1.0, 1.0):
             angle = (omega + sign * 2.0 * np.pi * number / bench.scenario.span_s) * time
             yield from _shape(
-                bench, "plane-coupling", swing[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1)
+                bench,
+                "plane-coupling",
+                swing[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1),
             )
 
 
-def moments(bench: Bench) -> FloatArray:
+def moments(bench: Bench) -> IntArray:
     """Indices of samples at which steps are looked for: blocks, and phases in each."""
     per_cycle = 2.0 * np.pi / bench.scenario.omega / bench.scenario.interval_s
     edge = max(3, int(0.02 * bench.count))
     blocks = np.linspace(edge, bench.count - edge - per_cycle, BLOCKS)
     found = (blocks[:, None] + per_cycle * np.arange(PHASES) / PHASES).astype(int)
-    return np.clip(found, 1, bench.count - 5)
+    return np.asarray(np.clip(found, 1, bench.count - 5))
 
 
 def steps(bench: Bench) -> Iterator[tuple[str, FloatArray]]:
@@ -164,10 +165,10 @@ def steps(bench: Bench) -> Iterator[tuple[str, FloatArray]]:
     motion = bench.propagator[kept]
     time = np.arange(bench.count)
 
-    def after(places: FloatArray, state: FloatArray, more: FloatArray | float) -> FloatArray:
+    def after(places: IntArray, state: FloatArray, more: FloatArray | float) -> FloatArray:
         """H(t - t0)·(response to a change of state at t0, plus more)."""
         start = np.linalg.solve(motion[places], state[:, :, None])[:, :, 0]
-        response = motion[:, 0, :] @ start.T + more
+        response: FloatArray = motion[:, 0, :] @ start.T + more
         return np.asarray(bench.gain * np.where(time[:, None] >= places, response, 0.0))
 
     every, first = at.ravel(), at[:, 0]

@@ -79,7 +79,7 @@ class Chain:
     def grid(self, samples: int, interval_s: float) -> FloatArray:
         """When the samples are really taken that the file counts evenly."""
         count = samples + sum(max(0, lost) for _, lost in self.dropped)
-        time = interval_s * np.arange(count)
+        time: FloatArray = interval_s * np.arange(count, dtype=np.float64)
         if self.clock_drift == 0.0:
             return time
         if self.clock_drift_s <= 0.0:
@@ -116,7 +116,7 @@ class Chain:
             angle = angle + rate * early + 0.5 * bend * early**2
         reading = self._sensed(angle + self.second_share * track.second_rad)
         volts = self._gain(time, track) * self.volts_per_radian * reading + self.offset_volts
-        volts = volts + self._drift(time, samples)
+        volts = volts + self._drift(time)
         if self.tone_volts != 0.0:
             phase = 2.0 * np.pi * self.tone_hz * time + self.tone_phase
             volts = volts + self.tone_volts * (
@@ -169,7 +169,7 @@ class Chain:
             gain = gain + self.ripple * np.cos(self.ripple_count * np.log(_swing(track)))
         return gain
 
-    def _drift(self, time: FloatArray, samples: int) -> FloatArray:
+    def _drift(self, time: FloatArray) -> FloatArray:
         volts = self.drift_volts_s * time
         if self.warm_up_volts != 0.0:
             volts = volts - self.warm_up_volts * np.expm1(-time / self.warm_up_s)

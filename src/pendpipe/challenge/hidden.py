@@ -113,9 +113,7 @@ def torque(
     def build(prepared: Scenario, strength: float) -> Scenario:
         return prepared.with_motion(**{name: strength}, **details)
 
-    return Hidden(
-        effect, law, build, scale, own, scenario, details=dict(details), parameter=name
-    )
+    return Hidden(effect, law, build, scale, own, scenario, details=dict(details), parameter=name)
 
 
 def reading(
@@ -133,9 +131,7 @@ def reading(
     def build(prepared: Scenario, strength: float) -> Scenario:
         return prepared.with_chain(**{name: strength}, **details)
 
-    return Hidden(
-        effect, law, build, scale, own, scenario, details=dict(details), parameter=name
-    )
+    return Hidden(effect, law, build, scale, own, scenario, details=dict(details), parameter=name)
 
 
 def amplitude(scenario: Scenario) -> float:

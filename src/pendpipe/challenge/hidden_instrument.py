@@ -268,8 +268,9 @@ def glitches(r: Random, s: Scenario) -> Hidden:
     volts = s.sd_rad * s.chain.volts_per_radian
 
     def build(base: Scenario, size: float) -> Scenario:
-        wild = tuple((int(at), float(size * share)) for at, share in zip(places, shares,
-                                                                          strict=True))
+        wild = tuple(
+            (int(at), float(size * share)) for at, share in zip(places, shares, strict=True)
+        )
         return base.with_chain(glitches=wild)
 
     return Hidden("glitches", "single samples", build, 5.0 * volts, True, s,

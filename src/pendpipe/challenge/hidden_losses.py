@@ -46,7 +46,7 @@ def swung(scenario: Scenario, factor: float) -> Scenario:
 
 @law("circular-error")
 def circular(_: Random, s: Scenario) -> Hidden:
-    """sin x; it has no strength but the amplitude."""
+    """Sin x; it has no strength but the amplitude."""
     return Hidden(
         "circular-error",
         "sin x",
@@ -168,7 +168,7 @@ def rayleigh(_: Random, s: Scenario) -> Hidden:
 
 
 @law("cubic-damping")
-def van_der_pol(r: Random, s: Scenario) -> Hidden:
+def van_der_pol(_: Random, s: Scenario) -> Hidden:
     """x^2 v."""
     size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) / amplitude(s) ** 2
     return torque(s, "cubic-damping", "x^2 v", "van_der_pol", size)

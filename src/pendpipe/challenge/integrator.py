@@ -134,7 +134,7 @@ def longest_step(p: Any, s: FloatArray) -> float:
         rate = max(rate, min(stiff, 200.0 * p.omega))
     if p.power != 0.0 or p.memory != 0.0 or p.reynolds != 0.0:
         rate = max(rate, p.omega / 0.12)
-    return 1.0 / rate
+    return float(1.0 / rate)
 
 
 @compiled

@@ -47,7 +47,8 @@ class Noise:
         density = 2.0 * self.white_sd**2 * (time_s[1] - time_s[0])
         density = density * (self.corner_hz / frequency) ** self.alpha
         angle = 2.0 * np.pi * np.outer(time_s, frequency)
-        return np.hstack([np.cos(angle), np.sin(angle)]) * np.sqrt(np.tile(density * width, 2))
+        weight = np.sqrt(np.tile(density * width, 2))
+        return np.asarray(np.hstack([np.cos(angle), np.sin(angle)]) * weight)
 
     def draw(self, time_s: FloatArray, random: np.random.Generator) -> FloatArray:
         """One realisation, rad."""

@@ -42,6 +42,8 @@ class Verdict:
         Effects by likelihood, the best first (a parameter more costs 2).
     members
         The equivalence class: effects within `CLASS` of the best.
+    whiteness_p
+        Of a whiteness test of the same residual, a peer's answer.
     """
 
     scores: dict[str, float]
@@ -51,6 +53,7 @@ class Verdict:
     detected_by_effect: bool
     ranking: tuple[str, ...]
     members: tuple[str, ...]
+    whiteness_p: float = float("nan")
 
 
 @dataclass

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.challenge.scenario import Scenario
 from pendpipe.files import replaced
 
 
-def plain_text(time_s: FloatArray, volts: FloatArray, metadata: dict[str, str]) -> str:
+def plain_text(
+    time_s: FloatArray, values: FloatArray, metadata: dict[str, str], quantity: str = "volts"
+) -> str:
     """The file's text: ``# key: value`` lines, a header, rows."""
     lines = [f"# {key}: {value}" for key, value in metadata.items()]
-    lines.append("time_s,volts")
-    lines += [f"{t:.9g},{v:.9g}" for t, v in zip(time_s.tolist(), volts.tolist(), strict=True)]
+    lines.append(f"time_s,{quantity}")
+    lines += [f"{t:.9g},{v:.9g}" for t, v in zip(time_s.tolist(), values.tolist(), strict=True)]
     return "\n".join(lines) + "\n"
 
 
@@ -25,7 +29,8 @@ def recording_text(scenario: Scenario, codes: IntArray) -> str:
         "bits": str(chain.bits),
         "range_volts": repr(chain.range_volts),
     }
-    return plain_text(scenario.time_s, codes * chain.step_volts, metadata)
+    volts = chain.step_volts * codes.astype(np.float64)
+    return plain_text(scenario.time_s, volts, metadata)
 
 
 def write_recording(path: str | Path, scenario: Scenario, codes: IntArray) -> None:

@@ -61,4 +61,5 @@ def hide(
     order = random.permutation(len(makers))
     drawn = [makers[i](random, scenario) for i in order]
     wanted = [h for h in drawn if own_form is None or h.own_form is own_form]
-    return (wanted or drawn)[0]
+    found: Hidden = (wanted or drawn)[0]
+    return found

@@ -30,7 +30,7 @@ class Scenario:
     @cached_property
     def time_s(self) -> FloatArray:
         """The times that the file states."""
-        return self.interval_s * np.arange(self.samples)
+        return np.asarray(self.interval_s * np.arange(self.samples, dtype=np.float64))
 
     @property
     def omega(self) -> float:

@@ -17,6 +17,7 @@ BASSET_ELEMENTS = layout.BASSET_ELEMENTS
 
 compiled = nb.njit(cache=True, fastmath=False, error_model="numpy")
 
+
 @compiled
 def ramp(t: float, tau: float) -> float:
     """t, or its relaxing form tau (1 - exp(-t/tau))."""
@@ -44,14 +45,14 @@ def omega_now(p: Any, t: float, middle: float) -> float:
         factor += p.omega_drift * ramp(t, p.omega_drift_time)
     if p.omega_jump != 0.0 and middle > p.omega_jump_at:
         factor += p.omega_jump
-    return p.omega * factor
+    return float(p.omega * factor)
 
 
 @compiled
 def restoring(p: Any, x: float, region: int) -> float:
     """Restoring torque over w^2; `region` is the side of the dead zone."""
     if p.any_restoring == 0.0:
-        return x
+        return float(x)
     if p.play != 0.0:
         x = 0.0 if region == 0 else x - region * p.play
     force = x
@@ -74,7 +75,7 @@ def restoring(p: Any, x: float, region: int) -> float:
         force += p.cogging * (
             math.sin(p.cogging_teeth * x + p.cogging_phase) - math.sin(p.cogging_phase)
         )
-    return force
+    return float(force)
 
 
 @compiled
@@ -82,7 +83,7 @@ def damping_rate(p: Any, x: float, v: float, t: float, middle: float) -> float:
     """What multiplies v."""
     rate = p.gamma
     if p.any_rate == 0.0:
-        return rate
+        return float(rate)
     if p.gamma_drift != 0.0:
         rate += p.gamma_drift * ramp(t, p.gamma_drift_time)
     if p.gamma_jump != 0.0 and middle > p.gamma_jump_at:
@@ -107,7 +108,7 @@ def damping_rate(p: Any, x: float, v: float, t: float, middle: float) -> float:
     if p.kink != 0.0:
         amplitude = math.sqrt(x * x + (v / p.omega) ** 2)
         rate += p.kink * max(0.0, amplitude - p.kink_amplitude)
-    return rate
+    return float(rate)
 
 
 @compiled
@@ -122,7 +123,7 @@ def friction(
         if p.energy != 0.0 and square > 0.0:
             force += p.energy * square**p.energy_exponent
     if p.any_friction == 0.0:
-        return force
+        return float(force)
     if p.power != 0.0:
         force += p.power * abs(v) ** p.power_exponent
     if p.stribeck != 0.0:
@@ -136,7 +137,7 @@ def friction(
         force += p.rough * math.exp(-(((x - p.rough_place) / p.rough_width) ** 2))
     if p.memory != 0.0:
         force += p.memory * abs(x - turn) ** p.memory_power
-    return force
+    return float(force)
 
 
 @compiled
@@ -148,7 +149,7 @@ def push(p: Any, t: float, middle: float) -> float:
     width = p.impulse_width
     if p.impulse != 0.0 and width > 0.0 and p.impulse_at < middle < p.impulse_at + width:
         force += p.impulse * 0.5 * math.pi / width * math.sin(math.pi * (t - p.impulse_at) / width)
-    return force
+    return float(force)
 
 
 @compiled
@@ -182,7 +183,7 @@ def hidden(p: Any, s: FloatArray, out: FloatArray, sign: float) -> float:
             out[BASSET + i] = v - rate * s[BASSET + i]
             force -= p.basset * math.sqrt(rate) / math.pi * out[BASSET + i]
             rate /= math.e
-    return force
+    return float(force)
 
 
 @compiled
@@ -234,4 +235,4 @@ def rates(
             + p.coupling * p.omega * p.omega * x
             - p.inertial * out[1]
         )
-    return free
+    return float(free)

@@ -1,0 +1,193 @@
+"""The challenge's own integrator against scipy's, and against what physics books say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe.arrays import FloatArray
+from pendpipe.challenge.motion import Motion
+
+OMEGA, AMPLITUDE = 5.6, 0.2
+LOSSES = {
+    "omega": OMEGA, "gamma": 0.03, "hysteretic": 0.004, "quadratic": 0.02, "coulomb": 0.004,
+}  # fmt: skip
+TIME = 0.05 * np.arange(600)
+
+
+def eq8(x: float, v: float) -> float:
+    """Eq. 8's acceleration, written out once more."""
+    square = OMEGA**2 * x**2 + v**2
+    solid = LOSSES["coulomb"] + LOSSES["hysteretic"] * np.sqrt(square)
+    solid += LOSSES["quadratic"] * square
+    return float(-solid * np.sign(v) - LOSSES["gamma"] * v - OMEGA**2 * x)
+
+
+LAWS: dict[str, tuple[dict[str, float], Callable[[float, float, float], float]]] = {
+    "Eq. 8 alone": ({}, lambda t, x, v: 0.0),
+    "sin x": ({"sine": 1.0}, lambda t, x, v: -(OMEGA**2) * (np.sin(x) - x)),
+    "x^3": ({"cubic": 0.3}, lambda t, x, v: -(OMEGA**2) * 0.3 * x**3),
+    "x^2": ({"square": 0.1}, lambda t, x, v: -(OMEGA**2) * 0.1 * x**2),
+    "v|v|": ({"drag": 0.05}, lambda t, x, v: -0.05 * abs(v) * v),
+    "|v|^1.5": ({"power": 0.02}, lambda t, x, v: -0.02 * abs(v) ** 1.5 * np.sign(v)),
+    "v^3": ({"rayleigh": 0.02}, lambda t, x, v: -0.02 * v**3),
+    "x^2 v": ({"van_der_pol": 1.0}, lambda t, x, v: -(x**2) * v),
+    "C_D(Re)": (
+        {"reynolds": 0.02, "reynolds_speed": 0.01},
+        lambda t, x, v: -0.02 * v * (1 + 0.15 * (abs(v) / 0.01) ** 0.687),
+    ),
+    "Stribeck": (
+        {"stribeck": 0.01, "stribeck_speed": 0.2},
+        lambda t, x, v: -0.01 * np.exp(-((v / 0.2) ** 2)) * np.sign(v),
+    ),
+    "drive": (
+        {"drive": 0.05, "drive_omega": 9.0, "drive_phase": 1.0},
+        lambda t, x, v: 0.05 * np.cos(9.0 * t + 1.0),
+    ),
+    "frequency drift": (
+        {"omega_drift": 1e-3},
+        lambda t, x, v: -((OMEGA * (1 + 1e-3 * t)) ** 2 - OMEGA**2) * x,
+    ),
+    "damping drift": ({"gamma_drift": 1e-3}, lambda t, x, v: -1e-3 * t * v),
+    "creep": ({"creep": 1e-4}, lambda t, x, v: OMEGA**2 * 1e-4 * t),
+    "release": (
+        {"release": 0.1, "release_time": 3.0},
+        lambda t, x, v: -0.1 * np.exp(-t / 3.0) * v,
+    ),
+    "magnet": (
+        {"magnet": 0.05, "magnet_width": 0.05},
+        lambda t, x, v: -(OMEGA**2) * 0.05 * x / (1 + (x / 0.05) ** 2) ** 2,
+    ),
+    "rough spot": (
+        {"rough": 0.05, "rough_place": 0.08, "rough_width": 0.02},
+        lambda t, x, v: -0.05 * np.exp(-(((x - 0.08) / 0.02) ** 2)) * np.sign(v),
+    ),
+}  # fmt: skip
+
+
+def by_scipy(extra: Callable[[float, float, float], float]) -> FloatArray:
+    """Half cycle by half cycle with DOP853, restarted at every reversal."""
+    found = np.full(len(TIME), np.nan)
+    t, state, way = 0.0, np.array([AMPLITUDE, 0.0]), -1.0
+
+    def rates(t: float, s: FloatArray) -> list[float]:
+        # The direction holds throughout a half cycle, also in trial steps beyond its end.
+        v = way * max(way * s[1], 1e-300)
+        return [s[1], eq8(s[0], v) + LOSSES["gamma"] * (v - s[1]) + extra(t, s[0], v)]
+
+    def turn(t: float, s: FloatArray) -> float:
+        return float(s[1])
+
+    turn.terminal = True  # type: ignore[attr-defined]
+    while t < TIME[-1]:
+        turn.direction = -way  # type: ignore[attr-defined]
+        run = solve_ivp(
+            rates, (t, TIME[-1] + 1e-9), state, method="DOP853", rtol=1e-11, atol=1e-14,
+            events=turn, dense_output=True, max_step=0.02,
+        )  # fmt: skip
+        here = (TIME >= t) & (TIME <= run.t[-1])
+        found[here] = run.sol(TIME[here])[0]
+        t, state, way = run.t[-1], np.array([run.y[0, -1], 0.0]), -way
+    return found
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_motion_is_that_of_another_integrator(law: str) -> None:
+    parameters, extra = LAWS[law]
+    motion, theirs = Motion({**LOSSES, **parameters}, AMPLITUDE), by_scipy(extra)
+    # At the coarsest step that is taken; and at half of it, where the eighth order shows.
+    assert np.abs(motion.run(TIME).angle_rad - theirs).max() < 2e-7 * AMPLITUDE
+    fine = motion.run(np.linspace(0.0, TIME[-1], 2 * len(TIME) - 1)).angle_rad[::2]
+    assert np.abs(fine - theirs).max() < 3e-9 * AMPLITUDE
+
+
+def test_viscous_decay_is_the_closed_form() -> None:
+    gamma = 0.1
+    track = Motion({"omega": OMEGA, "gamma": gamma}, AMPLITUDE).run(TIME)
+    shifted = np.sqrt(OMEGA**2 - gamma**2 / 4)
+    exact = np.cos(shifted * TIME) + gamma / (2 * shifted) * np.sin(shifted * TIME)
+    exact *= AMPLITUDE * np.exp(-gamma * TIME / 2)
+    assert np.abs(track.angle_rad - exact).max() < 2e-8 * AMPLITUDE
+
+
+def test_error_falls_with_the_eighth_power_of_the_step() -> None:
+    motion = Motion({"omega": 1.0, "gamma": 0.05}, 1.0)
+    errors = []
+    reference = motion.run(np.arange(0.0, 30.001, 0.025)).angle_rad[-1]
+    for step in (0.3, 0.15):
+        errors.append(abs(motion.run(np.arange(0.0, 30.001, step)).angle_rad[-1] - reference))
+    assert errors[0] / errors[1] > 2.0**7
+
+
+def test_coulomb_friction_stops_off_centre_and_for_good() -> None:
+    friction = 0.05
+    track = Motion({"omega": OMEGA, "coulomb": friction}, AMPLITUDE).run(TIME)
+    dead = friction / OMEGA**2
+    # Every half cycle loses twice the dead band, until it ends within it.
+    left = AMPLITUDE
+    while left > dead:
+        left = abs(left - 2 * dead)
+    assert abs(track.angle_rad[-1]) == pytest.approx(left, abs=1e-10)
+    assert track.rate_rad_s[-1] == 0.0
+
+
+def test_cubic_torque_shifts_the_frequency_by_three_eighths() -> None:
+    k3, amplitude = 0.05, 0.3
+    track = Motion({"omega": OMEGA, "cubic": k3}, amplitude).run(np.arange(0, 60, 0.02))
+    rising = np.flatnonzero((track.angle_rad[:-1] < 0) & (track.angle_rad[1:] >= 0))
+    at = track.time_s[rising] - track.angle_rad[rising] / track.rate_rad_s[rising]
+    omega = 2 * np.pi * (len(at) - 1) / (at[-1] - at[0])
+    assert omega / OMEGA - 1 == pytest.approx(3 / 8 * k3 * amplitude**2, rel=0.01)
+
+
+def test_play_lowers_the_frequency() -> None:
+    """A dead zone of half width b costs 2 b/(pi A) of the frequency (leading order)."""
+    b, amplitude = 1e-3, 0.3
+    track = Motion({"omega": OMEGA, "play": b}, amplitude).run(np.arange(0, 60, 0.02))
+    rising = np.flatnonzero((track.angle_rad[:-1] < 0) & (track.angle_rad[1:] >= 0))
+    at = track.time_s[rising] - track.angle_rad[rising] / track.rate_rad_s[rising]
+    omega = 2 * np.pi * (len(at) - 1) / (at[-1] - at[0])
+    assert omega / OMEGA - 1 == pytest.approx(-2 * b / (np.pi * amplitude), rel=0.02)
+
+
+def test_dahl_is_a_spring_when_small_and_friction_when_large() -> None:
+    stiffness, reach = 0.02, 0.05
+
+    def frequency(amplitude: float) -> float:
+        motion = Motion({"omega": OMEGA, "dahl": stiffness, "dahl_reach": reach}, amplitude)
+        track = motion.run(np.arange(0, 8, 0.005))
+        rising = np.flatnonzero((track.angle_rad[:-1] < 0) & (track.angle_rad[1:] >= 0))
+        at = track.time_s[rising] - track.angle_rad[rising] / track.rate_rad_s[rising]
+        return float(2 * np.pi * (len(at) - 1) / (at[-1] - at[0]))
+
+    assert frequency(1e-4) / OMEGA == pytest.approx(np.sqrt(1 + stiffness), rel=2e-4)
+    assert frequency(2.0) / OMEGA == pytest.approx(1.0, abs=6e-4)
+
+
+def test_history_force_in_steady_swing_damps_as_much_as_it_loads() -> None:
+    """d^(1/2)v/dt^(1/2) of a sine leads v by 45 degrees: half damping, half added mass."""
+    h = 0.02
+    track = Motion({"omega": OMEGA, "basset": h}, AMPLITUDE).run(np.arange(0, 400, 0.04))
+    late = track.time_s > 40
+    swing = np.hypot(track.angle_rad, track.rate_rad_s / OMEGA)[late]
+    rate = -np.polyfit(track.time_s[late], np.log(swing), 1)[0]
+    assert rate == pytest.approx(0.5 * h * np.sqrt(OMEGA) / np.sqrt(2), rel=0.05)
+
+
+def test_an_impulse_changes_v_and_not_x() -> None:
+    plain = Motion({"omega": OMEGA}, AMPLITUDE)
+    struck = plain.changed(impulse=0.1, impulse_at=10.0).run(TIME)
+    before = TIME < 10.0
+    assert np.array_equal(struck.angle_rad[before], plain.run(TIME).angle_rad[before])
+    change = struck.angle_rad - plain.run(TIME).angle_rad
+    after = TIME >= 10.0
+    expected = 0.1 / OMEGA * np.sin(OMEGA * (TIME[after] - 10.0))
+    assert np.allclose(change[after], expected, atol=1e-9)
+
+
+def test_unknown_parameters_are_refused() -> None:
+    with pytest.raises(KeyError, match="springiness"):
+        Motion({"springiness": 1.0}, AMPLITUDE).run(TIME)
