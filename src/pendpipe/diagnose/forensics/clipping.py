@@ -26,6 +26,8 @@ _FEWEST: Final = 2
 """Readings at the very end of the range that make a flat top."""
 _SHARED: Final = 0.1
 """Error in steps of the true angle that a window's readings share, where rounding is coarse."""
+_ROUNDED: Final = 0.5
+"""Rms in steps up to which errors may be alike because of rounding alone."""
 _MASKED: Final = 1e-2
 
 Side = Literal["upper", "lower"]
@@ -57,7 +59,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         return nothing("clipping")
     residual = residual_of(data, fit)
     lattice = find_lattice(data.values, samples.step)
-    ends = [_end(data, fit, residual, lattice, side) for side in ("upper", "lower")]
+    sides: tuple[Side, Side] = ("upper", "lower")
+    ends = [_end(data, fit, residual, lattice, side) for side in sides]
     p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))
     clipped = [end for end in ends if end.p_value < _MASKED]
     if not clipped:
@@ -65,24 +68,33 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     return _described(data, fit, lattice, clipped, p_value)
 
 
-def _end(data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str) -> End:
-    sign = 1.0 if side == "upper" else -1.0
-    named: Side = "upper" if side == "upper" else "lower"
+def _at_end(data: Data, slack: float, sign: float) -> BoolArray:
+    """Readings at the very end of what was read."""
     used = data.weight > 0.0
     level = float((sign * data.values[used]).max())
+    return np.asarray(used & (sign * data.values >= level - slack))
+
+
+def _end(data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: Side) -> End:
+    sign = 1.0 if side == "upper" else -1.0
+    used = data.weight > 0.0
     step = lattice.step if lattice is not None else 0.0
     slack = 0.5 * step if step else 1e-9 * float(np.ptp(data.values[used]))
-    at = used & (sign * data.values >= level - slack)
+    at, other = _at_end(data, slack, sign), _at_end(data, slack, -sign)
+    level = float((sign * data.values[at]).max())
     if np.count_nonzero(at) < _FEWEST:
-        return End(named, sign * level, at, 1.0, 0.0)
-    local = local_residual(fit.at.sampled.phase, residual, used, leave_out=at)
+        return End(side, sign * level, at, 1.0, 0.0)
+    local = local_residual(fit.at.sampled.phase, residual, used, leave_out=at | other)
+    if local.smooth and local.rms > _ROUNDED * step:
+        # A misfit of the motion is left: what it should have reached is not known.
+        return End(side, sign * level, at, 1.0, 0.0)
     true = sign * (data.values - local.left)
     before = _noise(local, step)
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
     near = used & (true > level - 6.0 * local.rms - 3.0 * step)
     p_value = _largest(level + 0.5 * step - true[near], spread[near], _common(before, step))
     beyond = np.maximum(true[at] - level - 0.5 * step, 0.0) / spread[at]
-    return End(named, sign * level, at, p_value, float(beyond @ beyond))
+    return End(side, sign * level, at, p_value, float(beyond @ beyond))
 
 
 def _noise(local: Local, step: float) -> float:

@@ -80,16 +80,17 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
         used = np.interp(when, data.time_s, data.weight) > 0.99
         residual = values - _between(data.time_s, fit.at.reading, when)
     local = local_residual(phase, residual, used)
-    smooth = (residual - local.left)[used]
     step = lattice.step
-    misfit = math.sqrt(float(np.mean(smooth**2))) / step
+    taken = float(np.mean((residual - local.left)[used] ** 2))
+    noise = local.rms**2 * float(np.mean(np.abs(local.leverage[used])))
+    misfit = math.sqrt(max(taken - noise, 0.0)) / step
     good = used & (np.abs(local.scaled) < 6.0)
     ratio = noise_before_rounding(local, step) / step
     if misfit < _MISFIT:
         true, blur = values - residual, min(0.5 * misfit, 0.05)
     else:
         true = values - local.left
-        blur = local.rms / step * math.sqrt(float(np.mean(np.abs(local.leverage[used]))))
+        blur = math.sqrt(noise) / step
     position = lattice.position(true[good])
     return Coded(lattice, lattice.code[good], position, blur, ratio, index[good])
 
