@@ -86,7 +86,7 @@ def _errors(
     phase = fit.at.sampled.phase
     rest = np.where(out, 0.0, residual)
     local = local_residual(phase, whitened_in_time(rest, noise), ~out)
-    if not local.smooth:
+    if not local.smooth():
         return local, noise.uniform and noise.memory != 0.0
     filled = np.interp(phase, phase[~out], residual[~out])
     padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")

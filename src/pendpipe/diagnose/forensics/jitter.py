@@ -102,7 +102,7 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     residual = residual_of(data, fit)
     white = whitened_in_time(residual, noise)
     local = local_residual(sampled.phase, white, used)
-    if local.smooth:
+    if local.smooth():
         return None
     scaled = local.scaled[used]
     unit = noise.white_rms**2

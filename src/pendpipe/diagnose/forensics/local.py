@@ -57,14 +57,18 @@ class Local:
         """Standard deviation of `left`, shape (n,)."""
         return np.asarray(self.rms * np.sqrt(np.maximum(1.0 + self.leverage, 0.05)))
 
-    @property
-    def smooth(self) -> bool:
-        """Whether what is left is still smooth, so that it is a misfit rather than noise."""
+    def smooth(self, memory: float = 0.0) -> bool:
+        """Say whether what is left is smoother than the noise, so that it is a misfit.
+
+        `memory` is the correlation of neighbouring errors that the noise is known to have.
+        """
         fitted = self.used & (self.leverage < 0.0)
         scaled = np.where(fitted, np.clip(self.scaled, -4.0, 4.0), 0.0)
         size = float(scaled @ scaled)
         correlation = float(scaled[1:] @ scaled[:-1]) / max(size, 1e-300)
-        return correlation > _SMOOTH + 4.0 / math.sqrt(max(int(np.count_nonzero(self.used)), 1))
+        return correlation > 1.2 * max(memory, 0.0) + _SMOOTH + 4.0 / math.sqrt(
+            max(int(np.count_nonzero(self.used)), 1)
+        )
 
     @property
     def scaled(self) -> FloatArray:
