@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
 
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import gather
 from pendpipe.diagnose.forensics import TESTS, Finding, examine, find_lost_samples
 from pendpipe.diagnose.model import Model
+from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.cubic_stiffness import CubicStiffness
 
@@ -217,24 +217,38 @@ def test_lost_samples_are_found_before_they_spoil_the_rest(lost: dict[int, int])
         assert candidate.time_s == pytest.approx(AIR.times()[place], abs=2.1 / AIR.rate_hz)
 
 
-def test_means_of_many_readings_are_judged_by_the_readings() -> None:
-    fast = Pendulum(rate_hz=400.0, count=20_000)
-    draw = generator()
-    motion = fast.model().reading(fast.values())
-    exact = np.round((motion + 1e-3 * draw.standard_normal(fast.count)) / STEP_12).astype(np.int64)
-    readings = STEP_12 * (exact + np.isin(exact, (30,)))
-    record = fitted(fast, readings)
-    folded = gather(
-        record.samples.time_s, readings, step=STEP_12, unit="rad", counts=False,
+def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
+    """Means of several readings, as the diagnosis takes them of a very long record."""
+    record = fitted(pendulum, readings)
+    data = gather(
+        record.samples.time_s, readings, step=record.samples.step, unit="rad", counts=False,
         period_s=1.0 / FREQUENCY_HZ, most=5000,
     )  # fmt: skip
-    assert len(folded) < fast.count // 3
-    model = Model(folded.time_s, folded.interval_s)
-    noise = replace(
-        record.noise, variance=record.noise.variance[: len(folded)], weight=folded.weight
-    )
-    fit = refine(model, folded, noise, fast.values())
-    samples: Samples = record.samples
-    finding = TESTS["missing-codes"](folded, fit, noise, samples)
-    assert finding.p_value < FOUND
-    assert finding.location.adc_codes == (30,)
+    assert len(data) < pendulum.count // 3
+    model = Model(data.time_s, data.interval_s)
+    noise = white_noise(data, record.noise.rms * math.sqrt(len(data) / pendulum.count))
+    fit = refine(model, data, noise, pendulum.values())
+    return Fitted(data, fit, noise, record.samples)
+
+
+FAST = Pendulum(rate_hz=400.0, count=20_000)
+
+
+def test_the_codes_behind_means_of_readings_are_judged() -> None:
+    noisy = FAST.model().reading(FAST.values()) + 1e-3 * generator().standard_normal(FAST.count)
+    exact = np.round(noisy / STEP_12).astype(np.int64)
+    findings = found(folded(FAST, STEP_12 * (exact + np.isin(exact, (30,)))))
+    assert list(findings) == ["missing-codes"]
+    assert findings["missing-codes"].location.adc_codes == (30,)
+
+
+def test_the_range_behind_means_of_readings_is_judged() -> None:
+    noisy = FAST.model().reading(FAST.values()) + white(generator(), FAST.count)
+    record = folded(FAST, rounded(np.minimum(noisy, 0.15), STEP_16))
+    findings = found(record)
+    assert list(findings) == ["clipping"]
+    clipping = findings["clipping"]
+    assert clipping.parameters["high"].value == pytest.approx(0.15, abs=STEP_16)
+    assert clipping.mask is not None
+    assert clipping.mask.shape == record.data.values.shape
+    assert 20 < np.count_nonzero(clipping.mask) < 0.1 * len(record.data)

@@ -23,6 +23,12 @@ _SIZES: Final = np.geomspace(1e-4, 1e6, 101)
 """Variance of a kick times the largest eigenvalue: where the likelihood is looked at."""
 _SEEN: Final = 1e-3
 """Of the largest eigenvalue: rougher shapes say nothing of a wandering."""
+_SLIP: Final = 0.15
+"""Phase between readings and model, rad, above which the law of motion comes first."""
+_ALIKE: Final = 4.0
+"""Ratio of S_a from slow and from fast wandering that a random walk may show."""
+_SMOOTHER: Final = 6.0
+"""Gain in -2 ln L, with eigenvalues squared, from which it is no random walk."""
 _SHOWN: Final = 0.05
 _BOTH: Final = 2.5
 """The whole gain counts as no more than this times that of the quadrature that has less."""
@@ -58,10 +64,13 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     sum of squares. It must be there in amplitude and in phase alike, which a term left out
     of the law of motion seldom is: p = max(p_amplitude, p_phase)^2.
     """
-    if data.used < 100:
+    if data.used < 100 or fit.slip_rad > _SLIP:
         return nothing("broadband-drive")
     amplitude, phase, per_kick = _wandering(data, fit, noise)
     if min(len(amplitude.weight), len(phase.weight)) < 5:
+        return nothing("broadband-drive")
+    if not (_may_walk(amplitude) and _may_walk(phase)):
+        # A term left out of the motion's law, or a tone: no random walk.
         return nothing("broadband-drive")
     p_value = max(amplitude.chance, phase.chance) ** 2
     both = Shapes(
@@ -119,6 +128,24 @@ def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
     size = float(sizes[best])
     relative = shapes.weight / (1.0 + size * shapes.weight)
     return size, math.sqrt(2.0 / float(relative @ relative)), float(twice[0] - twice[best])
+
+
+def _may_walk(shapes: Shapes) -> bool:
+    """Whether what is there may be a random walk: no smoother, and alike at all scales."""
+    smoother = Shapes(shapes.weight**2, shapes.square)
+    if _likelihood(smoother)[2] > _likelihood(shapes)[2] + _SMOOTHER:
+        return False
+    half = len(shapes.weight) // 2
+    slow = Shapes(shapes.weight[:half], shapes.square[:half])
+    fast = Shapes(shapes.weight[half:], shapes.square[half:])
+    logs, sds = [], []
+    for part in (slow, fast):
+        size, sd, gain = _likelihood(part)
+        if gain < _SMOOTHER:
+            return True
+        logs.append(math.log(size))
+        sds.append(sd / size)
+    return abs(logs[0] - logs[1]) < math.log(_ALIKE) + 3.0 * math.hypot(*sds)
 
 
 def _twice(shapes: Shapes, sizes: FloatArray) -> FloatArray:

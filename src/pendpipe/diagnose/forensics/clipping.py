@@ -10,14 +10,10 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
-from pendpipe.diagnose.forensics.lattice import (
-    Lattice,
-    find_lattice,
-    noise_before_rounding,
-    whole_readings,
-)
-from pendpipe.diagnose.forensics.local import Local, local_residual, residual_of
+from pendpipe.diagnose.forensics.lattice import Lattice, find_lattice, noise_before_rounding
+from pendpipe.diagnose.forensics.local import Local, local_residual
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
@@ -26,6 +22,8 @@ _FEWEST: Final = 2
 """Readings at the very end of the range that make a flat top."""
 _SHARED: Final = 0.1
 """Error in steps of the true angle that a window's readings share, where rounding is coarse."""
+_ROUNDED: Final = 0.5
+"""Rms in steps up to which errors may be alike because of rounding alone."""
 _MASKED: Final = 1e-2
 
 Side = Literal["upper", "lower"]
@@ -37,7 +35,7 @@ class End(NamedTuple):
     side: Side
     level: float
     at: BoolArray
-    """Which readings are there; shape (n,)."""
+    """Which readings are there; shape (m,) of `Raw`."""
     p_value: float
     delta_chi2: float
 
@@ -53,36 +51,44 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     the distribution of the largest reading. It counts only where two readings or more
     are the very same, as at the end of a converter's range.
     """
-    if data.time_noise or data.used < 60 or not whole_readings(data, samples):
+    if data.time_noise or samples.counts or data.used < 60:
         return nothing("clipping")
-    residual = residual_of(data, fit)
-    lattice = find_lattice(data.values, samples.step)
-    ends = [_end(data, fit, residual, lattice, side) for side in ("upper", "lower")]
+    raw = raw_readings(data, fit, samples)
+    lattice = find_lattice(raw.values, samples.step)
+    sides: tuple[Side, Side] = ("upper", "lower")
+    ends = [_end(raw, lattice, side, noise.memory) for side in sides]
     p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))
     clipped = [end for end in ends if end.p_value < _MASKED]
     if not clipped:
         return Finding("clipping", p_value, summary="the largest readings are as the motion's")
-    return _described(data, fit, lattice, clipped, p_value)
+    return _described(data, fit, samples, lattice, clipped, p_value)
 
 
-def _end(data: Data, fit: Fit, residual: FloatArray, lattice: Lattice | None, side: str) -> End:
+def _at_end(raw: Raw, slack: float, sign: float) -> BoolArray:
+    """Readings at the very end of what was read."""
+    level = float((sign * raw.values[raw.used]).max())
+    return np.asarray(raw.used & (sign * raw.values >= level - slack))
+
+
+def _end(raw: Raw, lattice: Lattice | None, side: Side, memory: float) -> End:
     sign = 1.0 if side == "upper" else -1.0
-    named: Side = "upper" if side == "upper" else "lower"
-    used = data.weight > 0.0
-    level = float((sign * data.values[used]).max())
     step = lattice.step if lattice is not None else 0.0
-    slack = 0.5 * step if step else 1e-9 * float(np.ptp(data.values[used]))
-    at = used & (sign * data.values >= level - slack)
+    slack = 0.5 * step if step else 1e-9 * float(np.ptp(raw.values[raw.used]))
+    at, other = _at_end(raw, slack, sign), _at_end(raw, slack, -sign)
+    level = float((sign * raw.values[at]).max())
     if np.count_nonzero(at) < _FEWEST:
-        return End(named, sign * level, at, 1.0, 0.0)
-    local = local_residual(fit.at.sampled.phase, residual, used, leave_out=at)
-    true = sign * (data.values - local.left)
+        return End(side, sign * level, at, 1.0, 0.0)
+    local = local_residual(raw.phase, raw.residual, raw.used, leave_out=at | other)
+    if local.smooth(memory) and local.rms > _ROUNDED * step:
+        # A misfit of the motion is left: what it should have reached is not known.
+        return End(side, sign * level, at, 1.0, 0.0)
+    true = sign * (raw.values - local.left)
     before = _noise(local, step)
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
-    near = used & (true > level - 6.0 * local.rms - 3.0 * step)
+    near = raw.used & (true > level - 6.0 * local.rms - 3.0 * step)
     p_value = _largest(level + 0.5 * step - true[near], spread[near], _common(before, step))
     beyond = np.maximum(true[at] - level - 0.5 * step, 0.0) / spread[at]
-    return End(named, sign * level, at, p_value, float(beyond @ beyond))
+    return End(side, sign * level, at, p_value, float(beyond @ beyond))
 
 
 def _noise(local: Local, step: float) -> float:
@@ -107,20 +113,25 @@ def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
 
 
 def _described(
-    data: Data, fit: Fit, lattice: Lattice | None, ends: list[End], p_value: float
-) -> Finding:
-    mask = np.zeros(len(data), dtype=bool)
+    data: Data, fit: Fit, samples: Samples, lattice: Lattice | None, ends: list[End],
+    p_value: float,
+) -> Finding:  # fmt: skip
     parameters = {}
     codes = []
     step = lattice.step if lattice is not None else 0.0
+    inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
+    clipped = np.zeros(len(samples), dtype=bool)
     for end in ends:
-        mask |= end.at
+        sign = 1.0 if end.side == "upper" else -1.0
+        clipped |= inside & (sign * (samples.values - end.level) >= -0.5 * step)
         parameters["high" if end.side == "upper" else "low"] = Estimate(
             end.level, step / math.sqrt(12.0), data.unit
         )
         if lattice is not None:
             codes.append(round(float(lattice.position(np.array(end.level)))))
-    number = int(np.count_nonzero(mask))
+    number = int(np.count_nonzero(clipped))
+    mask = np.zeros(len(data), dtype=bool)
+    mask[place_of(data, samples.time_s[clipped])] = True
     parameters["number"] = Estimate(float(number), 0.0, "")
     when, amplitude = data.time_s[mask], fit.at.sampled.amplitude[mask]
     sides = " and ".join(end.side for end in ends)

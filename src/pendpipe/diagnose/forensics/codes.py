@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.lattice import Lattice, find_lattice, noise_before_rounding
 from pendpipe.diagnose.forensics.local import local_residual, residual_of
@@ -54,6 +54,55 @@ class Coded:
         return self.code - self.position
 
 
+@dataclass(frozen=True)
+class Raw:
+    """Readings as they were taken, where the data may be means of several; shape (m,).
+
+    Parameters
+    ----------
+    values, residual, phase, used
+        Readings, readings less model, the motion's phase, and which count.
+    index
+        Which of the samples each is.
+    place
+        Which of the data each belongs to.
+    """
+
+    values: FloatArray
+    residual: FloatArray
+    phase: FloatArray
+    used: BoolArray
+    index: IntArray
+    place: IntArray
+
+
+def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
+    """Take the readings behind the data; of very many every second, third, ..."""
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
+    sampled, reading = fit.at.sampled, fit.at.reading
+    if last - first == len(data):
+        index = np.arange(first, last)
+        return Raw(
+            samples.values[index], residual_of(data, fit), sampled.phase, data.weight > 0.0,
+            index, np.arange(len(data)),
+        )  # fmt: skip
+    index = np.arange(first, last, max(1, (last - first) // _MOST))
+    when, values = samples.time_s[index], samples.values[index]
+    return Raw(
+        values, values - _between(data.time_s, reading, when),
+        np.interp(when, data.time_s, sampled.phase),
+        np.interp(when, data.time_s, data.weight) > 0.99,
+        index, place_of(data, when),
+    )  # fmt: skip
+
+
+def place_of(data: Data, time_s: FloatArray) -> IntArray:
+    """Which of the data lies nearest to each time."""
+    middle = 0.5 * (data.time_s[1:] + data.time_s[:-1])
+    return np.asarray(np.searchsorted(middle, time_s))
+
+
 def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     """Set codes and angles side by side; None where the readings have no step.
 
@@ -62,36 +111,25 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     """
     if samples.counts or samples.step is None:
         return None
-    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
-    every = 1 if last - first == len(data) else max(1, (last - first) // _MOST)
-    index = np.arange(first, last, every)
-    values = samples.values[index]
+    raw = raw_readings(data, fit, samples)
+    values, residual, used = raw.values, raw.residual, raw.used
     lattice = find_lattice(values, samples.step)
     if lattice is None:
         return None
-    sampled = fit.at.sampled
-    if last - first == len(data):
-        phase, used = sampled.phase, data.weight > 0.0
-        residual = residual_of(data, fit)
-    else:
-        when = samples.time_s[index]
-        phase = np.interp(when, data.time_s, sampled.phase)
-        used = np.interp(when, data.time_s, data.weight) > 0.99
-        residual = values - _between(data.time_s, fit.at.reading, when)
-    local = local_residual(phase, residual, used)
-    smooth = (residual - local.left)[used]
+    local = local_residual(raw.phase, residual, used)
     step = lattice.step
-    misfit = math.sqrt(float(np.mean(smooth**2))) / step
+    taken = float(np.mean((residual - local.left)[used] ** 2))
+    noise = local.rms**2 * float(np.mean(np.abs(local.leverage[used])))
+    misfit = math.sqrt(max(taken - noise, 0.0)) / step
     good = used & (np.abs(local.scaled) < 6.0)
     ratio = noise_before_rounding(local, step) / step
     if misfit < _MISFIT:
         true, blur = values - residual, min(0.5 * misfit, 0.05)
     else:
         true = values - local.left
-        blur = local.rms / step * math.sqrt(float(np.mean(np.abs(local.leverage[used]))))
+        blur = math.sqrt(noise) / step
     position = lattice.position(true[good])
-    return Coded(lattice, lattice.code[good], position, blur, ratio, index[good])
+    return Coded(lattice, lattice.code[good], position, blur, ratio, raw.index[good])
 
 
 def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,7 @@ _SHARED: Final = 0.35
 """Part of an error that its neighbours may have as well, if it is to be one reading's own."""
 _ROUNDS: Final = 4
 _NEAR: Final = 4
+_BLOCK: Final = 50
 _EXPECTED: Final = 0.05
 """A reading is left out where chance would make fewer than this in the whole record."""
 
@@ -46,33 +48,60 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """
     if data.used < 60:
         return nothing("glitches")
-    residual = residual_of(data, fit)
-    phase, used = fit.at.sampled.phase, data.weight > 0.0
-    local = local_residual(phase, whitened_in_time(residual, noise), used)
+    residual, used = residual_of(data, fit), data.weight > 0.0
+    local, smeared = _errors(data, fit, noise, residual, ~used)
     error = own_error(local)
-    place = np.flatnonzero(local.used)
-    p_value = _smallest(np.sort(error[place]))
-    tail = _others(np.sort(error[place]))
+    count = int(np.count_nonzero(used))
+    p_value, tail = _smallest(np.sort(error[used])), _others(np.sort(error[used]))
     mask = np.zeros(len(data), dtype=bool)
     size = np.zeros(len(data))
     for _ in range(_ROUNDS):
-        beyond = (error > 3.0) & local.used & ~mask & (p_value < _EXPECTED)
-        beyond[beyond] = tail.beyond(error[beyond]) * len(place) < _EXPECTED
-        if noise.uniform and noise.memory != 0.0:
-            # Whitening smears a wrong reading over its neighbours: the largest goes first.
+        beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED)
+        beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED
+        if smeared:
+            # The filter spreads a wrong reading over its neighbours: the largest goes first.
             beyond &= error == _largest_about(error)
         if not beyond.any():
             break
         size[beyond] = local.scaled[beyond]
         mask |= beyond
-        if noise.memory == 0.0:
+        if not smeared:
             break
-        rest = np.where(mask, 0.0, residual)
-        local = local_residual(phase, whitened_in_time(rest, noise), used, leave_out=mask)
+        local, _ = _errors(data, fit, noise, residual, ~used | mask)
         error = own_error(local)
     if not mask.any():
-        return Finding("glitches", p_value, summary="no reading stands out of the noise")
+        quiet = "no reading stands out of the noise"
+        return Finding("glitches", max(p_value, _EXPECTED), summary=quiet)
     return _described(data, fit, size, mask, p_value, tail)
+
+
+def _errors(
+    data: Data, fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray
+) -> tuple[Local, bool]:
+    """Each reading's error, and whether a filter has spread it over its neighbours.
+
+    Where a misfit of the motion is left in the windows, each reading is compared with the
+    cubic through its four neighbours instead.
+    """
+    phase = fit.at.sampled.phase
+    rest = np.where(out, 0.0, residual)
+    local = local_residual(phase, whitened_in_time(rest, noise), ~out)
+    if not local.smooth():
+        return local, noise.uniform and noise.memory != 0.0
+    filled = np.interp(phase, phase[~out], residual[~out])
+    padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")
+    between = (4.0 * (padded[1:-3] + padded[3:-1]) - padded[:-4] - padded[4:]) / 6.0
+    error = (filled - between) / _unrest(filled - between)
+    return local_residual(phase, np.where(out, 0.0, error), ~out), True
+
+
+def _unrest(error: FloatArray) -> FloatArray:
+    """Usual |error| about each reading, where a misfit makes it differ along the record."""
+    count = max(len(error) // _BLOCK, 1)
+    ends = np.linspace(0, len(error), count + 1).astype(np.int64)
+    usual = [np.median(np.abs(error[i:j])) for i, j in pairwise(ends)]
+    scale = np.interp(np.arange(len(error)), 0.5 * (ends[:-1] + ends[1:]), usual)
+    return np.asarray(np.maximum(scale, max(float(np.median(usual)), 1e-300)))
 
 
 def own_error(local: Local) -> FloatArray:
@@ -120,14 +149,15 @@ def _described(
 ) -> Finding:
     sampled = fit.at.sampled
     size = sizes[mask]
-    residual = residual_of(data, fit)
-    reading = residual[mask]
+    residual, used = residual_of(data, fit), data.weight > 0.0
+    local = local_residual(sampled.phase, residual, used, leave_out=mask)
+    reading = local.left[mask]
     when = data.time_s[mask]
     amplitude = sampled.amplitude[mask]
     largest = int(np.argmax(np.abs(size)))
     number = int(np.count_nonzero(mask))
     own = math.sqrt(float(np.mean(reading**2)))
-    rms = math.sqrt(float(np.mean(residual[~mask & (data.weight > 0.0)] ** 2)))
+    rms = local.rms
     parameters = {
         "number": Estimate(float(number), 0.0, ""),
         "share": Estimate(number / data.used, math.sqrt(number) / data.used, ""),

@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics.codes import read_codes
+from pendpipe.diagnose.forensics.codes import Coded, read_codes
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
 from pendpipe.diagnose.forensics.lattice import rounding_moments, whole_readings
 from pendpipe.diagnose.forensics.local import local_residual, residual_of, whitened_in_time
@@ -27,6 +27,8 @@ _DITHERED: Final = 0.7
 """Noise before rounding, in steps, from which rounding is part of the noise."""
 _ROUNDS: Final = 6
 _STEP: Final = 0.05
+_BLURRED: Final = 0.15
+"""Error of the angles in steps above which rounding's errors are not known."""
 
 
 class Squares(NamedTuple):
@@ -79,8 +81,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """
     if data.time_noise or data.used < 60:
         return nothing("jitter")
-    squares = _rounded(data, fit, samples) or _dithered(data, fit, noise)
-    if len(squares.square) < 50:
+    coded = read_codes(data, fit, samples)
+    if coded is not None and coded.ratio < _DITHERED:
+        squares = _rounded(data, fit, samples, coded)
+    else:
+        squares = _dithered(data, fit, noise)
+    if squares is None or len(squares.square) < 50:
         return nothing("jitter")
     p_value = _chance(squares, squares.mean + squares.double)
     size, covariance = _fitted(squares, [squares.mean, squares.double])
@@ -90,12 +96,14 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     return _described(data, fit, squares, p_value)
 
 
-def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares:
-    """Squares of normal errors."""
+def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
+    """Squares of normal errors; None where a misfit of the motion is left in them."""
     sampled, used = fit.at.sampled, data.weight > 0.0
     residual = residual_of(data, fit)
     white = whitened_in_time(residual, noise)
     local = local_residual(sampled.phase, white, used)
+    if local.smooth():
+        return None
     scaled = local.scaled[used]
     unit = noise.white_rms**2
     mean, double, speed = _speeds(fit, np.flatnonzero(used))
@@ -104,12 +112,9 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares:
     return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit, speed, shared)
 
 
-def _rounded(data: Data, fit: Fit, samples: Samples) -> Squares | None:
-    """Squares of errors that are rounding's at that angle; None where noise dithers it."""
-    if not whole_readings(data, samples):
-        return None
-    coded = read_codes(data, fit, samples)
-    if coded is None or coded.ratio > _DITHERED:
+def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
+    """Squares of errors that are rounding's at that angle; None where that is not known well."""
+    if not whole_readings(data, samples) or coded.blur > _BLURRED:
         return None
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
     index = coded.index - first

@@ -24,6 +24,8 @@ _CYCLES: Final = 2
 _READINGS: Final = 40
 _FAR: Final = 5.0
 """Standard deviations beyond which a reading has no say in its window's fit."""
+_SMOOTH: Final = 0.1
+"""Correlation of neighbouring errors that noise may have."""
 _ROUGH: Final = 5.0
 """Standard deviations by which the harmonics must be there to be taken off."""
 
@@ -54,6 +56,19 @@ class Local:
     def spread(self) -> FloatArray:
         """Standard deviation of `left`, shape (n,)."""
         return np.asarray(self.rms * np.sqrt(np.maximum(1.0 + self.leverage, 0.05)))
+
+    def smooth(self, memory: float = 0.0) -> bool:
+        """Say whether what is left is smoother than the noise, so that it is a misfit.
+
+        `memory` is the correlation of neighbouring errors that the noise is known to have.
+        """
+        fitted = self.used & (self.leverage < 0.0)
+        scaled = np.where(fitted, np.clip(self.scaled, -4.0, 4.0), 0.0)
+        size = float(scaled @ scaled)
+        correlation = float(scaled[1:] @ scaled[:-1]) / max(size, 1e-300)
+        return correlation > 1.2 * max(memory, 0.0) + _SMOOTH + 4.0 / math.sqrt(
+            max(int(np.count_nonzero(self.used)), 1)
+        )
 
     @property
     def scaled(self) -> FloatArray:

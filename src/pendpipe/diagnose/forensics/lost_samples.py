@@ -17,8 +17,10 @@ from pendpipe.diagnose.unwrapped import _alignment
 
 _SURE: Final = 7.0
 """Standard deviations of a phase step."""
-_WHOLE: Final = 0.15
+_WHOLE: Final = 0.03
 """Part of an interval by which a step may miss a whole number of them."""
+_BLURRED: Final = 0.12
+"""Standard deviation in intervals above which any step would pass for a whole number."""
 _MOST: Final = 40
 _TREND: Final = 6
 """Neighbouring steps on each side whose median is what the model lacks anyway."""
@@ -43,12 +45,19 @@ class LostSamples(NamedTuple):
     sd: float
 
 
-def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
+def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> list[LostSamples]:
     """Find sudden steps of the phase that are whole numbers of sampling intervals.
 
     Behind n lost samples the readings run n intervals ahead of their stamps, so that the
     phase between readings and model, cycle by cycle, steps by omega n interval. The steps
     of a clock have one sign; a blow has any, and is no whole number.
+
+    Parameters
+    ----------
+    data, fit
+        The readings, and a model near enough that its cycles are the readings'.
+    interval_s
+        Between samples, where `data` are means of several.
 
     Returns
     -------
@@ -62,17 +71,18 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
     if len(phase) < 8:
         return []
     sampled = fit.at.sampled
-    interval = sampled.motion.angular_frequency * data.interval_s
+    interval = sampled.motion.angular_frequency * (interval_s or data.interval_s)
     spread = _spread(data, fit, phase, centre)
     rest = phase.copy()
     found: list[tuple[int, int, float, float]] = []
     for _ in range(_MOST):
         step = rest[2:] - rest[:-2]
         step = step - _trend(step)
-        error = np.hypot(spread[2:], spread[:-2])
+        error = np.maximum(np.hypot(spread[2:], spread[:-2]), _unrest(step))
         number = np.round(step / interval)
         sure = (number != 0.0) & (np.abs(step) > _SURE * error)
-        sure &= np.abs(step - number * interval) < _WHOLE * interval + 2.0 * error
+        sure &= np.abs(step - number * interval) < _WHOLE * interval + 2.5 * error
+        sure &= error < _BLURRED * interval
         if not sure.any():
             break
         at = int(np.argmax(np.where(sure, np.abs(step) / error, 0.0)))
@@ -99,6 +109,11 @@ def _spread(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray) -> Floa
     readings = len(data) / max(len(phase), 1)
     floor = data.step / math.sqrt(12.0 * max(0.5 * readings, 1.0))
     return np.asarray(max(usual, floor, 1e-9) / amplitude)
+
+
+def _unrest(step: FloatArray) -> FloatArray:
+    """How much the steps about each differ, a misfit's included."""
+    return np.asarray(1.4826 * _trend(np.abs(step)))
 
 
 def _trend(step: FloatArray) -> FloatArray:
