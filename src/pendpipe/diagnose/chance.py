@@ -68,11 +68,13 @@ def draw_chance(bank: Bank, scans: Sequence[ToneScan], seed: int, draws: int = _
     smallest = np.ones(draws)
     own: dict[str, Trials] = {}
     if bank.candidates:
-        local = local_p_values(bank.scores(white), bank.freedom)
-        smallest = local.min(axis=0)
+        scores = bank.scores(white)
         for name, rows in bank.rows().items():
-            one = len(rows) == 1
-            own[name] = Trials(1.0, 0.0) if one else _trials(local[rows].min(axis=0), _GROWTH)
+            # All shapes of one effect have the same degrees of freedom.
+            freedom = bank.freedom[rows[:1]]
+            local = local_p_values(scores[rows].max(axis=0)[None], freedom)[0]
+            smallest = np.minimum(smallest, local)
+            own[name] = Trials(1.0, 0.0) if len(rows) == 1 else _trials(local, _GROWTH)
     for scan in scans:
         smallest = np.minimum(smallest, np.exp(-0.5 * scan.scores(white).max(axis=0)))
     return Chance(_trials(smallest, _GROWTH), own)

@@ -170,7 +170,7 @@ def _add_one(
     open_parameters = [entry for entry in freed if entry.index in state.holding]
     progress(f"scanning {len(effects)} effects")
     scanner = prepare(state.fit, state.data, state.noise, [*effects, *open_parameters])
-    state.now = detect(scanner, state.fit, seed=seed)
+    state.now = detect(scanner, state.fit, seed=seed, known=state.now)
     state.first = state.first or state.now
     if state.now.p_value > level * CATALOGUE_SHARE and state.noise.red > 0.0 and not gross:
         _doubt_redness(state, [*effects, *open_parameters], level, seed, progress)
