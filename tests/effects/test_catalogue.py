@@ -101,6 +101,15 @@ def test_the_page_is_the_catalogues() -> None:
     assert committed.read_text(encoding="utf-8") == page()
 
 
+def test_units_follow_the_displacements() -> None:
+    units = {
+        parameter.unit_in("m") for effect in CATALOGUE for parameter in effect.parameters
+    }  # fmt: skip
+    assert "m/s^2" in units
+    assert "1/m^2" in units
+    assert not any("rad" in unit for unit in units)
+
+
 def test_frictions_have_one_sign() -> None:
     """A size that can't be negative is looked for with its own sign only."""
     one_sided = {effect.identifier for effect in CATALOGUE if effect.template and effect.one_sided}

@@ -158,7 +158,8 @@ def _named(
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
-        effect_parameters(found.improved, effect), gain, step.p_value, float(weights[0]),
+        effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
+        float(weights[0]),
         tuple((mate.identifier, float(weight)) for mate, weight in
               zip(mates, weights[1:], strict=False)),
         effect.deciding, locate(without, found.improved, found.data, effect),

@@ -85,8 +85,8 @@ def _estimate(
     return Estimate(value, sd, unit, interval, at_bound)
 
 
-def effect_parameters(fit: Fit, effect: Effect) -> dict[str, Estimate]:
-    """Return an effect's own parameters, by name."""
+def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, Estimate]:
+    """Return an effect's own parameters, by name; displacements are in `unit`."""
     for other, place in fit.model.places():
         if other is effect:
             break
@@ -101,7 +101,7 @@ def effect_parameters(fit: Fit, effect: Effect) -> dict[str, Estimate]:
         value = float(fit.value[index])
         half = 1.959963984540054 * sd
         interval = (max(value - half, parameter.low), min(value + half, parameter.high))
-        found[parameter.name] = Estimate(value, sd, parameter.unit, interval)
+        found[parameter.name] = Estimate(value, sd, parameter.unit_in(unit), interval)
     return found
 
 

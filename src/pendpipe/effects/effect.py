@@ -28,6 +28,10 @@ class Parameter(NamedTuple):
     default: float | None = None
     """What a simulation takes where it is not given; None: it must be."""
 
+    def unit_in(self, unit: str) -> str:
+        """Return its unit where displacements are in `unit` ("rad" or "m")."""
+        return self.unit.replace("rad", unit)
+
 
 class Kick(NamedTuple):
     """A sudden change of the motion: at `time_s` the angle and the velocity jump."""
