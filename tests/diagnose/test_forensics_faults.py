@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -222,13 +223,27 @@ def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
     record = fitted(pendulum, readings)
     data = gather(
         record.samples.time_s, readings, step=record.samples.step, unit="rad", counts=False,
-        period_s=1.0 / FREQUENCY_HZ, most=5000,
+        period_s=1.0 / FREQUENCY_HZ, noise_rms=record.samples.noise_rms, most=5000,
     )  # fmt: skip
     assert len(data) < pendulum.count // 3
     model = Model(data.time_s, data.interval_s)
     noise = white_noise(data, record.noise.rms * math.sqrt(len(data) / pendulum.count))
     fit = refine(model, data, noise, pendulum.values())
     return Fitted(data, fit, noise, record.samples)
+
+
+def test_codes_are_judged_behind_a_mended_clock() -> None:
+    """Ten samples are lost in the middle; the data's times are right, the samples' are not."""
+    longer = Pendulum(count=AIR.count + 10)
+    kept = np.delete(np.arange(longer.count), slice(2000, 2010))
+    noise = 1e-3 * generator().standard_normal(longer.count)
+    noisy = longer.model().reading(longer.values()) + noise
+    exact = np.round(noisy / STEP_12).astype(np.int64)
+    readings = (STEP_12 * (exact + np.isin(exact, (20,))))[kept]
+    mended = fitted(AIR, readings, longer.times()[kept])
+    samples = replace(mended.samples, time_s=AIR.times()[: len(kept)])
+    finding = TESTS["missing-codes"](mended.data, mended.fit, mended.noise, samples)
+    assert finding.location.adc_codes == (20,)
 
 
 FAST = Pendulum(rate_hz=400.0, count=20_000)

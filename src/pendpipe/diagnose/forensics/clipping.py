@@ -12,7 +12,12 @@ from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
-from pendpipe.diagnose.forensics.lattice import Lattice, find_lattice, noise_before_rounding
+from pendpipe.diagnose.forensics.lattice import (
+    Lattice,
+    find_lattice,
+    noise_before_rounding,
+    whole_readings,
+)
 from pendpipe.diagnose.forensics.local import Local, local_residual
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -112,6 +117,25 @@ def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
     return float(min(chance @ weights / weights.sum(), 1.0))
 
 
+def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tuple[int, BoolArray]:
+    """How many samples stand at the ends, and which of the data hold some; shape (n,)."""
+    part = whole_readings(data, samples)
+    if part is None:
+        inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
+        index = np.flatnonzero(inside)
+        place = place_of(data, samples.time_s[index])
+    else:
+        index, place = np.arange(part.start, part.stop), np.arange(len(data))
+    clipped = np.zeros(len(index), dtype=bool)
+    slack = 0.5 * step if step else 1e-9 * abs(ends[0].level)
+    for end in ends:
+        sign = 1.0 if end.side == "upper" else -1.0
+        clipped |= sign * (samples.values[index] - end.level) >= -slack
+    mask = np.zeros(len(data), dtype=bool)
+    mask[place[clipped]] = True
+    return int(np.count_nonzero(clipped)), mask
+
+
 def _described(
     data: Data, fit: Fit, samples: Samples, lattice: Lattice | None, ends: list[End],
     p_value: float,
@@ -119,19 +143,13 @@ def _described(
     parameters = {}
     codes = []
     step = lattice.step if lattice is not None else 0.0
-    inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
-    clipped = np.zeros(len(samples), dtype=bool)
+    number, mask = _clipped(data, samples, ends, step)
     for end in ends:
-        sign = 1.0 if end.side == "upper" else -1.0
-        clipped |= inside & (sign * (samples.values - end.level) >= -0.5 * step)
         parameters["high" if end.side == "upper" else "low"] = Estimate(
             end.level, step / math.sqrt(12.0), data.unit
         )
         if lattice is not None:
             codes.append(round(float(lattice.position(np.array(end.level)))))
-    number = int(np.count_nonzero(clipped))
-    mask = np.zeros(len(data), dtype=bool)
-    mask[place_of(data, samples.time_s[clipped])] = True
     parameters["number"] = Estimate(float(number), 0.0, "")
     when, amplitude = data.time_s[mask], fit.at.sampled.amplitude[mask]
     sides = " and ".join(end.side for end in ends)

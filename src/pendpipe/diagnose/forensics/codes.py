@@ -11,7 +11,12 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics.lattice import Lattice, find_lattice, noise_before_rounding
+from pendpipe.diagnose.forensics.lattice import (
+    Lattice,
+    find_lattice,
+    noise_before_rounding,
+    whole_readings,
+)
 from pendpipe.diagnose.forensics.local import local_residual, residual_of
 from pendpipe.diagnose.refine import Fit
 
@@ -78,15 +83,16 @@ class Raw:
 
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     """Take the readings behind the data; of very many every second, third, ..."""
-    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
     sampled, reading = fit.at.sampled, fit.at.reading
-    if last - first == len(data):
-        index = np.arange(first, last)
+    part = whole_readings(data, samples)
+    if part is not None:
+        index = np.arange(part.start, part.stop)
         return Raw(
-            samples.values[index], residual_of(data, fit), sampled.phase, data.weight > 0.0,
+            samples.values[part], residual_of(data, fit), sampled.phase, data.weight > 0.0,
             index, np.arange(len(data)),
         )  # fmt: skip
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
     index = np.arange(first, last, max(1, (last - first) // _MOST))
     when, values = samples.time_s[index], samples.values[index]
     return Raw(

@@ -114,10 +114,10 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
 
 def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
     """Squares of errors that are rounding's at that angle; None where that is not known well."""
-    if not whole_readings(data, samples) or coded.blur > _BLURRED:
+    part = whole_readings(data, samples)
+    if part is None or coded.blur > _BLURRED:
         return None
-    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    index = coded.index - first
+    index = coded.index - part.start
     # At rest within a step the errors are all the same: they say nothing of noise.
     moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
     if np.count_nonzero(moving) < 50:

@@ -67,11 +67,19 @@ def find_lattice(values: FloatArray, step: float | None) -> Lattice | None:
     return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
 
 
-def whole_readings(data: Data, samples: Samples) -> bool:
-    """Whether the data are the readings themselves, and not means of several."""
+def whole_readings(data: Data, samples: Samples) -> slice | None:
+    """Find which of the samples the data are; None where they are means of several.
+
+    They have the samples' times, or, where the clock has been mended, their values.
+    """
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
-    return last - first == len(data)
+    part = slice(first, first + len(data))
+    if part.stop > len(samples):
+        return None
+    if np.allclose(samples.time_s[part], data.time_s, rtol=0.0, atol=1e-9):
+        return part
+    same = samples.values[part] == data.values
+    return part if np.count_nonzero(same) > 0.5 * len(data) else None
 
 
 def noise_before_rounding(local: Local, step: float) -> float:
