@@ -22,8 +22,9 @@ PHASES: Final = 24
 _COLUMNS: Final = 90
 _IN_A_CELL: Final = 4
 """Readings, usually: fewer would leave holes."""
-_COLOURS = LinearSegmentedColormap.from_list("residual", [BLUE, "#FFFFFF", VERMILION])
-_COLOURS.set_bad("#E3E6EA")
+_COLOURS = LinearSegmentedColormap.from_list(
+    "residual", [BLUE, "#FFFFFF", VERMILION]
+).with_extremes(bad="#E3E6EA")
 
 
 @styled

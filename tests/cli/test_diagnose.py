@@ -1,0 +1,237 @@
+"""`pendpipe diagnose`: the contract's file, key by key, and how the command ends."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe import cli
+from pendpipe.recording import Recording, write_plain
+
+FREQUENCY_HZ, LINEAR = 0.9, 0.012
+NOISE_RAD = 1e-4
+TIME_S = np.arange(1500) / 15.0
+
+
+def pendulum(folder: Path, *, sine: bool, amplitude: float = 0.25) -> Path:
+    """Write a decay of x'' = -omega^2 x - 2 b x' (or with sin x), with white noise."""
+    omega = 2.0 * math.pi * FREQUENCY_HZ
+
+    def rate(_: float, state: np.ndarray) -> list[float]:
+        x, v = state
+        return [v, -omega * omega * (math.sin(x) if sine else x) - 2.0 * LINEAR * v]
+
+    solved = solve_ivp(
+        rate, (0.0, TIME_S[-1]), [amplitude, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
+    )
+    noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
+    path = folder / f"{'sine' if sine else 'linear'}.csv"
+    write_plain(path, Recording(TIME_S, 0.01 + solved.y[0] + noise, "angle_rad"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording that Eq. 8 describes."""
+    return pendulum(tmp_path_factory.mktemp("linear"), sine=False)
+
+
+@pytest.fixture(scope="module")
+def sine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One with circular error."""
+    return pendulum(tmp_path_factory.mktemp("sine"), sine=True)
+
+
+def diagnosis(folder: Path) -> dict[str, Any]:
+    """Read the result as strict JSON: no NaN, no infinity."""
+
+    def refuse(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    text = (folder / "diagnosis.json").read_text(encoding="utf-8")
+    content: dict[str, Any] = json.loads(text, parse_constant=refuse)
+    return content
+
+
+TOP = {
+    "schema_version", "baseline", "noise_rms_rad", "verdict", "p_value", "effects", "improved",
+    "held_out", "unexplained", "statement", "figures", "provenance",
+}  # fmt: skip
+MODEL = {"parameters", "residual_rms_rad", "chi2_per_dof"}
+EFFECT = {
+    "id", "name", "kind", "equation", "parameters", "delta_chi2", "p_value_global", "probability",
+    "indistinguishable_from", "deciding_measurement", "location",
+}  # fmt: skip
+LOCATION = {
+    "summary", "time_s", "amplitude_rad", "phase_rad", "frequency_hz", "harmonics", "adc_codes",
+}  # fmt: skip
+
+
+def check_contract(content: dict[str, Any]) -> None:
+    """Every key of the contract, with the kind of value that it promises."""
+    assert set(content) >= TOP
+    assert content["schema_version"] == 1
+    assert set(content["baseline"]) == MODEL | {"name"}
+    assert set(content["improved"]) == MODEL
+    assert set(content["held_out"]) == {
+        "log_density_before", "log_density_after", "gain", "gain_sd",
+    }  # fmt: skip
+    assert set(content["unexplained"]) == {"residual_rms_rad", "p_value"}
+    assert isinstance(content["statement"], str)
+    for model in (content["baseline"], content["improved"]):
+        for parameter in model["parameters"].values():
+            assert set(parameter) == {"value", "sd", "interval95", "at_bound", "unit"}
+    for effect in content["effects"]:
+        assert set(effect) - {"curve"} == EFFECT
+        assert effect["kind"] in {"dynamics", "measurement", "parameter", "unnamed"}
+        assert set(effect["location"]) == LOCATION
+        for parameter in effect["parameters"].values():
+            assert set(parameter) >= {"value", "sd", "interval95", "unit"}
+        rest = [other["probability"] for other in effect["indistinguishable_from"]]
+        assert 0.0 <= effect["probability"] + sum(rest) <= 1.0 + 1e-9
+
+
+def test_a_recording_that_equation_8_describes_is_consistent(
+    linear: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = cli.main(["diagnose", str(linear), "--out", str(tmp_path), "--no-figures"])
+    said = capsys.readouterr()
+    content = diagnosis(tmp_path)
+    check_contract(content)
+    assert status == 0
+    assert content["verdict"] == "consistent"
+    assert content["effects"] == content["figures"] == []
+    assert content["p_value"] > 0.01
+    assert content["noise_rms_rad"] == pytest.approx(NOISE_RAD, rel=0.06)
+    found = content["baseline"]["parameters"]
+    assert abs(found["frequency"]["value"] - FREQUENCY_HZ) < 5 * found["frequency"]["sd"]
+    assert set(found) == {"a", "b", "c", "frequency", "amplitude", "phase", "offset"}
+    assert said.out.strip() == content["statement"]
+    assert "fitting" in said.err
+    assert "scanning" in said.err
+
+
+def test_circular_error_is_named_and_the_fit_improves_to_the_noise(
+    sine: Path, tmp_path: Path
+) -> None:
+    status = cli.main(
+        ["diagnose", str(sine), "--out", str(tmp_path), "--fail-on", "missing-physics"]
+    )
+    content = diagnosis(tmp_path)
+    check_contract(content)
+    assert status == 3
+    assert content["verdict"] == "missing-physics"
+    first = content["effects"][0]
+    assert first["id"] == "circular-error"
+    assert first["kind"] == "dynamics"
+    assert content["baseline"]["residual_rms_rad"] > 10 * NOISE_RAD
+    assert content["improved"]["residual_rms_rad"] == pytest.approx(NOISE_RAD, rel=0.06)
+    assert content["held_out"]["gain"] > 0.0
+    frequency = content["improved"]["parameters"]["frequency"]
+    assert abs(frequency["value"] - FREQUENCY_HZ) < 5 * frequency["sd"]
+    assert content["figures"] == [
+        "residual_map.svg", "residual_spectrum.svg", "damping.svg", "frequency.svg",
+    ]  # fmt: skip
+    assert {path.name for path in tmp_path.glob("*.svg")} == set(content["figures"])
+
+
+def test_a_wrong_parameter_is_told_from_missing_physics(linear: Path, tmp_path: Path) -> None:
+    """A frequency given 0.03 % too high is not physics that was left out."""
+    held = ["--no-figures", "--fix", f"frequency={1.0003 * FREQUENCY_HZ}"]
+    assert cli.main(["diagnose", str(linear), "--out", str(tmp_path), *held]) == 0
+    content = diagnosis(tmp_path)
+    check_contract(content)
+    first = content["effects"][0]
+    assert (first["id"], first["kind"]) == ("parameter-frequency", "parameter")
+    frequency = content["improved"]["parameters"]["frequency"]
+    assert abs(frequency["value"] - FREQUENCY_HZ) < 5 * frequency["sd"]
+    assert content["provenance"]["fixed"] == [held[-1]]
+
+
+def test_a_true_parameter_that_is_held_is_consistent(linear: Path, tmp_path: Path) -> None:
+    held = ["--no-figures", "--fix", f"frequency={FREQUENCY_HZ}"]
+    assert cli.main(["diagnose", str(linear), "--out", str(tmp_path), *held]) == 0
+    assert diagnosis(tmp_path)["verdict"] == "consistent"
+
+
+def test_what_holds_no_decay_is_not_analysable(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dead = tmp_path / "dead.csv"
+    write_plain(dead, Recording(TIME_S, np.full(len(TIME_S), 0.25), "angle_rad"))
+    status = cli.main(["diagnose", str(dead), "--out", str(tmp_path / "out")])
+    content = diagnosis(tmp_path / "out")
+    check_contract(content)
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert status == 2
+    assert content["verdict"] == "not-analysable"
+    assert content["reason"] in last
+    assert "\n" not in content["reason"]
+
+
+def test_a_file_that_is_not_there_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert cli.main(["diagnose", str(tmp_path / "none.csv"), "--out", str(out)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("words", [["--fix", "mass=1"], ["--fix", "a=-1"]])
+def test_a_parameter_that_cannot_be_held_is_a_usage_fault(
+    linear: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["diagnose", str(linear), "--out", str(tmp_path / "out"), *words]) == 2
+    assert "--fix" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> None:
+    """Snakemake waits for every declared figure, whatever became of the record."""
+    refused = tmp_path / "refused.json"
+    refused.write_text(json.dumps({"record": "r", "stage": "acquire", "reason": "no decay"}))
+    words = ["--out", str(tmp_path), "--record", "r", "--refused", str(refused)]
+    assert cli.main(["diagnose", str(tmp_path / "none.csv"), *words]) == 0
+    content = diagnosis(tmp_path)
+    check_contract(content)
+    assert content["verdict"] == "not-analysable"
+    assert content["reason"] == "no decay"
+    from pendpipe.stages.diagnose import DIAGNOSIS_FIGURES
+
+    for name in DIAGNOSIS_FIGURES:
+        assert (tmp_path / f"{name}.svg").read_text().startswith("<svg")
+
+
+def test_the_campaigns_diagnosis_says_that_it_is_not_there_yet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["diagnose-campaign", str(tmp_path)]) == 2
+    assert "not available yet" in capsys.readouterr().err
+
+
+def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:
+    from pendpipe.diagnose import diagnose_recording
+    from pendpipe.recording import read_plain
+
+    cli.main(["diagnose", str(linear), "--out", str(tmp_path), "--no-figures", "--seed", "3"])
+    outcome = diagnose_recording(read_plain(linear), seed=3)
+    own, filed = outcome.diagnosis.as_json(), diagnosis(tmp_path)
+    for key in TOP - {"provenance"}:
+        assert json.loads(json.dumps(own[key])) == filed[key]
+
+
+def test_importing_the_diagnosis_costs_nothing() -> None:
+    code = "import sys, pendpipe.diagnose; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert not {"numpy", "scipy", "matplotlib", "numba"} & set(loaded.stdout.split())
