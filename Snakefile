@@ -18,6 +18,7 @@ include: "workflow/rules/separate.smk"
 include: "workflow/rules/compare.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/challenge.smk"
 
 
 # `all` stands in this file: Snakemake forgets the default target of an included one.

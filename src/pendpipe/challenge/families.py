@@ -18,7 +18,7 @@ from pendpipe.challenge.registry import EFFECTS, MEASUREMENT
 
 SIZES: Final = (4.0, 9.0, 16.0, 25.0, 50.0, 100.0, 400.0, 2500.0)
 SHARES: Final = {
-    "null": 1 / 3, "single": 0.34, "combination": 0.08, "tie": 0.05, "outside": 0.10,
+    "null": 0.34, "single": 0.33, "combination": 0.08, "tie": 0.05, "outside": 0.10,
     "withheld": 0.05, "real": 0.05,
 }  # fmt: skip
 """Of a set; what rounding leaves goes to the nulls."""

@@ -1,0 +1,168 @@
+"""Scores: known answers give known numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from pendpipe.challenge import intervals
+from pendpipe.challenge.page import page
+from pendpipe.challenge.score import score
+
+
+def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:
+    """A sealed truth with what the scores read."""
+    effects = [
+        {"effect": effect, "also": [], "law": "x", "kind": "dynamics", "own_form": True,
+         "delta_chi2": size, "parameters": {"cubic": 1.0}, "left_by_catalogue": size,
+         "best_mimic": ""}
+    ]  # fmt: skip
+    oracle = {
+        "detected": size > 20 and bool(effect), "detected_by_effect": size > 15 and bool(effect),
+        "named": effect, "top3": [effect], "class": [effect, "backlash"], "found_each": [True],
+        "scores": {"cubic-stiffness": size if effect else 1.0}, "whiteness_p": 0.5,
+    }  # fmt: skip
+    nuisances = {
+        "alpha": 0.0, "freedom": 0.0, "stops": False, "samples": 1000, "gain": 1.0,
+        "frequency_hz": 1.0,
+    }  # fmt: skip
+    return {"family": family, "baseline": "eq8", "effects": effects if effect else [],
+            "nuisances": nuisances, "oracle": oracle, "cancelling": False, **more}  # fmt: skip
+
+
+def answer(*names: str, probability: float = 0.9, rest: tuple[str, ...] = ()) -> dict[str, Any]:
+    """An answer that names these effects, the first with a class."""
+    effects = [
+        {"id": name, "probability": probability, "parameters": {"k3": {"value": 1.1, "sd": 0.1}},
+         "indistinguishable_from": [{"id": r, "probability": 0.01} for r in rest if not i],
+         "deciding_measurement": "swing it wider"}
+        for i, name in enumerate(names)
+    ]  # fmt: skip
+    verdict = "missing-physics" if names else "consistent"
+    return {"diagnosis": {"verdict": verdict, "effects": effects, "noise_rms_rad": 1.0,
+                          "baseline": {"residual_rms_rad": 2.0}, "statement": "It differs.",
+                          "improved": {"residual_rms_rad": 1.0},
+                          "held_out": {"gain": 3.0, "gain_sd": 1.0}}}  # fmt: skip
+
+
+def opened(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> dict[str, Any]:
+    items = {f"item-{n}": {"truth": t, "answer": a} for n, (t, a) in enumerate(pairs)}
+    return {
+        "items": items,
+        "set": "s",
+        "count": len(items),
+        "sealed_at": "1",
+        "opened_at": "3",
+        "answered_at": "2",
+        "seed": 1,
+        "truth_sha256": "ab",
+        "answers_sha256": "cd",
+    }
+
+
+K3 = "cubic-stiffness"
+
+
+def test_false_alarms_are_counted_and_red_noise_called_red_is_none() -> None:
+    red = truth("null")
+    red["nuisances"] = {**red["nuisances"], "alpha": 1.0}
+    found = score(
+        opened(
+            (truth("null"), answer()),
+            (truth("null"), answer(K3)),
+            (red, answer("coloured-noise")),
+            (truth("null"), answer("coloured-noise")),
+        )
+    )["false_alarms"]
+    assert (found["hits"], found["of"]) == (2, 4)
+    assert found["rightly_called_coloured"] == 1
+
+
+def test_names_are_judged_first_among_three_and_in_class() -> None:
+    found = score(
+        opened(
+            (truth("single", K3), answer(K3)),
+            (truth("single", K3), answer("backlash", rest=(K3,))),
+            (truth("single", K3), answer("jitter")),
+            (truth("single", K3), answer()),
+        )
+    )["naming"]["100"]
+    assert found["top1"]["hits"] == 1
+    assert found["class"]["hits"] == 2
+    assert found["class"]["of"] == 3
+    assert found["class_size"] == pytest.approx(4 / 3)
+    assert found["oracle_class_size"] == 2
+    assert found["share_of_the_oracle"] == pytest.approx(0.5)
+
+
+def test_outside_the_catalogue_a_confident_name_is_wrong() -> None:
+    made = truth("outside", "unnamed-damping")
+    found = score(
+        opened(
+            (made, answer("unnamed-damping")),
+            (made, answer("unnamed-restoring")),
+            (made, answer(K3, probability=0.95)),
+            (made, answer(K3, probability=0.5)),
+        )
+    )["outside"]
+    assert found["unnamed_of_the_right_kind"]["hits"] == 1
+    assert found["unnamed_of_any_kind"]["hits"] == 2
+    assert found["confident_wrong_names"]["hits"] == 1
+
+
+def test_a_tie_is_credited_for_its_class_only() -> None:
+    found = score(
+        opened(
+            (truth("tie", K3), answer(K3, rest=("backlash",))),
+            (truth("tie", K3), answer(K3)),
+        )
+    )["ties"]
+    assert found["class_and_deciding_measurement"]["hits"] == 1
+    assert found["lone_confident_names"]["hits"] == 1
+
+
+def test_pulls_compare_estimates_with_the_truth() -> None:
+    found = score(opened(*[(truth("single", K3), answer(K3))] * 2))["pulls"]
+    assert found["mean"] == pytest.approx(1.0)
+    assert found["coverage95"]["hits"] == 2
+
+
+def test_probabilities_that_come_true_are_calibrated() -> None:
+    random = np.random.default_rng(0)
+    stated = random.uniform(0.3, 1.0, 4000)
+    honest = intervals.calibration(stated, (random.random(4000) < stated).astype(float))
+    boasting = intervals.calibration(stated, (random.random(4000) < stated - 0.2).astype(float))
+    assert honest["expected_calibration_error"] < 0.03
+    assert boasting["expected_calibration_error"] == pytest.approx(0.2, abs=0.03)
+
+
+def test_the_power_curve_is_found_again() -> None:
+    random = np.random.default_rng(1)
+    size = random.choice([4.0, 9.0, 16.0, 25.0, 50.0, 100.0], 3000)
+    found = random.random(3000) < norm.cdf(np.sqrt(size) - 4.0)
+    half, most = intervals.power_curve(size, found.astype(float))
+    assert half == pytest.approx(16.0, rel=0.05)
+    assert most == pytest.approx((4 + 1.2816) ** 2, rel=0.05)
+
+
+def test_exact_intervals_are_clopper_and_pearsons() -> None:
+    none = intervals.rate(0, 300)["interval95"]
+    assert none[0] == 0.0
+    assert none[1] == pytest.approx(1 - 0.025 ** (1 / 300), rel=1e-9)
+    half = intervals.rate(50, 100)["interval95"]
+    assert half == pytest.approx([0.3983, 0.6017], abs=1e-4)
+
+
+def test_the_page_says_yes_and_no() -> None:
+    content = opened(
+        *[(truth("null"), answer())] * 3, (truth("single", K3), answer(K3)),
+        (truth("single", K3, 60.0), answer()), (truth("outside", "unnamed-damping"), answer(K3)),
+    )  # fmt: skip
+    text = page(content, score(content), ["power.svg"], "proof")
+    assert "**no**" in text
+    assert "| yes |" in text
+    assert "item-4 | cubic-stiffness" in text
+    assert "(proof/power.svg)" in text

@@ -1,0 +1,180 @@
+"""Sealing: the solver sees recordings and nothing else; nothing can be changed unseen."""
+
+# ruff: noqa: ARG005
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.challenge import families, make, sealing
+from pendpipe.challenge.make import Places, make_set
+from pendpipe.challenge.opening import open_set
+from pendpipe.challenge.singles import make_null
+from pendpipe.challenge.solve import answer_path, solve_set
+from pendpipe.commands import challenge as command
+from pendpipe.errors import InputError
+
+STUB = """
+import json, os, pathlib, sys
+from pathlib import Path
+
+seen = []
+def watch(event, arguments):
+    if event == "open" and isinstance(arguments[0], (str, bytes)):
+        seen.append(os.fsdecode(arguments[0]))
+sys.addaudithook(watch)
+here = Path.cwd()
+answer = Path(sys.argv[sys.argv.index("--out") + 1])
+answer.mkdir()
+Path(sys.argv[1]).read_text()
+report = {
+    "argv": sys.argv, "environment": dict(os.environ), "cwd": str(here),
+    "files": sorted(str(p.relative_to(here)) for p in here.rglob("*")), "opened": seen,
+}
+(answer / "diagnosis.json").write_text(json.dumps({
+    "verdict": "consistent", "p_value": 0.5, "effects": [], "report": report,
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Places:
+    """A set of nulls, solved by a stub that tells all that it could see."""
+    root = tmp_path_factory.mktemp("challenge")
+    places = Places(root / "open" / "set", root / "hidden" / "truth")
+    patch = pytest.MonkeyPatch()
+    patch.setattr(make, "make_item", lambda recipe, random: make_null(random))
+    patch.setattr(make, "plan", lambda count, random, real: [{"family": "null"}] * count)
+    patch.setattr(make, "ProcessPoolExecutor", Alone)
+    make_set(places, 3, seed=7)
+    patch.undo()
+    stub = root / "elsewhere" / "solver.py"
+    stub.parent.mkdir()
+    stub.write_text(STUB)
+    solve_set(places.folder, solver=[sys.executable, str(stub)])
+    return places
+
+
+class Alone:
+    """A pool of nobody: what is patched here holds in a worker too."""
+
+    def __init__(self, workers: int) -> None:
+        assert workers == 1
+
+    def __enter__(self) -> Alone:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    map = staticmethod(map)
+
+
+def test_the_solver_sees_one_recording_and_no_path_of_the_set(solved: Places) -> None:
+    for name in ("item-0001", "item-0002", "item-0003"):
+        content = json.loads(answer_path(solved.folder, name).read_text())["diagnosis"]["report"]
+        assert content["files"] == ["answer", "recording.csv"]
+        assert content["argv"][1:] == ["recording.csv", "--out", "answer", "--baseline", "eq8"]
+        told = json.dumps([content["argv"], content["environment"], content["cwd"]])
+        for secret in (solved.sealed, solved.folder, name):
+            assert str(secret) not in told
+        assert any(path.endswith("recording.csv") for path in content["opened"])
+        assert not any(str(solved.sealed) in path for path in content["opened"])
+        cwd = Path(content["cwd"])
+        assert solved.sealed not in cwd.parents
+        assert not cwd.exists()
+
+
+def test_the_recording_tells_what_a_laboratory_knows_and_no_more(solved: Places) -> None:
+    lines = solved.recording("item-0001").read_text().splitlines()
+    keys = {line.removeprefix("# ").split(":")[0] for line in lines if line.startswith("#")}
+    assert keys == {"volts_per_radian", "bits", "range_volts"}
+    assert lines[3] == "time_s,volts"
+    assert len(lines) <= 4 + 4000
+
+
+def test_the_manifest_was_sealed_before_any_answer(solved: Places) -> None:
+    manifest = json.loads(solved.manifest.read_text())
+    answers = [json.loads(answer_path(solved.folder, n).read_text()) for n in manifest["items"]]
+    assert all(manifest["sealed_at"] <= answer["solved_at"] for answer in answers)
+    text = solved.manifest.read_text()
+    assert "seed" not in text
+    assert "null" not in text.replace("null,", "")
+
+
+def test_a_set_opens_once_and_every_hash_is_checked(solved: Places) -> None:
+    truth = solved.truth("item-0002")
+    kept = truth.read_text()
+    truth.write_text(kept.replace('"null"', '"single"'))
+    with pytest.raises(InputError, match="not what was sealed"):
+        open_set(solved)
+    truth.write_text(kept)
+    answer = answer_path(solved.folder, "item-0003")
+    said = answer.read_text()
+    answer.write_text(said.replace("consistent", "missing-physics"))
+    with pytest.raises(InputError, match="changed after it was hashed"):
+        open_set(solved)
+    answer.write_text(said)
+    opened = json.loads(open_set(solved).read_text())
+    assert opened["seed"] == 7
+    assert set(opened["items"]) == {"item-0001", "item-0002", "item-0003"}
+    with pytest.raises(InputError, match="opened before"):
+        open_set(solved)
+
+
+def test_the_ledger_holds_every_item_and_no_line_can_go(solved: Places, tmp_path: Path) -> None:
+    ledger = solved.folder.parent / "ledger.jsonl"
+    assert sealing.check_ledger(ledger) == 3
+    copy = tmp_path / "ledger.jsonl"
+    lines = ledger.read_text().splitlines(keepends=True)
+    copy.write_text("".join([lines[0], lines[2]]))
+    with pytest.raises(InputError, match="chain of hashes"):
+        sealing.check_ledger(copy)
+
+
+def test_the_same_seed_makes_the_same_recording() -> None:
+    first, second = (make_null(np.random.default_rng([7, 1])) for _ in range(2))
+    assert np.array_equal(first.codes, second.codes)
+    assert first.truth == second.truth
+
+
+def test_truth_within_reach_of_the_solver_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="apart"):
+        make_set(Places(tmp_path / "set", tmp_path / "set" / "truth"), 1)
+
+
+def test_an_unsolved_set_is_not_opened(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not all there"):
+        open_set(Places(tmp_path / "set", tmp_path / "truth"))
+
+
+def test_a_salt_hides_what_was_hashed() -> None:
+    assert sealing.salted({"a": 1}, "x") != sealing.salted({"a": 1}, "y")
+    assert sealing.salted({"a": 1, "b": 2}, "x") == sealing.salted({"b": 2, "a": 1}, "x")
+
+
+def test_the_plan_has_a_third_nulls_and_many_instrument_decoys() -> None:
+    recipes = families.plan(600, np.random.default_rng(0), real=1000)
+    assert len(recipes) == 600
+    count = {f: sum(r["family"] == f for r in recipes) for f in families.SHARES}
+    assert count["null"] >= 200
+    assert all(count[family] >= 25 for family in families.SHARES)
+    singles = [r for r in recipes if r["family"] == "single"]
+    decoys = [r for r in singles if r["effects"][0] in families.MEASUREMENT]
+    assert len(decoys) >= 0.35 * len(singles)
+    assert {size for r in singles for size in r["delta_chi2"]} == set(families.SIZES)
+    assert any(r["cancelling"] for r in recipes if r["family"] == "combination")
+
+
+def test_the_command_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    import argparse
+
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    arguments = parser.parse_args(["score", str(tmp_path), "--out", str(tmp_path)])
+    with pytest.raises(InputError, match="not opened"):
+        command.run(arguments)

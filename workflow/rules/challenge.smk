@@ -1,0 +1,99 @@
+# The proof: conceal effects, solve by the released command, open, score. It has nothing to
+# do with the campaign, and its own configuration.
+import os
+
+import yaml
+
+with open("config/challenge.yaml", encoding="utf-8") as stream:
+    CHALLENGE = yaml.safe_load(stream)
+CHALLENGE_SET = os.environ.get("PENDPIPE_CHALLENGE_SET", CHALLENGE["set"])
+CHALLENGE_ITEMS = os.environ.get("PENDPIPE_CHALLENGE_ITEMS", CHALLENGE["items"])
+# The solver's folder and the sealed truth lie apart.
+OPEN = f"results/challenge/{CHALLENGE_SET}"
+SEALED = f"results/challenge-sealed/{CHALLENGE_SET}"
+
+
+def option(name, value):
+    """An option of the command line, or nothing."""
+    return "" if value is None else f"--{name} {value}"
+
+
+rule challenge:
+    input:
+        f"{OPEN}/scores/scores.json",
+
+
+rule challenge_make:
+    output:
+        f"{OPEN}/manifest.json",
+    log:
+        f"{OPEN}/logs/make.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    threads: 2
+    params:
+        number=CHALLENGE_ITEMS,
+        seed=option("seed", CHALLENGE["seed"]),
+        real=option("real", CHALLENGE["real"]),
+        folder=subpath(output[0], parent=True),
+        sealed=SEALED,
+    message:
+        "make and seal {params.number} items"
+    shell:
+        "pendpipe challenge make {params.folder} --sealed {params.sealed} --items {params.number}"
+        " {params.seed} {params.real} --workers {threads} 2> {log}"
+
+
+rule challenge_solve:
+    input:
+        f"{OPEN}/manifest.json",
+    output:
+        f"{OPEN}/answers.json",
+    log:
+        f"{OPEN}/logs/solve.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    threads: 2
+    params:
+        folder=subpath(input[0], parent=True),
+    message:
+        "solve the set"
+    shell:
+        "pendpipe challenge solve {params.folder} --workers {threads} 2> {log}"
+
+
+rule challenge_open:
+    input:
+        f"{OPEN}/answers.json",
+    output:
+        protected(f"{OPEN}/opened.json"),
+    log:
+        f"{OPEN}/logs/open.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        folder=subpath(input[0], parent=True),
+        sealed=SEALED,
+    message:
+        "check the seals and open the set"
+    shell:
+        "pendpipe challenge open {params.folder} --sealed {params.sealed} 2> {log}"
+
+
+rule challenge_score:
+    input:
+        f"{OPEN}/opened.json",
+    output:
+        f"{OPEN}/scores/scores.json",
+    log:
+        f"{OPEN}/logs/score.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        folder=subpath(input[0], parent=True),
+        out=subpath(output[0], parent=True),
+        page=option("page", CHALLENGE["page"]),
+    message:
+        "score the set"
+    shell:
+        "pendpipe challenge score {params.folder} --out {params.out} {params.page} > {log} 2>&1"
