@@ -17,7 +17,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data, gather
-from pendpipe.diagnose.model import OMEGA, SHARE, START, TIME, A, B, C, Model, OFFSET
+from pendpipe.diagnose.model import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Model
 from pendpipe.diagnose.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.physics.decay import time_at
@@ -98,7 +98,7 @@ def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
 def _before_the_stop(data: Data, value: FloatArray, order: int) -> tuple[Data, Model]:
     """Leave readings at the end out until the start values move the pendulum to the last."""
     while True:
-        model = Model(data.time_s, data.interval_s, order=order)
+        model = Model(data.time_s, data.interval_s, order=order, fold=data.fold)
         try:
             model.evaluate(value)
         except NoMotionError:

@@ -12,6 +12,8 @@ from pendpipe.arrays import BoolArray, FloatArray
 _DITHERS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step that is tried."""
 _WORTH: Final = 12.0
+_LEAST_IN_A_CYCLE: Final = 24.0
+"""Means of readings: the fifth harmonic loses 7 %, and the fundamental's loss is known."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,8 @@ class Data:
         Whether the error is in the times (an encoder's counts).
     noise_rms
         First estimate of one reading's noise.
+    fold
+        How many readings each is the mean of.
     lattice
         Where the rounding rules: a reading's remainder by the step, and the noise before
         the rounding (rad); None where noise makes the rounding random.
@@ -53,6 +57,7 @@ class Data:
     unit: str = "rad"
     time_noise: bool = False
     noise_rms: float = 0.0
+    fold: int = 1
     lattice: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
 
@@ -140,19 +145,19 @@ def fast_length(count: int) -> int:
 
 def gather(
     time_s: FloatArray, values: FloatArray, *, step: float | None, unit: str, counts: bool,
-    period_s: float, noise_rms: float, most: int = 8000,
+    period_s: float, noise_rms: float, most: int = 4000,
 ) -> Data:  # fmt: skip
     """Take the readings, in means of several where there are very many in a cycle.
 
-    A mean over m readings keeps what is slower than it; 48 in a cycle are left at least, so
-    that the fifth harmonic loses less than 1 %, and the model's readings are not averaged.
+    A mean over m readings keeps what is slower than it; 24 in a cycle are left at least.
+    What it takes off the fundamental, the model's readings lose as well (`Model.fold`).
     """
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
     uniform = bool(np.all(np.abs(intervals - interval) < 0.02 * interval)) and not counts
     fold = 1
     if uniform and len(time_s) > most:
-        fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / 48.0)))
+        fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _LEAST_IN_A_CYCLE)))
     if fold > 1:
         whole = len(time_s) // fold * fold
         time_s = time_s[:whole].reshape(-1, fold).mean(axis=1)
@@ -162,6 +167,7 @@ def gather(
         # The whitening's transforms are ten times slower where the length has a large prime.
         time_s, values = time_s[: fast_length(len(time_s))], values[: fast_length(len(values))]
     return Data(
-        time_s, values, interval, uniform, np.ones(len(time_s)), (step or 0.0) if fold == 1 else 0.0, unit,
-        counts, noise_rms / fold**0.5,
+        time_s, values, interval, uniform, np.ones(len(time_s)),
+        (step or 0.0) if fold == 1 else 0.0, unit,
+        counts, noise_rms / fold**0.5, fold=fold,
     )  # fmt: skip

@@ -97,9 +97,7 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))
 
 
-def detect(
-    scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None
-) -> Detection:
+def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None) -> Detection:
     """Score everything.
 
     Parameters
@@ -135,7 +133,7 @@ def _bank_leads(bank: Bank, residual: FloatArray, own: dict[str, Trials]) -> lis
         index = rows[int(np.argmax(scores[rows]))]
         candidate = bank.candidates[index]
         score = float(scores[index])
-        local = float(local_p_values(np.array([score]), np.array([float(candidate.count)]))[0])
+        local = float(local_p_values(np.array([score]), np.array([float(candidate.width)]))[0])
         p_value = own[name].global_p_value(local) if name in own else local
         leads.append(Lead(candidate.effect, candidate.shape, score, p_value))
     return leads

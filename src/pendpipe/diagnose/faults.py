@@ -131,9 +131,7 @@ class Forensics:
         state.fit, state.data, state.noise = settled(fit, mended, state.noise, state.holding)
 
 
-def kicked_at_random(
-    state: _State, rival: Rival, forensics: Forensics, progress: Progress
-) -> bool:
+def kicked_at_random(state: _State, rival: Rival, forensics: Forensics, progress: Progress) -> bool:
     """Ask whether random kicks explain more than the best effect of the catalogue does."""
     from pendpipe.diagnose.naming import equivalent
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
@@ -55,15 +55,15 @@ def held_out(
     return HeldOut(float(before.sum()), float(after.sum()), sd)
 
 
-def _blocks(fit: Fit) -> FloatArray:
+def _blocks(fit: Fit) -> IntArray:
     """Number of each reading's block: ten cycles, or fewer where there are few."""
     turns = (fit.at.sampled.phase - fit.at.sampled.phase[0]) / (2.0 * math.pi)
     size = min(float(_CYCLES), max(float(turns[-1]) / 8.0, 0.5))
-    return np.maximum(np.floor(turns / size), 0.0).astype(np.int64)
+    return np.asarray(np.maximum(np.floor(turns / size), 0.0).astype(np.int64))
 
 
 def _densities(
-    fit: Fit, data: Data, noise: Noise, held: Sequence[int], block: FloatArray
+    fit: Fit, data: Data, noise: Noise, held: Sequence[int], block: IntArray
 ) -> FloatArray:
     """Log density of each reading, given the other half of the blocks."""
     variance = np.full(len(data), noise.rms**2) if noise.uniform else noise.variance
@@ -79,5 +79,7 @@ def _densities(
             predicted = fit.at.reading
         wanted = out & (data.weight > 0.0)
         off = data.residual(predicted)[wanted]
-        found[wanted] = -0.5 * (off**2 / variance[wanted] + np.log(2.0 * math.pi * variance[wanted]))
+        found[wanted] = -0.5 * (
+            off**2 / variance[wanted] + np.log(2.0 * math.pi * variance[wanted])
+        )
     return found

@@ -48,6 +48,7 @@ class Location:
 
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""
+
         def pair(interval: tuple[float, float] | None) -> list[float] | None:
             return None if interval is None else [float(end) for end in interval]
 
@@ -146,9 +147,11 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
     size = np.maximum(np.bincount(cycle, minlength=count), 1)
     found = []
     for harmonic in range(_HARMONICS + 1):
-        parts = [np.cos(harmonic * phase), np.sin(harmonic * phase)] if harmonic else [
-            np.ones_like(phase)
-        ]
+        parts = (
+            [np.cos(harmonic * phase), np.sin(harmonic * phase)]
+            if harmonic
+            else [np.ones_like(phase)]
+        )
         held = 0.0
         for part in parts:
             sums = np.bincount(cycle, weights=difference * part, minlength=count)

@@ -82,6 +82,8 @@ class Model:
         Intervals between the nodes of a half cycle.
     half_cycles
         How many are followed; None for as many as the readings may need, and some more.
+    fold
+        How many readings each is the mean of, `interval_s` apart.
     """
 
     time_s: FloatArray
@@ -89,6 +91,7 @@ class Model:
     effects: tuple[Effect, ...] = ()
     order: int = 14
     half_cycles: int | None = None
+    fold: int = 1
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     def adding(self, effect: Effect) -> Model:
@@ -224,13 +227,20 @@ class Model:
                 times = times + delay
         sampled = sample_pieces(pieces, times)
         pendulum = self.pendulum(value)
-        reading = value[OFFSET] + sampled.angle
+        reading = value[OFFSET] + self._averaging(value) * sampled.angle
         for effect, place in self.places():
             extra = effect.reading(sampled, pendulum, value[place])
             if extra is not None:
                 reading = reading + extra
         tangent = Tangent(lambda m: self.acceleration(m, value), motion)
         return Evaluated(reading, sampled, tangent, self.span(value, sampled))
+
+    def _averaging(self, value: FloatArray) -> float:
+        """What a mean over `fold` neighbouring readings leaves of the fundamental."""
+        if self.fold == 1:
+            return 1.0
+        half = 0.5 * float(value[OMEGA]) * self.interval_s / self.fold
+        return math.sin(self.fold * half) / (self.fold * math.sin(half))
 
     def reading(self, value: FloatArray) -> FloatArray:
         """Return the readings alone, shape (n,)."""

@@ -136,9 +136,7 @@ def _cost(sizes: int, trials: Trials) -> float:
     return 2.0 * math.log(max(trials.first, 1.0)) + 6.0 * (sizes - 1)
 
 
-def _refitted(
-    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
-) -> Fit | None:
+def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:
     effect = lead.effect
     if isinstance(effect, FreedParameter):
         held = [index for index in held if index != effect.index]

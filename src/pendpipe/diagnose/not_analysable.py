@@ -23,7 +23,7 @@ def not_analysable(
     provenance
         Goes into the result.
     """
-    nothing = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
+    nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
     return {
         "schema_version": 1,
         "baseline": {"name": baseline, **nothing},

@@ -94,7 +94,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer to: where do model and recording differ, and what was left out?
+    """Where model and recording differ, and what was left out.
 
     Parameters
     ----------

@@ -104,10 +104,7 @@ def diagnose_decay(
     )  # fmt: skip
     named = (
         *(_fault(found, fault) for fault in found.faults),
-        *(
-            _named(found, beginning, step, index, baseline, seed)
-            for index, step in enumerate(found.steps)
-        ),
+        *(_named(found, beginning, step) for step in found.steps),
     )
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
@@ -142,12 +139,10 @@ def _held_out(found: Search, beginning: Beginning) -> HeldOut:
     )
 
 
-def _named(
-    found: Search, beginning: Beginning, step: Step, index: int, baseline: str, seed: int
-) -> Named:
+def _named(found: Search, beginning: Beginning, step: Step) -> Named:
     """One effect, weighed against its rivals with all the others in the model."""
     effect = step.winner.lead.effect
-    without, rivals = _rivalry(found, beginning, step, index, baseline, seed)
+    without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     mates = [
         rival for rival in rivals
@@ -191,9 +186,7 @@ def _misfit(found: Search) -> float:
     return 4.0 if found.unexplained > 0.01 else 0.0
 
 
-def _rivalry(
-    found: Search, beginning: Beginning, step: Step, index: int, baseline: str, seed: int
-) -> tuple[Fit, Sequence[Rival]]:
+def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
     """The model without one effect, and who else could take its place in it."""
     effect = step.winner.lead.effect
     held = list(found.held)
@@ -240,8 +233,6 @@ def refit_one(
     effect = lead.effect
     if isinstance(effect, FreedParameter):
         held = [index for index in held if index != effect.index]
-    own = rival.fit.value[len(rival.fit.value) - effect.count :] if effect.count else []
+    own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
     return _refined(without.model.adding(effect), found, start, held)
-
-

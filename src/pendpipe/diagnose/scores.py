@@ -35,7 +35,7 @@ class Candidate(NamedTuple):
     effect: Effect
     shape: tuple[float, ...]
     first: int
-    count: int
+    width: int
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Bank:
     @property
     def freedom(self) -> FloatArray:
         """Degrees of freedom of each candidate."""
-        return np.array([candidate.count for candidate in self.candidates], dtype=np.float64)
+        return np.array([candidate.width for candidate in self.candidates], dtype=np.float64)
 
 
 def tangent_basis(fit: Fit) -> FloatArray:

@@ -151,7 +151,8 @@ def search(
         if not _add_one(state, forensics, catalogue, freed, baseline, level, seed, progress):
             break
     forensics.after(state, progress)
-    assert state.first is not None and state.now is not None
+    assert state.first is not None
+    assert state.now is not None
     base = refine(beginning.model, state.data, state.noise, start, held=held)
     return Search(
         state.data, state.noise, base, state.fit, tuple(state.steps), tuple(state.faults),
@@ -189,9 +190,7 @@ def _add_one(
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
     if isinstance(winner.lead.effect, FreedParameter):
         state.holding.remove(winner.lead.effect.index)
-    state.fit, state.data, state.noise = settled(
-        winner.fit, state.data, state.noise, state.holding
-    )
+    state.fit, state.data, state.noise = settled(winner.fit, state.data, state.noise, state.holding)
     return True
 
 
@@ -257,5 +256,3 @@ def settled(
     data = with_lattice(data, fit.at.reading)
     noise = noise_left(fit, data, red=red)
     return refine(fit.model, data, noise, fit.value, held=held), data, noise
-
-

@@ -58,9 +58,7 @@ class ToneScan:
         first, mixed, second = (
             column.reshape(-1, *([1] * (real.ndim - 1))) for column in self.inverse.T
         )
-        return np.asarray(
-            first * real**2 + 2.0 * mixed * real * imaginary + second * imaginary**2
-        )
+        return np.asarray(first * real**2 + 2.0 * mixed * real * imaginary + second * imaginary**2)
 
 
 def tone_scan(
@@ -69,7 +67,7 @@ def tone_scan(
     """Prepare a scan: what the model's tangent space leaves of a tone at each frequency."""
     count = len(data)
     size = int(2 ** np.ceil(np.log2(_FINER * count)))
-    frequency = np.fft.rfftfreq(size, data.interval_s)[1:]
+    frequency = np.asarray(np.fft.rfftfreq(size, data.interval_s)[1:], dtype=np.float64)
     keep = slice(1, len(frequency) + 1)
     variance = _variance_at(noise, frequency, data)
     # Tones are white noise's own basis: their squares are sums of the envelope's.

@@ -40,8 +40,7 @@ def statement(
     if moved:
         said.append(f"The omission had falsified {moved}.")
     said.append(
-        "Nothing else stands out"
-        f" (global p = {unexplained:.2g})."
+        f"Nothing else stands out (global p = {unexplained:.2g})."
         if unexplained > level
         else f"Something is left that has not been explained (global p = {unexplained:.2g})."
     )
@@ -52,7 +51,9 @@ def _effect(effect: Named) -> str:
     """One sentence on one effect."""
     where = f", {effect.location.summary}" if effect.location.summary else ""
     if effect.kind == "unnamed":
-        return f"Left out is something that no entry of the catalogue explains: {effect.name}{where}."
+        return (
+            f"Left out is something that no entry of the catalogue explains: {effect.name}{where}."
+        )
     numbers = ", ".join(_number(name, each) for name, each in effect.parameters.items())
     kind = {"dynamics": "physics", "measurement": "the measurement", "parameter": "a parameter"}
     text = f"Left out is {effect.name} ({kind.get(effect.kind, effect.kind)}"

@@ -91,11 +91,10 @@ def _alignment(
     matrix = np.stack([np.stack([n, si, sq]), np.stack([si, sii, siq]), np.stack([sq, siq, sqq])])
     right = np.stack([part[good] for part in data_sums])
     try:
-        level, cosine, sine = np.linalg.solve(matrix.transpose(2, 0, 1), right.T[..., None])[
-            ..., 0
-        ].T
+        solved = np.linalg.solve(matrix.transpose(2, 0, 1), right.T[..., None])[..., 0]
     except np.linalg.LinAlgError:
         return np.zeros(0), np.zeros(0), np.zeros(0)
+    cosine, sine = solved[:, 1], solved[:, 2]
     # y = r (cosine cos psi + sine sin psi) = r R cos(psi + phase).
     phase = np.unwrap(np.arctan2(-sine, cosine))
     expected = 0.0

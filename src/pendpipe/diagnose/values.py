@@ -87,10 +87,8 @@ def _estimate(
 
 def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, Estimate]:
     """Return an effect's own parameters, by name; displacements are in `unit`."""
-    for other, place in fit.model.places():
-        if other is effect:
-            break
-    else:
+    place = next((here for other, here in fit.model.places() if other is effect), None)
+    if place is None:
         return {}
     covariance = fit.covariance()
     found = {}
@@ -103,5 +101,3 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
         interval = (max(value - half, parameter.low), min(value + half, parameter.high))
         found[parameter.name] = Estimate(value, sd, parameter.unit_in(unit), interval)
     return found
-
-

@@ -7,6 +7,7 @@ out along its own fitted motion (`Curve.reduced`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
@@ -179,7 +180,10 @@ class ProfileCurve(Curve):
     identifier = "unnamed-damping"
     name = "a friction of unknown form along each half swing"
     equation = r"\ddot x \to \ddot x + y\,h(\psi)\,\mathrm{sgn}\,\dot x"
-    argument, ordinate = "phase since the last turning point, rad", "extra friction over amplitude, 1/s^2"
+    argument, ordinate = (
+        "phase since the last turning point, rad",
+        "extra friction over amplitude, 1/s^2",
+    )
     flavour = "profile"
     deciding = "sample the swing faster, and look at the velocity about the turning points"
 
@@ -278,7 +282,7 @@ class BaselineCurve(Curve):
 
 def _loss_rate(pendulum: Pendulum, span: Span) -> float:
     """The usual loss rate, 1/s: that of the middle amplitude."""
-    middle = (span.first_amplitude * span.last_amplitude) ** 0.5
+    middle = math.sqrt(span.first_amplitude * span.last_amplitude)
     return (
         pendulum.quadratic * middle + pendulum.linear + pendulum.coulomb / middle
     ) + 1e-4 * pendulum.angular_frequency

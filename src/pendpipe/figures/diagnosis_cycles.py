@@ -69,7 +69,7 @@ def draw_frequency(content: Shown) -> Figure:
     return figure
 
 
-def _models(content: Shown) -> list[tuple[str, str, str, object]]:
+def _models(content: Shown) -> list[tuple[str, str, str, Spans]]:
     """Name, colour, dashes and spans of the baseline and of the extended model."""
     found = [(content.baseline_name, VERMILION, "--", content.of_model(content.baseline))]
     if content.extended is not None:

@@ -103,7 +103,7 @@ def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     window = np.hanning(count)
     lines = np.fft.rfft((residual - np.mean(residual)) * window)
     density = 2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2)
-    frequency = np.fft.rfftfreq(count, interval)
+    frequency = np.asarray(np.fft.rfftfreq(count, interval), dtype=np.float64)
     return _banded(frequency[2:-1], density[2:-1])
 
 

@@ -131,9 +131,7 @@ def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Mark
     return decays, outside
 
 
-def _diagnoses(
-    asked: Content, folder: Path, entries: list[Content], spent: int
-) -> list[Diagnosed]:
+def _diagnoses(asked: Content, folder: Path, entries: list[Content], spent: int) -> list[Diagnosed]:
     """The records' diagnoses, where the campaign asks for them."""
     if not asked.get("enabled", True):
         return []
