@@ -193,13 +193,16 @@ class Model:
             raise NoMotionError("the frequency is out of reach")
         last = self._last.get("motion")
         known = [] if last is None else [last.clock.count]
+        stops = math.inf
         for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
-            if not needed - 1.0 < count < 1.3 * needed + 4.0:
+            if not needed - 1.0 < count < min(1.3 * needed + 4.0, stops):
                 continue
             clock = Clock(count, self.order)
             try:
                 motion = self._from_guesses(law, value, clock)
             except NoMotionError:
+                # So many half cycles are too many; fewer may do.
+                stops = count
                 continue
             if motion.time_s[-1, -1] >= self.time_s[-1]:
                 return motion

@@ -162,6 +162,8 @@ def _step(
     """The Gauss-Newton step, the best within the bounds."""
     step = np.zeros(len(value))
     part = jacobian[:, free]
+    if not np.all(np.isfinite(part)):
+        raise NoMotionError("its derivatives are out of reach")
     scale = np.linalg.norm(part, axis=0)
     scale[scale == 0.0] = 1.0
     left, small = np.linalg.qr(part / scale)

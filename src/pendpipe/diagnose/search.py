@@ -19,6 +19,7 @@ from pendpipe.diagnose.naming import Rival, refit_leads
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES
 
@@ -31,7 +32,7 @@ _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
 _DOUBT: Final = 10.0
 """By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
-_PART: Final = 0.03
+_PART: Final = 0.3
 """Part of a gross misfit that an effect must explain to be worth naming."""
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
@@ -150,6 +151,7 @@ def search(
         forensics.before(state, progress)
         if not _add_one(state, forensics, catalogue, freed, baseline, level, seed, progress):
             break
+    _prune(state, beginning, progress)
     forensics.after(state, progress)
     assert state.first is not None
     assert state.now is not None
@@ -192,6 +194,27 @@ def _add_one(
         state.holding.remove(winner.lead.effect.index)
     state.fit, state.data, state.noise = settled(winner.fit, state.data, state.noise, state.holding)
     return True
+
+
+def _prune(state: _State, beginning: Beginning, progress: Progress) -> None:
+    """Drop what later effects have made needless."""
+    for step in list(state.steps[:-1]):
+        effect = step.winner.lead.effect
+        if isinstance(effect, FreedParameter):
+            continue
+        model, value = beginning.model, state.fit.value[: len(beginning.value)]
+        for other, place in state.fit.model.places():
+            if other is not effect:
+                model = model.adding(other)
+                value = np.append(value, state.fit.value[place])
+        try:
+            without = refine(model, state.data, state.noise, value, held=state.holding)
+        except NoMotionError:
+            continue
+        if without.chi2 - state.fit.chi2 < _NEEDED:
+            progress(f"{effect.identifier} is needless now")
+            state.fit = without
+            state.steps.remove(step)
 
 
 def _doubt_redness(

@@ -24,7 +24,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 
 _TOLERANCE: Final = 1e-9
-_ROUNDS: Final = 40
+_ROUNDS: Final = 25
 _STEP: Final = 1e-6
 _STRIDE: Final = 0.7
 """Longest step in ln r."""
