@@ -92,12 +92,12 @@ def table_of_plain(place: Path, recording: Recording) -> Table:
         place=place,
         format="plain",
         columns=(column,),
-        markers=tuple(_markers(recording)),
+        markers=tuple(markers_of(recording)),
         notes=recording.notes,
     )
 
 
-def _markers(recording: Recording) -> list[Marker]:
+def markers_of(recording: Recording) -> list[Marker]:
     """Read back the markers that ``convert`` has kept as metadata."""
     found = []
     for key, value in recording.metadata.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +18,14 @@ from pendpipe.formats.windaq_header import WindaqHeader
 _COMMENT_FLAG: Final = -0x80000000
 _PAUSE: Final = 2.0
 """Stamps are whole seconds: less than this is no pause."""
+_GAP: Final = re.compile(r"gap (\d{1,9}\.\d{1,9}) s\b")
 _LONGEST_TAIL: Final = 4096
 """Bytes behind the samples of a recording with a damaged header; more is not sought."""
+
+
+def gap_comment(missing_s: float) -> str:
+    """Say the length of a gap so that `scan_times` understands it: ``gap 0.350000 s``."""
+    return f"gap {missing_s:.9f} s"
 
 
 @dataclass(frozen=True)
@@ -157,7 +164,7 @@ def scan_times(
     WinDaq strings the samples together over a pause; only the stamp of the event that
     follows tells of it. A stamp that is ahead of the samples by more than two seconds (and
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
-    known to a second.
+    known to a second. A comment of `gap_comment` says it exactly, where the stamp agrees.
     """
     time = np.arange(scans, dtype=np.float64) * header.interval_s
     notes = []
@@ -167,10 +174,16 @@ def scan_times(
             continue
         expected = event.scan * header.interval_s + lag
         missing = event.stamp_s - expected
-        if missing > max(_PAUSE, 0.01 * (expected - since)):
-            time[event.scan :] += missing
-            lag += missing
+        told = _GAP.match(event.comment)
+        if told and abs(missing - float(told[1])) <= _PAUSE:
+            missing = float(told[1])
+            notes.append(f"gap of {missing:.6g} s before scan {event.scan}, by its comment")
+        elif missing > max(_PAUSE, 0.01 * (expected - since)):
             notes.append(f"pause of {missing:.0f} s before scan {event.scan}, by its time stamp")
+        else:
+            missing = 0.0
+        time[event.scan :] += missing
+        lag += missing
         since = event.stamp_s
     return time, notes
 
