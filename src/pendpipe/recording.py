@@ -175,7 +175,7 @@ def read_plain(path: str | Path) -> Recording:
         time_s=np.ascontiguousarray(table[:, 0]),
         values=np.ascontiguousarray(table[:, 1]),
         quantity=quantity,
-        quality=table[:, 2].astype(np.uint8) if len(picked) > 2 else None,
+        quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
         metadata=metadata,
     )
     check(place, recording, first_line=first + 2)
@@ -228,6 +228,16 @@ def _numbers(
                     where, f"'{cells[index].strip()}' is no number", "mend or drop the row"
                 ) from None
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
+
+
+def _quality(place: Path, column: FloatArray, first_line: int) -> ByteArray:
+    """Turn the column into bytes; what is no byte can't be cast."""
+    odd = np.flatnonzero(~np.isin(column, (GOOD, SUSPECT, MISSING)))
+    if odd.size:
+        raise InputError(
+            f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "mend the row"
+        )
+    return column.astype(np.uint8)
 
 
 def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> None:

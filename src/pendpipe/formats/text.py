@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from pendpipe.formats.header import Header, read_header
 from pendpipe.formats.layout import Layout, first_row, guess_layout, is_comment
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
+
+_WIDEST: Final = 64
+"""Cells that a row may have, however narrow the others are; else at most four times theirs."""
 
 
 def decode(data: bytes) -> str:
@@ -53,7 +57,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     rows, numbers, remarks, notes = _rows(lines, first, layout)
     if not rows:
         raise InputError(place, "there are no samples", "record again, or give another file")
-    columns = _columns(rows, layout, header)
+    columns = _columns(place, rows, numbers, layout, header)
     if header.notes:
         notes.extend(header.notes)
     if remarks:
@@ -93,24 +97,31 @@ def _rows(
     return rows, np.array(numbers, dtype=np.int64), remarks, notes
 
 
-def _columns(rows: list[str], layout: Layout, header: Header) -> list[Column]:
+def _columns(
+    place: Path, rows: list[str], numbers: IntArray, layout: Layout, header: Header
+) -> list[Column]:
     """Turn the rows into columns with the header's names."""
     table = all_numbers(rows, layout)
     if table is not None:
-        return [_column(header, place, values) for place, values in enumerate(table.T)]
+        return [_column(header, column, values) for column, values in enumerate(table.T)]
     cells = [layout.split(row) for row in rows]
     width = max(layout.width, max(map(len, cells)))
+    if width > max(_WIDEST, 4 * layout.width):
+        row = int(np.argmax([len(row) for row in cells]))
+        raise InputError(
+            f"{place}, line {numbers[row]}", f"{width} cells in a row", "mend or drop the row"
+        )
     columns = []
-    for place in range(width):
-        texts = [row[place] if place < len(row) else "" for row in cells]
+    for column in range(width):
+        texts = [row[column] if column < len(row) else "" for row in cells]
         values, blank, fault = column_of_numbers(texts, layout)
         if np.isfinite(values).any():
-            columns.append(_column(header, place, values, blank if blank.any() else None, fault))
+            columns.append(_column(header, column, values, blank if blank.any() else None, fault))
             continue
         clock = column_of_clock_times(texts)
         if clock is not None:
-            name = header.names[place] if place < len(header.names) else ""
-            columns.append(Column(name or "time", "s", clock, place + 1))
+            name = header.names[column] if column < len(header.names) else ""
+            columns.append(Column(name or "time", "s", clock, column + 1))
     return columns
 
 

@@ -24,6 +24,8 @@ _LARGEST: Final = 1e30
 """Readings beyond it are none, and would not fit the header's scale."""
 _LATEST: Final = 2**31 - 2**24
 """Times of the header are seconds since 1970 in 31 bits."""
+_LONGEST_S: Final = 2.0**31 - 1
+"""Time stamps are whole seconds in 31 bits."""
 _TAGS: Final = {"volts": "Volt", "angle_rad": "rad", "displacement_m": "m"}
 _READ_ONLY: Final = (".wdq", ".wdc", ".whc", ".mat", ".xlsx", ".xls")
 
@@ -80,6 +82,12 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         raise InputError(place, f"{len(values)} samples are too many for a .WDH", "cut it")
     if np.abs(values).max() > _LARGEST:
         raise InputError(place, "the readings are too large for a .WDH", "check their unit")
+    begin_s = float(recording.time_s[grid.rows[0]])
+    length_s = float(recording.time_s[grid.rows[-1]]) - begin_s
+    if length_s > _LONGEST_S:
+        raise InputError(
+            place, f"{length_s:.3g} s are too long for a .WDH", "check the time's unit"
+        )
     slope, intercept, counts, notes = _scaled(recording, values)
     number = recording.metadata.get("channel", "1")
     channel = WrittenChannel(
@@ -91,11 +99,9 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         annotation=recording.metadata.get("model", "")[:31],
     )
     began = _seconds_since_1970(recording.metadata.get("recorded_at", ""))
-    begin_s = float(recording.time_s[grid.rows[0]])
     opened = round(began + begin_s) if began else 0
     if not 0 < opened < _LATEST:
         opened = 0
-    length_s = float(recording.time_s[grid.rows[-1]]) - begin_s
     content = pack(
         counts[:, None],
         [channel],
