@@ -120,61 +120,71 @@ def block(name: str, number: int, length: int = BLOCK) -> Tally:
     return tally
 
 
-def added(one: Tally, other: Tally) -> Tally:
-    """Join two tallies."""
-    joined = {key: one[key] + other[key] for key in ("inputs", "readable", "refused", "wrong")}
-    return joined | {key: max(one[key], other[key]) for key in ("times", "cpu")}
+Blocks = dict[str, dict[str, Tally]]
 
 
 def run(seconds: float | None = None, only: str | None = None) -> dict[str, Tally]:
-    """Run every block that is not done, a few at a time; a worker that dies is a finding."""
-    KEPT.mkdir(parents=True, exist_ok=True)
+    """Run every block that is not done, or what fits; a worker that dies is a finding."""
     journal = KEPT / "blocks.json"
     whole = seconds is None
-    done: dict[str, dict[str, Tally]] = (
-        json.loads(journal.read_text()) if whole and journal.exists() else {}
-    )
+    done: Blocks = json.loads(journal.read_text()) if whole and journal.exists() else {}
     queue = [
         (name, number)
         for number in range(max(-(-t.inputs // BLOCK) for t in _targets().values()))
         for name, target in _targets().items()
-        if number * BLOCK < target.inputs and str(number) not in done.get(name, {})
-        and only in (None, name)
-    ]  # fmt: skip
-    until, kept_at = time.monotonic() + (seconds or 1e9), time.monotonic()
+        if number * BLOCK < target.inputs and only in (None, name)
+    ]
+    queue = [key for key in queue if str(key[1]) not in done.get(key[0], {})]
+    until = time.monotonic() + (seconds or 1e9)
     while queue and time.monotonic() < until:
-        with ProcessPoolExecutor(CORES, initializer=begin) as pool:
-            running: dict[tuple[str, int], Future[Tally]] = {}
-            try:
-                while (queue or running) and (running or time.monotonic() < until):
-                    while queue and len(running) < 2 * CORES and time.monotonic() < until:
-                        running[queue[0]] = pool.submit(
-                            block, *queue[0], _length(queue[0][0], whole)
-                        )
-                        queue.pop(0)
-                    key, future = next(iter(running.items()))
-                    done.setdefault(key[0], {})[str(key[1])] = future.result()
-                    del running[key]
-                    if whole and time.monotonic() - kept_at > 5.0:
-                        kept_at = time.monotonic()
-                        journal.write_text(json.dumps(done))
-                        _progress(done)
-            except BrokenProcessPool:
-                for key in running:
-                    died = [[key[1] * BLOCK, "the interpreter died in this block or beside it"]]
-                    done.setdefault(key[0], {})[str(key[1])] = {
-                        "inputs": _length(key[0], whole), "readable": 0, "refused": 0, "wrong": died,
-                        "times": 0.0, "cpu": 0.0,
-                    }  # fmt: skip
+        _drain(queue, done, until, journal if whole else None)
     if whole:
-        journal.write_text(json.dumps(done))
-    total = {}
-    for name, blocks in done.items():
-        tallies = list(blocks.values())
-        total[name] = tallies[0]
-        for tally in tallies[1:]:
-            total[name] = added(total[name], tally)
-    return {name: total[name] for name in _targets() if name in total}
+        _keep(journal, done)
+    return {name: _total(done[name]) for name in _targets() if name in done}
+
+
+def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, journal: Path | None) -> None:
+    """Hand blocks to a few workers until all are done, time is up, or one has died."""
+    kept_at = time.monotonic()
+    running: dict[tuple[str, int], Future[Tally]] = {}
+    with ProcessPoolExecutor(CORES, initializer=begin) as pool:
+        try:
+            while running or (queue and time.monotonic() < until):
+                while queue and len(running) < 2 * CORES and time.monotonic() < until:
+                    name, number = queue.pop(0)
+                    length = _length(name, journal is not None)
+                    running[name, number] = pool.submit(block, name, number, length)
+                (name, number), future = next(iter(running.items()))
+                done.setdefault(name, {})[str(number)] = future.result()
+                del running[name, number]
+                if journal and time.monotonic() - kept_at > 5.0:
+                    kept_at = time.monotonic()
+                    _keep(journal, done)
+                    _progress(done)
+        except BrokenProcessPool:
+            for name, number in running:
+                tally = dict.fromkeys(("readable", "refused", "times", "cpu"), 0)
+                said = "the interpreter died in this block, or in one beside it"
+                tally |= {"inputs": _length(name, journal is not None)}
+                done.setdefault(name, {})[str(number)] = {
+                    **tally, "wrong": [[number * BLOCK, said]]
+                }  # fmt: skip
+
+
+def _keep(journal: Path, done: Blocks) -> None:
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    beside = journal.with_suffix(".new")
+    beside.write_text(json.dumps(done))
+    beside.replace(journal)
+
+
+def _total(blocks: dict[str, Tally]) -> Tally:
+    """Join the tallies of a target."""
+    first, *rest = blocks.values()
+    for tally in rest:
+        sums = {key: first[key] + tally[key] for key in ("inputs", "readable", "refused", "wrong")}
+        first = sums | {key: max(first[key], tally[key]) for key in ("times", "cpu")}
+    return first
 
 
 def _length(name: str, whole: bool) -> int:
@@ -185,7 +195,7 @@ def _length(name: str, whole: bool) -> int:
     return 25 if inputs > BLOCK else 2
 
 
-def _progress(done: dict[str, dict[str, Tally]]) -> None:
+def _progress(done: Blocks) -> None:
     inputs = sum(tally["inputs"] for blocks in done.values() for tally in blocks.values())
     wrong = sum(len(tally["wrong"]) for blocks in done.values() for tally in blocks.values())
     print(f"\r{inputs} inputs, {wrong} wrong", end="", file=sys.stderr, flush=True)
@@ -222,6 +232,7 @@ def _tell_wrong(total: dict[str, Tally]) -> None:
         first = {said: place for place, said in reversed(tally["wrong"])}
         for said, count in kinds.most_common(20):
             print(f"{name}, input {first[said]} ({count} alike): {said}", file=sys.stderr)
+            KEPT.mkdir(parents=True, exist_ok=True)
             path = KEPT / f"{name.replace(' ', '-').replace(',', '')}-{first[said]}"
             path.write_bytes(case_of(name, first[said]).data)
 

@@ -69,7 +69,7 @@ def _hold(recording: Recording) -> None:
 
 
 def run_file(case: Case) -> bool:
-    """Read and inspect a file, and write what was read for WinDaq; whether it was readable."""
+    """Read a file and write it for WinDaq; inspect every other; whether it was readable."""
     path = _folder() / f"fuzzed{case.suffix}"
     path.write_bytes(case.data)
     readable = False
@@ -84,6 +84,8 @@ def run_file(case: Case) -> bool:
             windaq_hires("out.wdh", recording)
         except InputError as fault:
             _one_line(fault)
+    if len(case.data) % 2:
+        return readable
     try:
         json.dumps(inspect(path).as_json())
     except InputError as fault:

@@ -14,7 +14,8 @@ WORDS = [
     b"\xff\xfe", b"\xb0", b"\xc3", b"\xf0\x9f\x98\x80", b"time", b"Time (s)", b"angle", b"deg",
     b"x", b"rad", b"V", b"Hz", b"sample rate: ", b"9" * 30, b"1.7976931348623157e308", b" " * 40,
     b"stop 01", b"sc ", b"start", b"Resume", b"# volts_per_radian: 0\n", b"# bits: 0\n",
-    b"# range_volts: nan\n", b"srate x0\n", b"Relative Time,",
+    b"# range_volts: nan\n", b'r="1048576"', b'r="XFD7"', b"A1:XFD1048576", b'count="99999999"',
+    b"&#x10ffff;", b"<v>1e400</v>", b"srate x0\n", b"Relative Time,",
 ]  # fmt: skip
 NUMBERS = [0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x7FFFFFFF,
            0x80000000, 0xFFFFFFFF, 1 << 20, 1 << 28]  # fmt: skip

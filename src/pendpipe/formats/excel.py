@@ -34,10 +34,12 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = load_workbook(io.BytesIO(data), read_only=True, data_only=True)
-            sheets = {sheet.title: list(sheet.values) for sheet in book if hasattr(sheet, "values")}
+            sheets = {sheet.title: _rows(sheet) for sheet in book if hasattr(sheet, "values")}
     except Exception as fault:  # openpyxl raises whatever the archive makes it stumble on
         raise InputError(
-            place, f"the workbook can't be read ({fault})", "save it again, or export CSV"
+            place,
+            f"the workbook can't be read ({str(fault)[:200]})",
+            "save it again, or export CSV",
         ) from None
     numbers = {
         title: sum(isinstance(cell, int | float) for row in rows for cell in row)
@@ -59,6 +61,12 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     from dataclasses import replace
 
     return replace(table, notes=(note, *table.notes[1:]))
+
+
+def _rows(sheet: Any) -> list[tuple[Any, ...]]:
+    """Read the filled rows; what the file says of their number and width is not believed."""
+    sheet.reset_dimensions()
+    return [row for row in sheet.values if any(cell is not None for cell in row)]
 
 
 def _written(cell: Any) -> str:

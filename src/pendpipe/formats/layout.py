@@ -54,7 +54,11 @@ class Layout:
         import csv
 
         blank = self.delimiter == " "
-        cells = next(csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True))
+        rows = csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True)
+        try:
+            cells = next(rows)
+        except csv.Error:  # a quote that opens 128 kB of text
+            return [line.strip()]
         return [cell.strip() for cell in cells if cell.strip() or not blank]
 
     def is_number(self, cell: str) -> bool:
@@ -122,10 +126,15 @@ def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
     for row in rows:
         if len(row) != width:
             continue
-        cells = [cell for cell in row if cell.lower() not in BLANK_CELLS]
-        total += sum(map(layout.is_number, cells)) / max(len(cells), 1)
+        found = 0
+        blank = 0
         for place, cell in enumerate(row):
-            numbers[place] += layout.is_number(cell)
+            if layout.is_number(cell):
+                found += 1
+                numbers[place] += 1
+            else:
+                blank += cell.lower() in BLANK_CELLS
+        total += found / max(width - blank, 1)
     return total / len(rows), width, sum(count > len(rows) / 2 for count in numbers)
 
 

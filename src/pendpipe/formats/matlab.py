@@ -72,7 +72,9 @@ def _load(place: Path, data: bytes) -> dict[str, Any]:
             warnings.simplefilter("ignore")
             loaded = loadmat(stream, squeeze_me=True, variable_names=names)
     except Exception as fault:  # scipy raises whatever its parser stumbles on
-        raise InputError(place, f"the MATLAB file can't be read: {fault}", remedy) from None
+        raise InputError(
+            place, f"the MATLAB file can't be read: {str(fault)[:200]}", remedy
+        ) from None
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
