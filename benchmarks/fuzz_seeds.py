@@ -96,6 +96,7 @@ def windaq(*, hires: bool, size: int = 1156, channels: int = 2, packed: bool = F
     struct.pack_into("<HHBBh", head, 0, channels, 1, 110, 36, size)
     struct.pack_into("<IIH", head, 8, 2 * scans * channels, 4 * len(events), len(texts))
     struct.pack_into("<dii", head, 28, 0.1, 1_700_000_000, 1_700_000_090)
+    struct.pack_into("<i", head, 44, 1)
     struct.pack_into("<H", head, 56, 7)
     head[65] = 0x80 if wrapped else 7
     struct.pack_into("<H", head, 100, 2 * hires | packed << 14)

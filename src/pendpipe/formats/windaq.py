@@ -75,6 +75,8 @@ def _checked(
     if header.data_bytes and at <= len(data) and header.data_bytes % unit == 0:
         trailers = parse_trailers(data, at, header.event_bytes, header, header.scans)
         said = [] if trailers else ["the list of events is damaged: no markers"]
+        if trailers and at + header.event_bytes + header.annotation_bytes > len(data):
+            said.append(f"the header's size of the annotations ({header.annotation_bytes}) is wrong")
         return header, trailers, said
     found = mended(data, header)
     if found is not None:
