@@ -12,7 +12,6 @@ seconds of the processor, and with a peak of memory (one input in forty is trace
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import resource
 import signal
@@ -28,10 +27,11 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from benchmarks import journal
 from benchmarks.fuzz_checks import Case, InvalidError
 from benchmarks.fuzz_targets import targets
 
-KEPT = Path(__file__).resolve().parents[1] / ".evidence" / "fuzz"
+JOURNAL = "fuzz"
 BLOCK = 500
 CORES = 2
 LONGEST_S = 5.0
@@ -125,9 +125,8 @@ Blocks = dict[str, dict[str, Tally]]
 
 def run(seconds: float | None = None, only: str | None = None) -> dict[str, Tally]:
     """Run every block that is not done, or what fits; a worker that dies is a finding."""
-    journal = KEPT / "blocks.json"
     whole = seconds is None
-    done: Blocks = json.loads(journal.read_text()) if whole and journal.exists() else {}
+    done: Blocks = journal.read(JOURNAL, {}) if whole else {}
     queue = [
         (name, number)
         for number in range(max(-(-t.inputs // BLOCK) for t in _targets().values()))
@@ -137,13 +136,13 @@ def run(seconds: float | None = None, only: str | None = None) -> dict[str, Tall
     queue = [key for key in queue if str(key[1]) not in done.get(key[0], {})]
     until = time.monotonic() + (seconds or 1e9)
     while queue and time.monotonic() < until:
-        _drain(queue, done, until, journal if whole else None)
+        _drain(queue, done, until, whole)
     if whole:
-        _keep(journal, done)
+        journal.keep(JOURNAL, done)
     return {name: _total(done[name]) for name in _targets() if name in done}
 
 
-def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, journal: Path | None) -> None:
+def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, whole: bool) -> None:
     """Hand blocks to a few workers until all are done, time is up, or one has died."""
     kept_at = time.monotonic()
     running: dict[tuple[str, int], Future[Tally]] = {}
@@ -152,30 +151,23 @@ def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, journal: Pa
             while running or (queue and time.monotonic() < until):
                 while queue and len(running) < 2 * CORES and time.monotonic() < until:
                     name, number = queue.pop(0)
-                    length = _length(name, journal is not None)
+                    length = _length(name, whole)
                     running[name, number] = pool.submit(block, name, number, length)
                 (name, number), future = next(iter(running.items()))
                 done.setdefault(name, {})[str(number)] = future.result()
                 del running[name, number]
-                if journal and time.monotonic() - kept_at > 5.0:
+                if whole and time.monotonic() - kept_at > 5.0:
                     kept_at = time.monotonic()
-                    _keep(journal, done)
+                    journal.keep(JOURNAL, done)
                     _progress(done)
         except BrokenProcessPool:
             for name, number in running:
                 tally = dict.fromkeys(("readable", "refused", "times", "cpu"), 0)
                 said = "the interpreter died in this block, or in one beside it"
-                tally |= {"inputs": _length(name, journal is not None)}
+                tally |= {"inputs": _length(name, whole)}
                 done.setdefault(name, {})[str(number)] = {
                     **tally, "wrong": [[number * BLOCK, said]]
                 }  # fmt: skip
-
-
-def _keep(journal: Path, done: Blocks) -> None:
-    journal.parent.mkdir(parents=True, exist_ok=True)
-    beside = journal.with_suffix(".new")
-    beside.write_text(json.dumps(done))
-    beside.replace(journal)
 
 
 def _total(blocks: dict[str, Tally]) -> Tally:
@@ -232,8 +224,9 @@ def _tell_wrong(total: dict[str, Tally]) -> None:
         first = {said: place for place, said in reversed(tally["wrong"])}
         for said, count in kinds.most_common(20):
             print(f"{name}, input {first[said]} ({count} alike): {said}", file=sys.stderr)
-            KEPT.mkdir(parents=True, exist_ok=True)
-            path = KEPT / f"{name.replace(' ', '-').replace(',', '')}-{first[said]}"
+            wrong = journal.KEPT / "fuzz"
+            wrong.mkdir(parents=True, exist_ok=True)
+            path = wrong / f"{name.replace(' ', '-').replace(',', '')}-{first[said]}"
             path.write_bytes(case_of(name, first[said]).data)
 
 

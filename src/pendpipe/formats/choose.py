@@ -221,9 +221,10 @@ def _evenness(values: FloatArray) -> float:
 
 def _counts_samples(column: Column) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
-    steps = np.diff(column.values)
-    whole = bool(np.all(column.values == np.rint(column.values)))
-    return whole and float(np.median(steps)) == 1.0 and meaning(column) in ("index", "unknown")
+    values = column.values
+    if not np.isfinite(values).all() or np.any(values != np.rint(values)):
+        return False
+    return float(np.median(np.diff(values))) == 1.0 and meaning(column) in ("index", "unknown")
 
 
 def _readings(channels: Sequence[Column]) -> tuple[tuple[Column, ...], tuple[str, ...]]:

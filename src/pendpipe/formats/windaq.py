@@ -76,7 +76,9 @@ def _checked(
         trailers = parse_trailers(data, at, header.event_bytes, header, header.scans)
         said = [] if trailers else ["the list of events is damaged: no markers"]
         if trailers and at + header.event_bytes + header.annotation_bytes > len(data):
-            said.append(f"the header's size of the annotations ({header.annotation_bytes}) is wrong")
+            said.append(
+                f"the header's size of the annotations ({header.annotation_bytes}) is wrong"
+            )
         return header, trailers, said
     found = mended(data, header)
     if found is not None:
