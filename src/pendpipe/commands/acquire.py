@@ -207,6 +207,7 @@ def _default_signal(seed: int, volts_per_radian: float) -> Signal:
 def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
     from pendpipe.acquire.ports import identify, list_ports
+    from pendpipe.acquire.usb import no_ports, without_port
 
     if port:
         identity = identify(port)
@@ -223,6 +224,9 @@ def _list(port: str | None) -> int:
             except InputError as fault:
                 told = f"Dataq, {fault.problem}"
         print(f"{entry.port}: {told}")
-    if not found:
-        print("no serial ports; try --device simulated:di2108")
+    unbound = without_port()
+    for device in unbound:
+        print(device)
+    if not found and not unbound:
+        print(no_ports())
     return 0

@@ -61,7 +61,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         Column(
             name=f"channel {channel + 1}",
             unit="V",
-            values=scans.counts[:, channel] * _VOLTS_PER_COUNT,
+            values=scans.counts[:, channel].astype(np.float64) * _VOLTS_PER_COUNT,
             number=channel + 1,
             resolution=_VOLTS_PER_COUNT,
             limits=(-10.0, 2047 * _VOLTS_PER_COUNT),
