@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import zipfile
 import zlib
@@ -14,7 +15,7 @@ from pendpipe.acquire.devices.models import DEVICES
 from pendpipe.acquire.raw import RawWriter
 from pendpipe.arrays import FloatArray
 
-ROWS = 40
+ROWS = 30
 
 
 def swing(rows: int = ROWS, rate_hz: float = 10.0) -> tuple[FloatArray, FloatArray]:
@@ -53,7 +54,7 @@ def plain() -> list[bytes]:
     head = "# volts_per_radian: 3.85\n# bits: 16\n# range_volts: 10\n# marker_1: 5; 0.5 s; go\n"
     good = [line + ",0" for line in rows("{t!r},{x!r}\n").split("\n")[:-1]]
     good[20] = good[20].split(",")[0] + ",nan,2"
-    good[30] = good[30][:-1] + "1"
+    good[25] = good[25][:-1] + "1"
     return [
         (head + "time_s,volts,quality\n" + "\n".join(good) + "\n").encode(),
         ("time_s,angle_rad\n" + rows("{t!r},{x!r}\n")).encode(),
@@ -134,7 +135,8 @@ def matlab(compressed: bool = False) -> list[bytes]:
     ):
         stream = io.BytesIO()
         savemat(stream, content, do_compression=compressed)
-        found.append(stream.getvalue())
+        # (The head of the file bears the time at which it was made.)
+        found.append(b"MATLAB 5.0 MAT-file for the fuzzer".ljust(116) + stream.getvalue()[116:])
     return found
 
 
@@ -164,14 +166,16 @@ def workbook() -> dict[str, bytes]:
     stream = io.BytesIO()
     book.save(stream)
     with zipfile.ZipFile(stream) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    made = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
+    return {name: made.sub(b"2026-01-01T00:00:00Z", part) for name, part in parts.items()}
 
 
 def zipped(parts: dict[str, bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         for name, content in parts.items():
-            archive.writestr(name, content)
+            archive.writestr(zipfile.ZipInfo(name), content)
     return stream.getvalue()
 
 

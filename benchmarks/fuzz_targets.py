@@ -10,7 +10,8 @@ from random import Random
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_checks import Case, run_answers, run_decoder, run_file, run_raw
 from benchmarks.fuzz_mutations import mutate
-from pendpipe.acquire.drivers import DRIVERS
+from pendpipe.acquire.drivers import DRIVERS, find_driver
+from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
 
 MODELS = tuple(DRIVERS)
 
@@ -139,20 +140,22 @@ def _large(random: Random) -> Case:
 def targets() -> dict[str, Target]:
     """All that is fuzzed; a million inputs together."""
     found = {
-        "text tables": Target(_files(_named(".csv", seeds.texts())), run_file, 120_000),
+        "text tables": Target(_files(_named(".csv", seeds.texts())), run_file, 90_000),
         "the plain form": Target(_files(_named(".csv", seeds.plain())), run_file, 60_000),
-        "WinDaq CSV": Target(_files(_named(".csv", seeds.windaq_csv())), run_file, 30_000),
+        "WinDaq CSV": Target(_files(_named(".csv", seeds.windaq_csv())), run_file, 25_000),
         "DI-149 captures": Target(_files(_named(".cso", seeds.captures())), run_file, 40_000),
-        "WinDaq": Target(_files(seeds.windaq_files()), run_file, 220_000),
+        "WinDaq": Target(_files(seeds.windaq_files()), run_file, 200_000),
         "MATLAB": Target(_files(_named(".mat", seeds.matlab())), run_file, 40_000),
-        "MATLAB, inside the compression": Target(_matlab_packed, run_file, 20_000),
-        "Excel": Target(_files([(".xlsx", seeds.zipped(_workbook()))]), run_file, 10_000),
-        "Excel, inside the archive": Target(_excel_parts, run_file, 19_000),
+        "MATLAB, inside the compression": Target(_matlab_packed, run_file, 15_000),
+        "Excel": Target(_files([(".xlsx", seeds.zipped(_workbook()))]), run_file, 5_000),
+        "Excel, inside the archive": Target(_excel_parts, run_file, 10_000),
         "raw recordings": Target(_files(_named("", list(_raws()))), run_raw, 60_000),
         "raw, with right check sums": Target(_raw_checked, run_raw, 60_000),
         "large files": Target(_large, run_file, 200),
-        "answers of devices": Target(_answers, run_answers, 120_800),
+        "answers of devices": Target(_answers, run_answers, 94_800),
     }
     for model in MODELS:
-        found[f"decoder {model}"] = Target(_stream(model), run_decoder, 200_000 // len(MODELS))
+        marked = isinstance(find_driver(model).decoder(1), SyncBitDecoder)
+        inputs = 20_000 if marked else 25_000
+        found[f"decoder {model}"] = Target(_stream(model), run_decoder, inputs)
     return found
