@@ -179,7 +179,7 @@ def read_plain(path: str | Path) -> Recording:
         metadata=metadata,
     )
     check(place, recording, first_line=first + 2)
-    return replace(recording, resolution=_resolution(recording))
+    return replace(recording, resolution=converter_step(recording))
 
 
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
@@ -279,10 +279,12 @@ def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> No
         )
 
 
-def _resolution(recording: Recording) -> float | None:
+def converter_step(recording: Recording) -> float | None:
     """The step of the converter, from `bits` and `range_volts`, where both are told."""
     bits, high = recording.number("bits"), recording.number("range_volts")
     if bits is None or high is None or recording.quantity != "volts":
         return None
     low = recording.number("range_low_volts")
-    return float((high - (-high if low is None else low)) / 2.0**bits)
+    span = high - (-high if low is None else low)
+    # What no converter has tells nothing of the step.
+    return span / 2.0**bits if 1 <= bits <= 64 and 0 < span < 1e9 else None

@@ -119,11 +119,15 @@ def test_what_breaks_the_frame_mark_costs_one_scan(kind: str, name: str, place: 
     assert error_steps(recording, late_s=1 / RATE_HZ) <= 0.51
 
 
-def test_a_lost_byte_of_the_unmarked_family_is_seen_by_no_decoder() -> None:
-    """Stated as a limit in docs/acquisition.md: words are cut across from there on."""
+def test_a_lost_byte_of_the_unmarked_family_is_told_by_the_signal() -> None:
+    """No mark tells it; the words are cut across from there on, and are put into step again."""
     recording = recorded("di2108", Fault("drop", at=1001), duration_s=15.0)
-    assert missing(recording) == 0
-    assert error_steps(recording) > 100
+    assert any("bytes slipped at 1 places" in note for note in recording.notes)
+    assert recording.quality is not None
+    gap = np.flatnonzero(recording.quality == MISSING)
+    assert 1 <= len(gap) <= 7
+    assert abs(gap - 500).max() <= 7
+    assert error_steps(recording) <= 0.51
 
 
 @pytest.mark.parametrize("kind", ["di154", "di2108"])

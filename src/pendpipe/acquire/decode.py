@@ -196,6 +196,8 @@ def _notes(
     if silent := [loss for loss in losses if loss.reason == "clock"]:
         scans = sum(loss.lost_scans for loss in silent)
         notes.append(f"{scans} scans lost at {len(silent)} places, by the recorder's clock")
+    if slipped := [loss for loss in losses if loss.reason == "slip"]:
+        notes.append(f"bytes slipped at {len(slipped)} places: put into step again behind a gap")
     notes += [
         f"the device's buffer overflowed ('{loss.reason}')"
         for loss in losses

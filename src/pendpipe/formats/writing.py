@@ -129,7 +129,8 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
     tries: list[tuple[float, float]] = []
     range_volts = recording.number("range_volts")
     unipolar = recording.number("range_low_volts") is not None
-    if recording.quantity == "volts" and range_volts and range_volts > 0 and not unipolar:
+    possible = range_volts is not None and 1e-6 < range_volts < 1e6
+    if recording.quantity == "volts" and range_volts and possible and not unipolar:
         tries.append((range_volts / -_LOWEST, 0.0))
     if recording.resolution:
         step = recording.resolution
@@ -142,7 +143,7 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
         if counts.min() < _LOWEST or counts.max() > _HIGHEST:
             continue
         worst = float(np.abs(counts * step + intercept - values).max())
-        if worst < 1e-3 * step:
+        if worst < 1e-3 * min(step, high - low or step):
             return 4.0 * step, intercept, counts.astype(np.int64), []
     note = f"readings rounded to the .WDH's 16 bits (by {worst:.2g} {recording.unit} at most)"
     return 4.0 * step, intercept, counts.astype(np.int64), [note]
