@@ -85,6 +85,14 @@ def test_the_channels_stay_in_their_places(channels: int) -> None:
         assert np.array_equal(recording.values[-1000:], truth[-1000:])
 
 
+def test_channels_that_read_alike_are_said_to_be_a_guess() -> None:
+    codes = np.hstack([swing(), swing()])
+    data = stream(codes)
+    assert [slip.sure for slip in find_slips(data[:8001] + data[8002:], 2)] == [False]
+    notes = decode_recording(recorded(data[:8001] + data[8002:], [1, 2])).notes
+    assert any("behind 1 of them which channel is which is a guess" in note for note in notes)
+
+
 def test_a_byte_too_many_and_a_second_slip_are_found() -> None:
     data = stream(swing(8000))
     slipped = data[:5001] + b"\x55" + data[5001:11000] + data[11001:]

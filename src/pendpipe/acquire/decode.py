@@ -196,8 +196,12 @@ def _notes(
     if silent := [loss for loss in losses if loss.reason == "clock"]:
         scans = sum(loss.lost_scans for loss in silent)
         notes.append(f"{scans} scans lost at {len(silent)} places, by the recorder's clock")
-    if slipped := [loss for loss in losses if loss.reason == "slip"]:
-        notes.append(f"bytes slipped at {len(slipped)} places: put into step again behind a gap")
+    if slipped := [loss for loss in losses if loss.reason.startswith("slip")]:
+        unsure = sum(loss.reason != "slip" for loss in slipped)
+        doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
+        notes.append(
+            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}"
+        )
     notes += [
         f"the device's buffer overflowed ('{loss.reason}')"
         for loss in losses

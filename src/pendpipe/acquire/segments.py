@@ -112,7 +112,8 @@ def _scans_of(data: bytes, decoder: Decoder) -> tuple[AnyArray, tuple[Loss, ...]
         parts += [fed.counts, decoder.finish().counts]
         scans = sum(map(len, parts))
         thrown = slip.next_byte - slip.last_byte
-        losses.append(Loss(scans, thrown, -(-thrown // size), suspect_before=True, reason="slip"))
+        lost, reason = -(-thrown // size), "slip" if slip.sure else "slip, channels unsure"
+        losses.append(Loss(scans, thrown, lost, suspect_before=True, reason=reason))
         begin = slip.next_byte
     fed, end = decoder.feed(data[begin:]), decoder.finish()
     if not parts:

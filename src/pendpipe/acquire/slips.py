@@ -37,10 +37,13 @@ class Slip:
         Up to here the words are in step as before: a whole number of scans since the last slip.
     next_byte
         From here on they are in step again.
+    sure
+        Whether the levels tell which channel is which behind it.
     """
 
     last_byte: int
     next_byte: int
+    sure: bool = True
 
 
 def find_slips(data: bytes, channels: int) -> list[Slip]:
@@ -98,9 +101,10 @@ def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Slip:
     ]
     best = int(np.argmin(jumps))
     # Channels that read alike don't tell: one byte lost is the likeliest then.
-    if sorted(jumps)[:2][-1] < 2.0 * jumps[best]:
+    sure = len(jumps) == 1 or sorted(jumps)[1] >= 2.0 * jumps[best]
+    if not sure:
         best = len(jumps) - 1
-    return Slip(stop, start + 2 * best + 1)
+    return Slip(stop, start + 2 * best + 1, sure)
 
 
 def _slipped(here: FloatArray, beside: FloatArray) -> bool:
