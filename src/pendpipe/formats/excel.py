@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import io
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pendpipe.errors import InputError
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError, Table
 from pendpipe.formats.text import table_of_text
+
+_MOST_ROWS: Final = 1 << 20
+"""What a sheet has, and no more."""
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -66,7 +70,14 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 def _rows(sheet: Any) -> list[tuple[Any, ...]]:
     """Read the filled rows; what the file says of their number and width is not believed."""
     sheet.reset_dimensions()
-    return [row for row in sheet.values if any(cell is not None for cell in row)]
+    rows = islice(sheet.values, _MOST_ROWS + 1)
+    filled = []
+    for number, row in enumerate(rows, start=1):
+        if number > _MOST_ROWS:
+            raise ValueError("a row's number is beyond the last row")
+        if any(cell is not None for cell in row):
+            filled.append(row)
+    return filled
 
 
 def _written(cell: Any) -> str:
