@@ -39,7 +39,8 @@ def speed_table(folder: Path) -> str:
 def _row(name: str, channels: int, rate: float, kind: str) -> str:
     asked = ASKED[kind]
     verdict = "" if rate >= asked else ": **missed**"
-    return f"| {name} | {channels} | {rate / 1e6:{'.0f' if rate > 1e8 else '.1f'}} | {asked / 1e6:.0f}{verdict} |"
+    shown = f"{rate / 1e6:.0f}" if rate > 1e8 else f"{rate / 1e6:.1f}"
+    return f"| {name} | {channels} | {shown} | {asked / 1e6:.0f}{verdict} |"
 
 
 def _best(work: Callable[[], object], samples: int) -> float:

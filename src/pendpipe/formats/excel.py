@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import InputError
+from pendpipe.formats.matlab_check import most_unpacked
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError, Table
 from pendpipe.formats.text import table_of_text
@@ -35,6 +37,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     from openpyxl import load_workbook
 
     try:
+        _refuse_bomb(data)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = load_workbook(io.BytesIO(data), read_only=True, data_only=True)
@@ -65,6 +68,14 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     from dataclasses import replace
 
     return replace(table, notes=(note, *table.notes[1:]))
+
+
+def _refuse_bomb(data: bytes) -> None:
+    """Refuse an archive that says it holds far more than such a file can."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        whole = sum(part.file_size for part in archive.infolist())
+    if whole > most_unpacked(len(data)):
+        raise ValueError(f"it unpacks to {whole >> 20} MB")
 
 
 def _rows(sheet: Any) -> list[tuple[Any, ...]]:
