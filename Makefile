@@ -22,6 +22,7 @@ bench: .venv/installed-bench
 	$(RUN) python -m benchmarks
 
 evidence: .venv/installed
+	$(RUN) python -m benchmarks.acquisition
 	$(RUN) python -m benchmarks.evidence
 
 # What CI asks besides the tests.

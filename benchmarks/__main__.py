@@ -10,9 +10,8 @@ from pathlib import Path
 def main() -> None:
     """Run those named, or all that there are: modules of this package with a ``main``."""
     here = Path(__file__).parent
-    there = [
-        name for name in ("engine", "estimators", "workflow") if (here / f"{name}.py").exists()
-    ]
+    known = ("engine", "estimators", "workflow", "acquisition_speed")
+    there = [name for name in known if (here / f"{name}.py").exists()]
     for name in sys.argv[1:] or there:
         print(f"\n## {name}\n", flush=True)
         importlib.import_module(f"benchmarks.{name}").main()

@@ -1,8 +1,10 @@
 """Evidence of the acquisition: faults by the hundred thousand, kills, full disks, a pulled plug.
 
 ``python -m benchmarks.acquisition`` prints the tables and writes them into
-``docs/acquisition.md``. A part may be named: ``faults``, ``clock``, ``kill``, ``disk``, ``plug``,
-``speed``; parts not run keep their tables.
+``docs/acquisition.md`` (``make evidence`` does). A part may be named: ``faults``, ``slips``,
+``clock``, ``kill``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``; parts not run keep
+their tables.
+Kills and fuzzing go on where they were broken off, as long as the code is the same.
 """
 
 from __future__ import annotations
@@ -12,17 +14,24 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.acquisition_crash import disk_table, kill_table, plug_table, speed_table
+from benchmarks.acquisition_crash import disk_table, kill_table, plug_table
 from benchmarks.acquisition_faults import clock_table, fault_table
+from benchmarks.acquisition_slips import slip_table
+from benchmarks.acquisition_speed import speed_table
+from benchmarks.acquisition_windaq import windaq_table
+from benchmarks.fuzz import fuzz_table
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "acquisition.md"
 PARTS: dict[str, Callable[[Path], str]] = {
     "faults": fault_table,
+    "slips": slip_table,
     "clock": clock_table,
     "kill": kill_table,
     "disk": disk_table,
     "plug": plug_table,
     "speed": speed_table,
+    "windaq": windaq_table,
+    "fuzz": fuzz_table,
 }
 
 

@@ -1,8 +1,7 @@
-"""Kills at random instants, file systems that fill, a plug that is pulled, and the speed."""
+"""Kills at random instants, file systems that fill, a plug that is pulled."""
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import resource
@@ -14,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import journal
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.devices.faults import Fault
-from pendpipe.acquire.devices.models import DEVICES
-from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.raw import read_raw
 from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
@@ -25,7 +23,7 @@ from pendpipe.errors import InputError
 from pendpipe.recording import MISSING, Recording
 
 KILLS = 200
-KEPT = Path(__file__).resolve().parents[1] / "results" / "acquisition-kills.json"
+JOURNAL = "acquisition-kills"
 """The kills done so far: a run that is broken off goes on from there."""
 
 
@@ -82,11 +80,10 @@ def one_kill(raw: Path, instants: random.Random) -> dict[str, float | bool | str
 
 def kill_table(folder: Path) -> str:
     """Kill with signal 9 at random instants; results are kept as they come."""
-    KEPT.parent.mkdir(parents=True, exist_ok=True)
-    done = json.loads(KEPT.read_text()) if KEPT.exists() else []
+    done = journal.read(JOURNAL, [])
     for number in range(len(done), KILLS):
         done.append(one_kill(folder / "killed.raw", random.Random(number)))
-        KEPT.write_text(json.dumps(done))
+        journal.keep(JOURNAL, done)
     worst = max(entry.get("worst_steps", 0.0) for entry in done)
     return (
         "| kills | opened | all written before the kill was there | torn last frames | "
@@ -164,37 +161,4 @@ def plug_table(_folder: Path) -> str:
             f"| {kind} | 5 | {resumed} | {min(missing)} to {max(missing)} | "
             f"{1e3 * max(errors_s):.0f} ms |"
         )
-    return "\n".join(lines)
-
-
-def speed_table(folder: Path) -> str:
-    """Samples decoded in a second, one channel and four, pieces of 64 kB."""
-    lines = ["| model | channels | million samples a second |", "|---|---|---|"]
-    for kind in ("di154", "di194", "di149", "di155", "di245", "di1100", "di2108"):
-        driver, device = find_driver(kind), DEVICES[kind]()
-        for channels in (1, 4):
-            half = 2 ** (driver.bits - 1)
-            codes = np.random.default_rng(1).integers(-half, half, (1 << 18, channels))
-            data = device.encode(codes)
-            pieces = [data[at : at + 65536] for at in range(0, len(data), 65536)]
-            best = np.inf
-            for _ in range(5):
-                decoder = driver.decoder(channels)
-                begin = time.perf_counter()
-                for piece in pieces:
-                    decoder.feed(piece)
-                best = min(best, time.perf_counter() - begin)
-            lines.append(f"| {driver.model} | {channels} | {codes.size / best / 1e6:.0f} |")
-    begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
-    recording = acquire_simulated(
-        "di2108", np.sin, rate_hz=160e3, duration_s=20.0, clock_scale=1.0, raw_path=folder / "fast"
-    )
-    share = (time.process_time() - begin_cpu_s) / (time.perf_counter() - begin_s)
-    wrong = np.abs(recording.values - np.sin(recording.time_s)).max() > (recording.resolution or 0)
-    lines += [
-        "",
-        f"The simulated DI-2108 at 160 kHz for 20 s: {len(recording)} scans, "
-        f"{'some wrong' if wrong else 'all right'}, {len(recording.notes)} notes of losses; "
-        f"device, recorder and decoder together take {100 * share:.0f} % of one core.",
-    ]
     return "\n".join(lines)

@@ -13,7 +13,7 @@ from pendpipe.acquire.devices.models import DEVICES
 from pendpipe.acquire.drivers import find_driver
 
 MODELS = ["di154", "di194", "di149", "di155", "di245", "di1100", "di1110", "di1120", "di2108",
-          "di4108"]  # fmt: skip
+          "di2108p", "di4108", "di4208", "di4718b"]  # fmt: skip
 MARKED = set(MODELS[:5])
 SCANS = 24
 FAULTS = 100_000

@@ -175,11 +175,11 @@ def read_plain(path: str | Path) -> Recording:
         time_s=np.ascontiguousarray(table[:, 0]),
         values=np.ascontiguousarray(table[:, 1]),
         quantity=quantity,
-        quality=table[:, 2].astype(np.uint8) if len(picked) > 2 else None,
+        quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
         metadata=metadata,
     )
     check(place, recording, first_line=first + 2)
-    return replace(recording, resolution=_resolution(recording))
+    return replace(recording, resolution=converter_step(recording))
 
 
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
@@ -230,6 +230,16 @@ def _numbers(
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
 
 
+def _quality(place: Path, column: FloatArray, first_line: int) -> ByteArray:
+    """Turn the column into bytes; what is no byte can't be cast."""
+    odd = np.flatnonzero(~np.isin(column, (GOOD, SUSPECT, MISSING)))
+    if odd.size:
+        raise InputError(
+            f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "mend the row"
+        )
+    return column.astype(np.uint8)
+
+
 def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> None:
     """Refuse a recording whose samples can't be true.
 
@@ -269,10 +279,12 @@ def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> No
         )
 
 
-def _resolution(recording: Recording) -> float | None:
+def converter_step(recording: Recording) -> float | None:
     """The step of the converter, from `bits` and `range_volts`, where both are told."""
     bits, high = recording.number("bits"), recording.number("range_volts")
     if bits is None or high is None or recording.quantity != "volts":
         return None
     low = recording.number("range_low_volts")
-    return float((high - (-high if low is None else low)) / 2.0**bits)
+    span = high - (-high if low is None else low)
+    # What no converter has tells nothing of the step.
+    return span / 2.0**bits if 1 <= bits <= 64 and 0 < span < 1e9 else None

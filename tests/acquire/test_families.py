@@ -40,6 +40,10 @@ WORKED = [
     ("di1120", "00 40", 4096, 100.0, 50.0),
     ("di4108", "FF 7F", 32767, 5.0, 4.99985),
     ("di4108", "00 60", 24576, 5.0, 3.75),
+    ("di2108p", "FF FF", -1, 5.0, -0.00015),
+    ("di2108p", "00 40", 16384, 10.0, 5.0),
+    ("di4208", "00 40", 16384, 100.0, 50.0),
+    ("di4718b", "FF 7F", 32767, 5.0, 4.99985),
 ]
 
 
@@ -141,6 +145,33 @@ def test_di4108_range_code_stands_in_bits_8_to_11(script: Any) -> None:
     line = script(*[(f"{text}\r".encode(), f"{text}\r".encode()) for text in echoed])
     setup = find_driver("di4108")(line, FAST).configure([4], 100.0, range_volts=0.5)
     assert setup.range_volts == 0.5
+    assert line.finished
+
+
+def test_di2108p_has_ranges_and_no_deca(script: Any) -> None:
+    """+-2.5 V is code 2: word 0x0201 for the second channel."""
+    echoed = ["encode 0", "slist 0 513", "srate 60000", "dec 10", "filter * 0", "ps 0"]
+    line = script(*[(f"{text}\r".encode(), f"{text}\r".encode()) for text in echoed])
+    setup = find_driver("DI-2108-P")(line, FAST).configure([2], 100.0, range_volts=2.0)
+    assert (setup.rate_hz, setup.range_volts) == (100.0, 2.5)
+    assert line.finished
+
+
+def test_a_hyphen_more_or_less_in_a_name_is_the_same_model(script: Any) -> None:
+    answers = ["info 0 DATAQ", "info 1 2108P", "info 2 1", "info 6 1"]
+    asked = ["info 0", "info 1", "info 2", "info 6"]
+    pairs = [(f"{a}\r".encode(), f"{b}\r".encode()) for a, b in zip(asked, answers, strict=True)]
+    line = script((b"stop\r", b"stop\r"), *pairs)
+    assert find_driver("di2108p")(line, FAST).identify().model == "DI-2108P"
+    line = script((b"stop\r", b"stop\r"), *pairs)
+    with pytest.raises(InputError, match="this is a DI-2108P, no DI-2108"):
+        find_driver("di2108")(line, FAST).identify()
+
+
+def test_di4718b_stands_behind_its_amplifiers(script: Any) -> None:
+    echoed = ["encode 0", "slist 0 0", "srate 60000", "dec 10", "deca 1", "filter * 0", "ps 0"]
+    line = script(*[(f"{text}\r".encode(), f"{text}\r".encode()) for text in echoed])
+    assert find_driver("di4718b")(line, FAST).configure([1], 100.0).range_volts == 5.0
     assert line.finished
 
 

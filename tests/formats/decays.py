@@ -57,6 +57,7 @@ class WindaqFile:
         struct.pack_into("<IIH", header, 8, size, len(events), len(texts))
         struct.pack_into("<d", header, 28, self.interval_s)
         struct.pack_into("<ii", header, 36, self.opened, self.opened + 60)
+        struct.pack_into("<i", header, 44, 1)
         struct.pack_into("<HH", header, 56, self.next_write & 0xFFFF, self.next_write >> 16)
         header[65] = self.state << 6
         flags = 2 * self.hires | (bool(self.divisors) << 14) | 0x100

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.formats import ReadOptions, excel, inspect, matlab_check, read
 
 from .decays import swing
 
@@ -55,6 +55,23 @@ def test_matlab_73_and_junk_are_refused_clearly(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(InputError, match="can't be read"):
         read(path)
+
+
+def test_what_unpacks_to_more_than_any_recording_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"t": TIME, "theta": ANGLE, "more": np.zeros(20_000)}, do_compression=True)
+    book = openpyxl.Workbook()
+    book.active.append(["t", "angle"])
+    book.save(tmp_path / "a.xlsx")
+    assert len(read(path)) == len(TIME)
+    for module in (matlab_check, excel):
+        monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)
+    with pytest.raises(InputError, match="its compressed data are more than 0 MB"):
+        read(path)
+    with pytest.raises(InputError, match="it unpacks to 0 MB"):
+        read(tmp_path / "a.xlsx")
 
 
 @pytest.mark.parametrize("header", [None, ["Zeit [s]", "Winkel [°]"], ["t", "theta (deg)"]])

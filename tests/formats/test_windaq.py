@@ -141,6 +141,25 @@ def test_a_header_beyond_repair_is_refused_in_one_line(
         read(path)
 
 
+@pytest.mark.parametrize(
+    ("at", "junk", "said"),
+    [
+        (44, b"\0\0\0\0", "compression of the display (0)"),
+        (12, b"\xff\xff\xff\x7f", "list of events is damaged"),
+        (16, b"\xff\xff", "size of the annotations (65535)"),
+    ],
+)
+def test_damage_that_costs_no_sample_is_told(
+    tmp_path: Path, at: int, junk: bytes, said: str
+) -> None:
+    damaged = bytearray(WindaqFile(COUNTS).pack())
+    damaged[at : at + len(junk)] = junk
+    path = tmp_path / "a.WDQ"
+    path.write_bytes(bytes(damaged))
+    assert len(read(path)) == 2000
+    assert any(said in note for note in read(path).notes)
+
+
 def test_the_users_rate_mends_a_damaged_interval(tmp_path: Path) -> None:
     path = write(tmp_path / "a.WDQ", WindaqFile(COUNTS, interval_s=-1.2e-41))
     assert read(path, ReadOptions(sample_rate=250)).time_s[1] == pytest.approx(0.004)

@@ -12,6 +12,7 @@ import numpy as np
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.drivers.base import Loss
 from pendpipe.acquire.raw import RawRecording, read_raw
+from pendpipe.acquire.raw_checks import check_description
 from pendpipe.acquire.segments import Segment, cut, offsets_s, split
 from pendpipe.acquire.timebase import TimeBase, measure_rate
 from pendpipe.arrays import ByteArray, FloatArray, IntArray
@@ -45,7 +46,8 @@ def decode_recording(
         If it is no raw recording, the channel was not recorded, or nothing was.
     """
     raw = source if isinstance(source, RawRecording) else read_raw(source)
-    place = str(source) if isinstance(source, str | Path) else str(raw.header["port"])
+    place = str(source) if isinstance(source, str | Path) else str(raw.header.get("port"))
+    check_description(place, raw)
     channels: list[int] = list(raw.header["channels"])
     chosen = channels[0] if channel is None else channel
     if chosen not in channels:
@@ -95,22 +97,38 @@ def _join(
             # Late stamps must not make time stand still.
             begin_s = max(offset_s, last_s + 1.0 / rate_hz)
             rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
-            times.append(last_s + np.arange(1, rows + 1) / rate_hz)
-            values.append(np.full(rows, np.nan))
-            qualities.append(np.full(rows, MISSING, dtype=np.uint8))
-        reading = np.full(grid.length, np.nan)
+            shown = np.arange(1, rows + 1) if rows <= _most_rows(length) else np.array([1, rows])
+            times.append(last_s + shown / rate_hz)
+            values.append(np.full(len(shown), np.nan))
+            qualities.append(np.full(len(shown), MISSING, dtype=np.uint8))
+        reading = np.full(len(grid.quality), np.nan)
         reading[grid.index] = segment.counts[:, column] * step
-        times.append(begin_s + np.arange(grid.length) / rate_hz)
+        times.append(begin_s + grid.number / rate_hz)
         values.append(reading)
         qualities.append(grid.quality)
     return np.concatenate(times), np.concatenate(values), np.concatenate(qualities)
 
 
+def _most_rows(scans: int) -> int:
+    """How many rows a gap may fill: of a longer one (a computer that slept) the ends do."""
+    return max(1 << 20, scans)
+
+
 @dataclass(frozen=True)
 class _Grid:
-    """Where the good scans stand once the lost ones have their rows."""
+    """Rows for good scans and lost ones.
 
-    length: int
+    Parameters
+    ----------
+    number
+        Each row's place in time, in scans, shape (rows,).
+    index
+        The rows of the good scans.
+    quality
+        Of each row.
+    """
+
+    number: IntArray
     index: IntArray
     quality: ByteArray
 
@@ -120,14 +138,16 @@ def _place(scans: int, losses: Sequence[Loss]) -> _Grid:
     lost = np.zeros(scans, dtype=np.int64)
     for loss in losses:
         lost[loss.after_scan] += loss.lost_scans
-    index = np.arange(scans) + np.cumsum(lost)
-    length = int(index[-1]) + 1
-    quality = np.full(length, MISSING, dtype=np.uint8)
+    long = lost > _most_rows(scans)
+    index = np.arange(scans) + np.cumsum(np.where(long, 2, lost))
+    quality = np.full(int(index[-1]) + 1, MISSING, dtype=np.uint8)
     quality[index] = GOOD
     for loss in losses:
         if loss.suspect_before:
             quality[index[loss.after_scan - 1]] = SUSPECT
-    return _Grid(length, index, quality)
+    left_out = np.zeros(len(quality), dtype=np.int64)
+    left_out[index[long] - 1] = lost[long] - 2
+    return _Grid(np.arange(len(quality)) + np.cumsum(left_out), index, quality)
 
 
 def _metadata(
@@ -176,6 +196,12 @@ def _notes(
     if silent := [loss for loss in losses if loss.reason == "clock"]:
         scans = sum(loss.lost_scans for loss in silent)
         notes.append(f"{scans} scans lost at {len(silent)} places, by the recorder's clock")
+    if slipped := [loss for loss in losses if loss.reason.startswith("slip")]:
+        unsure = sum(loss.reason != "slip" for loss in slipped)
+        doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
+        notes.append(
+            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}"
+        )
     notes += [
         f"the device's buffer overflowed ('{loss.reason}')"
         for loss in losses

@@ -7,11 +7,9 @@ another does not depend on the scale of a simulated clock.
 
 from __future__ import annotations
 
-import errno
-import sys
 import time
 from types import TracebackType
-from typing import Final, Self
+from typing import Self
 
 import serial
 
@@ -20,13 +18,8 @@ try:
 except ImportError:  # not on Windows
     termios_error = OSError  # type: ignore[misc,assignment]
 
+from pendpipe.acquire.line_faults import cannot_open
 from pendpipe.errors import InputError
-
-_PERMISSION: Final = {
-    "linux": "join its group (often: sudo usermod -aG dialout $USER) and log in again",
-    "darwin": "use the /dev/cu.* name and close the programs that hold it",
-    "win32": "close the program that holds it (WinDaq, a terminal)",
-}
 
 
 class LineLostError(InputError):
@@ -63,7 +56,7 @@ class Line:
                 self._serial.exclusive = True
             self._serial.open()
         except (OSError, ValueError) as fault:
-            raise _cannot_open(port, fault) from None
+            raise cannot_open(port, fault) from None
 
     def __enter__(self) -> Self:
         return self
@@ -153,23 +146,3 @@ class Line:
 def _text(fault: BaseException) -> str:
     """One short clause out of pyserial's messages, which wrap one another."""
     return " ".join(str(fault).split())[:160]
-
-
-def _cannot_open(port: str, fault: Exception) -> InputError:
-    """Say why a port does not open, and what to do about it on this system."""
-    text = _text(fault)
-    number = getattr(fault, "errno", None)
-    if number == errno.ENOENT or "FileNotFoundError" in text:
-        return InputError(port, "there is no such port", "pendpipe acquire --list shows the ports")
-    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
-        return InputError(port, "the port is busy", "close the program that uses it")
-    if number in (errno.EACCES, errno.EPERM) or "PermissionError" in text:
-        remedy = _PERMISSION.get(sys.platform, "ask the owner of the machine")
-        return InputError(port, "the port may not be opened", remedy)
-    if "refused" in text:
-        return InputError(port, "nothing listens there", "start the device, or mend the address")
-    if "configure port" in text:
-        return InputError(port, "this is no serial port", "pendpipe acquire --list shows the ports")
-    return InputError(
-        port, f"the port can't be opened ({text})", "pendpipe acquire --list shows the ports"
-    )

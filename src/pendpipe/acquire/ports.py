@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 from pendpipe.acquire.clock import ScaledClock
 from pendpipe.acquire.drivers import FAMILIES
 from pendpipe.acquire.drivers.base import Identity
 from pendpipe.acquire.line import Line, LineLostError
+from pendpipe.acquire.usb import VENDOR
 from pendpipe.errors import InputError
-
-VENDOR: Final = 0x0683
-"""The vendor's USB number."""
 
 
 @dataclass(frozen=True)
@@ -69,4 +66,6 @@ def identify(port: str) -> Identity:
                 raise
             except InputError:
                 continue
-    raise InputError(port, "no known device answers", "check cable and power, or give --model")
+    raise InputError(
+        port, "no known device answers", "check cable, power and CDC mode, or give --model"
+    )

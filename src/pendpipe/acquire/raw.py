@@ -143,7 +143,7 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
             pieces.append(body)
             stamps.append((time_s, total))
         elif kind == b"E":
-            events.append({**json.loads(body), "time_s": time_s, "at_byte": total})
+            events.append({**_event(place, body), "time_s": time_s, "at_byte": total})
     return RawRecording(
         header,
         b"".join(pieces),
@@ -159,13 +159,24 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     end = content.find(b"\n", 0, _LONGEST_HEADER)
     try:
         header = json.loads(content[: max(end, 0)])
-    except ValueError:
+    except (ValueError, RecursionError):
         header = None
     if not isinstance(header, dict) or header.get("format") != _FORMAT:
         raise InputError(place, "this is no raw recording of pendpipe", "give another file")
     if header.get("version") != 1:
         raise InputError(place, "it was made by a newer version", "install a newer pendpipe")
     return header, end + 1
+
+
+def _event(place: str, body: bytes) -> Mapping[str, Any]:
+    """Return an event's content."""
+    try:
+        event = json.loads(body)
+    except (ValueError, RecursionError):
+        event = None
+    if not isinstance(event, dict):
+        raise InputError(place, "an event in it is damaged", "give another copy")
+    return event
 
 
 def _frame(content: bytes, place: int) -> tuple[Literal[b"D", b"E"] | bytes, float, bytes] | None:

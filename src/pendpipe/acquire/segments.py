@@ -11,7 +11,9 @@ import numpy as np
 
 from pendpipe.acquire.clock_losses import find_clock_losses
 from pendpipe.acquire.drivers.base import Decoder, Driver, Loss
+from pendpipe.acquire.drivers.words import WordDecoder
 from pendpipe.acquire.raw import RawRecording
+from pendpipe.acquire.slips import find_slips
 from pendpipe.arrays import AnyArray, FloatArray, IntArray
 
 _NEAR: Final = 64
@@ -86,9 +88,7 @@ def _decode(
     scale: float,
 ) -> Segment:
     """Decode one stream and look for what only the clock can tell."""
-    scans, end = decoder.feed(data), decoder.finish()
-    counts = np.concatenate([scans.counts, end.counts]) if len(end) else scans.counts
-    losses = (*scans.losses, *end.losses)
+    counts, losses = _scans_of(data, decoder)
     made, good = _scans_by(arrived_bytes, losses, decoder.bytes_per_scan)
     missing, limit_s = find_clock_losses(arrival_s, made, rate_hz, scale)
     for loss in missing:
@@ -98,6 +98,30 @@ def _decode(
         made[loss.first_arrival :] += loss.scans
     ordered = tuple(sorted(losses, key=lambda loss: loss.after_scan))
     return Segment(counts, ordered, arrival_s, made, limit_s)
+
+
+def _scans_of(data: bytes, decoder: Decoder) -> tuple[AnyArray, tuple[Loss, ...]]:
+    """Decode a stream; one without marks is put into step again wherever it slips."""
+    size = decoder.bytes_per_scan
+    parts: list[AnyArray] = []
+    losses: list[Loss] = []
+    scans = begin = 0
+    for slip in find_slips(data, size // 2) if isinstance(decoder, WordDecoder) else []:
+        fed = decoder.feed(data[begin : slip.last_byte])
+        # (What might be the beginning of a stop code is held back.)
+        parts += [fed.counts, decoder.finish().counts]
+        scans = sum(map(len, parts))
+        thrown = slip.next_byte - slip.last_byte
+        lost, reason = -(-thrown // size), "slip" if slip.sure else "slip, channels unsure"
+        losses.append(Loss(scans, thrown, lost, suspect_before=True, reason=reason))
+        begin = slip.next_byte
+    fed, end = decoder.feed(data[begin:]), decoder.finish()
+    if not parts:
+        return (np.concatenate([fed.counts, end.counts]) if len(end) else fed.counts), (
+            *fed.losses, *end.losses,
+        )  # fmt: skip
+    # A decoder of words counts its scans on over a slip.
+    return np.concatenate([*parts, fed.counts, end.counts]), (*losses, *fed.losses, *end.losses)
 
 
 def _scans_by(

@@ -217,7 +217,10 @@ class Session:
                 self._line.set_baudrate(self._driver.baudrate)
                 identity, setup = self._introduce()
                 if (identity, setup) != (self.identity, self.setup):
-                    return False
+                    # Another device, or an answer that was damaged: it is asked again.
+                    self._line.close()
+                    time.sleep(_RETRY_S)
+                    continue
                 writer.event(self._elapsed_s(), event="restarted", reason=reason)
                 self._instrument.start()
             except InputError:

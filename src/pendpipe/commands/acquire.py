@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="how long a device that was unplugged is waited for (30)",
     )
-    parser.add_argument("--out", metavar="FILE.csv", help="the recording")
+    parser.add_argument("--out", metavar="FILE", help="the recording; FILE.wdh for WinDaq")
     parser.add_argument("--raw", metavar="FILE", help="where the bytes off the wire go (FILE.raw)")
     parser.add_argument("--volts-per-radian", type=float, help="sensor constant, for the metadata")
     parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (0)")
@@ -74,8 +74,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.campaign:
         return _stage(arguments)
     from pendpipe.acquire.progress import ProgressLine
-    from pendpipe.recording import write_plain
+    from pendpipe.formats.writing import check_name, write
 
+    check_name(arguments.out)
     _complete(arguments)
     progress = ProgressLine(sys.stderr, arguments.duration)
     if arguments.recover:
@@ -90,8 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(
             "acquire", "no instrument is named", "give --port PORT or --device simulated:di2108"
         )
-    write_plain(arguments.out, recording)
-    for note in recording.notes:
+    for note in (*recording.notes, *write(arguments.out, recording)):
         print(f"pendpipe: {arguments.out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
     print(f"{arguments.out}: {len(recording)} samples at {float(rate):.6g} Hz")
@@ -207,6 +207,7 @@ def _default_signal(seed: int, volts_per_radian: float) -> Signal:
 def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
     from pendpipe.acquire.ports import identify, list_ports
+    from pendpipe.acquire.usb import no_ports, without_port
 
     if port:
         identity = identify(port)
@@ -223,6 +224,9 @@ def _list(port: str | None) -> int:
             except InputError as fault:
                 told = f"Dataq, {fault.problem}"
         print(f"{entry.port}: {told}")
-    if not found:
-        print("no serial ports; try --device simulated:di2108")
+    unbound = without_port()
+    for device in unbound:
+        print(device)
+    if not found and not unbound:
+        print(no_ports())
     return 0

@@ -1,4 +1,4 @@
-"""Write any supported recording in the plain CSV form."""
+"""Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
 
 from __future__ import annotations
 
@@ -12,17 +12,21 @@ from pendpipe.commands import _reading
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe convert``."""
     _reading.add_arguments(parser)
-    parser.add_argument("out", metavar="OUT.csv", type=Path, help="the plain form")
+    parser.add_argument(
+        "out", metavar="OUT", type=Path, help="OUT.csv: the plain form; OUT.wdh: WinDaq HiRes"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
-    from pendpipe.recording import write_plain
+    from pendpipe.formats.writing import check_name, write
 
+    check_name(arguments.out)
     recording = read(arguments.file, _reading.options(arguments))
     for note in recording.notes:
         print(f"{arguments.file}: {note}", file=sys.stderr)
-    write_plain(arguments.out, recording)
+    for note in write(arguments.out, recording):
+        print(f"{arguments.out}: {note}", file=sys.stderr)
     print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")
     return 0

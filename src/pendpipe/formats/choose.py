@@ -56,6 +56,13 @@ class Choice:
     notes: tuple[str, ...]
 
 
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Join names for a message of one line: the first dozen, each of a bearable length."""
+    shown = [name if len(name) <= 60 else name[:57] + "..." for name in names[:most]]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "") or "none"
+
+
 def meaning(column: Column) -> Role:
     """Say what a column holds, by its name and, where that is silent, by its unit."""
     role: Role = role_of(column.name) if column.name else "unknown"
@@ -114,7 +121,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         return Choice(time, counts, (_channel(table, channels, options.channel),), channels, ())
     readings, notes = _readings(_of_one_run(channels, time))
     if not readings and reading:
-        names = ", ".join(column.label for column in table.columns) or "none"
+        names = listed([column.label for column in table.columns])
         raise InputError(
             table.place,
             f"no column looks like an angle, a voltage or a displacement (found {names})",
@@ -133,7 +140,7 @@ def find(table: Table, columns: Sequence[Column], key: str) -> Column:
         for column in columns:
             if column.number == int(key):
                 return column
-    names = ", ".join(column.label for column in columns)
+    names = listed([column.label for column in columns])
     raise InputError(table.place, f"there is no column '{key}'", f"choose from: {names}")
 
 
@@ -155,7 +162,7 @@ def _channel(table: Table, channels: Sequence[Column], key: str) -> Column:
             return column
     if key.isdigit() and 1 <= int(key) <= len(channels):
         return channels[int(key) - 1]
-    names = ", ".join(f"{i} {column.label}" for i, column in enumerate(channels, start=1))
+    names = listed([f"{i} {column.label}" for i, column in enumerate(channels, start=1)])
     raise InputError(table.place, f"there is no channel '{key}'", f"choose from: {names}")
 
 
@@ -214,9 +221,10 @@ def _evenness(values: FloatArray) -> float:
 
 def _counts_samples(column: Column) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
-    steps = np.diff(column.values)
-    whole = bool(np.all(column.values == np.rint(column.values)))
-    return whole and float(np.median(steps)) == 1.0 and meaning(column) in ("index", "unknown")
+    values = column.values
+    if not np.isfinite(values).all() or np.any(values != np.rint(values)):
+        return False
+    return float(np.median(np.diff(values))) == 1.0 and meaning(column) in ("index", "unknown")
 
 
 def _readings(channels: Sequence[Column]) -> tuple[tuple[Column, ...], tuple[str, ...]]:

@@ -27,6 +27,8 @@ def is_uniform(time_s: FloatArray) -> bool:
     if len(steps) < 2:
         return True
     middle = float(np.median(steps))
+    if not middle > 0:
+        return False
     return float(np.mean(np.abs(steps - middle) <= 0.15 * middle)) >= 0.99 or (
         # A handful of gaps in a short recording is no unevenness.
         bool(np.all(np.abs(steps / middle - np.rint(steps / middle)) < 0.1))
@@ -40,6 +42,8 @@ def sample_rate(time_s: FloatArray) -> float:
     if not len(steps):
         return float("nan")
     middle = float(np.median(steps))
+    if not middle > 0:
+        return float("nan")
     usual = steps[np.abs(steps - middle) <= 0.5 * middle]
     return 1.0 / float(usual.mean() if is_uniform(time_s) else middle)
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import io
+import zipfile
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pendpipe.errors import InputError
+from pendpipe.formats.matlab_check import most_unpacked
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError, Table
 from pendpipe.formats.text import table_of_text
+
+_MOST_ROWS: Final = 1 << 20
+"""What a sheet has, and no more."""
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -31,13 +37,16 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     from openpyxl import load_workbook
 
     try:
+        _refuse_bomb(data)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = load_workbook(io.BytesIO(data), read_only=True, data_only=True)
-            sheets = {sheet.title: list(sheet.values) for sheet in book if hasattr(sheet, "values")}
+            sheets = {sheet.title: _rows(sheet) for sheet in book if hasattr(sheet, "values")}
     except Exception as fault:  # openpyxl raises whatever the archive makes it stumble on
         raise InputError(
-            place, f"the workbook can't be read ({fault})", "save it again, or export CSV"
+            place,
+            f"the workbook can't be read ({str(fault)[:200]})",
+            "save it again, or export CSV",
         ) from None
     numbers = {
         title: sum(isinstance(cell, int | float) for row in rows for cell in row)
@@ -59,6 +68,27 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     from dataclasses import replace
 
     return replace(table, notes=(note, *table.notes[1:]))
+
+
+def _refuse_bomb(data: bytes) -> None:
+    """Refuse an archive that says it holds far more than such a file can."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        whole = sum(part.file_size for part in archive.infolist())
+    if whole > most_unpacked(len(data)):
+        raise ValueError(f"it unpacks to {whole >> 20} MB")
+
+
+def _rows(sheet: Any) -> list[tuple[Any, ...]]:
+    """Read the filled rows; what the file says of their number and width is not believed."""
+    sheet.reset_dimensions()
+    rows = islice(sheet.values, _MOST_ROWS + 1)
+    filled = []
+    for number, row in enumerate(rows, start=1):
+        if number > _MOST_ROWS:
+            raise ValueError("a row's number is beyond the last row")
+        if any(cell is not None for cell in row):
+            filled.append(row)
+    return filled
 
 
 def _written(cell: Any) -> str:

@@ -142,7 +142,7 @@ def _interval(lines: Sequence[str]) -> float | None:
                 continue
             number = float(value[1].replace(",", "."))
             told = (value[2] or "").lower() or line[found.end() : found.end() + 8].lower()
-            if number <= 0:
+            if not 1e-9 < number < 1e12:
                 continue
             if inverse:
                 return 1.0 / (number * (1e3 if "khz" in told else 1.0))

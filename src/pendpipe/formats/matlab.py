@@ -15,6 +15,8 @@ from pendpipe.formats.names import role_of
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
 
+_SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
+"""What a rate or an interval may be."""
 _RATES = ("fs", "samplerate", "sample_rate", "srate", "rate", "sampling_rate", "samplingrate")
 _INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat")
 
@@ -72,7 +74,9 @@ def _load(place: Path, data: bytes) -> dict[str, Any]:
             warnings.simplefilter("ignore")
             loaded = loadmat(stream, squeeze_me=True, variable_names=names)
     except Exception as fault:  # scipy raises whatever its parser stumbles on
-        raise InputError(place, f"the MATLAB file can't be read: {fault}", remedy) from None
+        raise InputError(
+            place, f"the MATLAB file can't be read: {str(fault)[:200]}", remedy
+        ) from None
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
@@ -139,8 +143,10 @@ def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
 def _interval(arrays: dict[str, FloatArray]) -> float | None:
     for name, values in arrays.items():
         word = _last(name).lower()
-        if values.size == 1 and values[0] > 0 and word in _RATES:
+        if values.size != 1 or not _SLOWEST_HZ < values[0] < _FASTEST_HZ:
+            continue
+        if word in _RATES:
             return float(1.0 / values[0])
-        if values.size == 1 and values[0] > 0 and word in _INTERVALS:
+        if word in _INTERVALS:
             return float(values[0])
     return None

@@ -25,6 +25,11 @@ class DamagedError(ValueError):
     """The file's tags contradict one another."""
 
 
+def most_unpacked(size: int) -> int:
+    """How many bytes a packed file of so many may hold; what holds more is no recording."""
+    return max(256 << 20, 100 * size)
+
+
 @dataclass
 class _Elements:
     """Elements one after the other in `data`, from `at` on."""
@@ -71,6 +76,7 @@ def sound_variables(data: bytes) -> list[str]:
     if len(data) < 136 or data[126:128] not in (b"IM", b"MI"):
         raise DamagedError("its header is damaged")
     order = "<" if data[126:128] == b"IM" else ">"
+    most = most_unpacked(len(data))
     elements = _Elements(data, order, 128)
     names = []
     while elements.more():
@@ -78,11 +84,14 @@ def sound_variables(data: bytes) -> list[str]:
         if kind == _COMPRESSED:
             unpacker = zlib.decompressobj()
             try:
-                unpacked = unpacker.decompress(content, _LARGEST)
+                unpacked = unpacker.decompress(content, most)
             except zlib.error as fault:
                 raise DamagedError(f"its compressed data are damaged ({fault})") from None
+            if not unpacker.eof and len(unpacked) >= most:
+                raise DamagedError(f"its compressed data are more than {most >> 20} MB")
             if not unpacker.eof:
                 raise DamagedError("its compressed data are cut short")
+            most -= len(unpacked)
             kind, content = _Elements(unpacked, order).next()
         if kind != _MATRIX:
             raise DamagedError(f"an element of type {kind} stands where a variable is due")

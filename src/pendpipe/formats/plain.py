@@ -11,7 +11,7 @@ from pendpipe.formats.names import role_of
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, Marker, Table
 from pendpipe.formats.units import split_header
-from pendpipe.recording import QUANTITIES, Recording, read_plain
+from pendpipe.recording import QUANTITIES, Recording, converter_step, read_plain
 
 _READINGS: Final = ("angle", "volts", "length", "angular velocity")
 
@@ -75,10 +75,9 @@ def table_of_plain(place: Path, recording: Recording) -> Table:
     """Show a plain recording as the table that ``inspect`` goes through."""
     limits = None
     high, low = recording.number("range_volts"), recording.number("range_low_volts")
-    bits = recording.number("bits")
-    if high is not None and bits is not None and recording.quantity == "volts":
-        low = -high if low is None else low
-        limits = (low, high - (high - low) / 2.0**bits)
+    step = converter_step(recording)
+    if high is not None and step is not None:
+        limits = (-high if low is None else low, high - step)
     column = Column(
         name=recording.quantity,
         unit=recording.unit,
@@ -92,12 +91,12 @@ def table_of_plain(place: Path, recording: Recording) -> Table:
         place=place,
         format="plain",
         columns=(column,),
-        markers=tuple(_markers(recording)),
+        markers=tuple(markers_of(recording)),
         notes=recording.notes,
     )
 
 
-def _markers(recording: Recording) -> list[Marker]:
+def markers_of(recording: Recording) -> list[Marker]:
     """Read back the markers that ``convert`` has kept as metadata."""
     found = []
     for key, value in recording.metadata.items():

@@ -152,7 +152,9 @@ def _recording(table: Table, options: ReadOptions) -> Recording:
     choice = choose(table, options)
     _refuse_text(table, choice)
     base = time_base(table, choice, options)
-    found = readings(table, choice, options, base.time_s)
+    time_s = np.full(len(base.keep), np.nan)
+    time_s[base.keep] = base.time_s
+    found = readings(table, choice, options, time_s)
     if len(found.values) != len(base.keep):
         raise InputError(table.place, "the columns are of unequal length", "choose with --column")
     values = found.values[base.keep]

@@ -33,7 +33,7 @@ def readings(
     Parameters
     ----------
     time_s
-        Times of all rows (only an angular velocity needs them).
+        Times of all rows, NaN where a row is left out (only an angular velocity needs them).
     as_told
         Keep an angle's zero where the file has it.
     """
@@ -155,7 +155,12 @@ def _position(x: Column, y: Column) -> Readings:
 
 def _integrated(rate: FloatArray, time_s: FloatArray) -> FloatArray:
     """Integrate an angular velocity (trapezoids), its mean taken out against drift."""
-    free = rate - np.nanmean(rate)
-    steps = 0.5 * (free[1:] + free[:-1]) * np.diff(time_s)
-    angle: FloatArray = np.concatenate(([0.0], np.cumsum(steps)))
-    return angle - np.mean(angle)
+    timed = np.isfinite(time_s)
+    angle: FloatArray = np.full(len(rate), np.nan)
+    if not np.isfinite(rate[timed]).all():
+        return angle
+    free = rate[timed] - np.mean(rate[timed])
+    steps = 0.5 * (free[1:] + free[:-1]) * np.diff(time_s[timed])
+    angle[timed] = np.concatenate(([0.0], np.cumsum(steps)))
+    angle -= float(np.mean(angle[timed]))
+    return angle

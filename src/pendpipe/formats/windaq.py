@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from pendpipe.formats.windaq_events import (
     scan_times,
 )
 from pendpipe.formats.windaq_header import Channel, WindaqHeader, parse_header
+
+_ENOUGH: Final = 32
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -72,6 +75,10 @@ def _checked(
     if header.data_bytes and at <= len(data) and header.data_bytes % unit == 0:
         trailers = parse_trailers(data, at, header.event_bytes, header, header.scans)
         said = [] if trailers else ["the list of events is damaged: no markers"]
+        if trailers and at + header.event_bytes + header.annotation_bytes > len(data):
+            said.append(
+                f"the header's size of the annotations ({header.annotation_bytes}) is wrong"
+            )
         return header, trailers, said
     found = mended(data, header)
     if found is not None:
@@ -126,8 +133,10 @@ def _column(
 ) -> Column:
     """Scale one channel."""
     slope = channel.slope * (0.25 if header.hires else 1.0)
-    counts = (raw if header.hires else raw >> 2).astype(np.float64)
-    ends = (-32768, 32767) if header.hires else (-8192, 8191)
+    whole = raw if header.hires else raw >> 2
+    counts = whole.astype(np.float64)
+    ladder = _unused_low_bits(whole)
+    ends = (-32768, 32768 - ladder) if header.hires else (-8192, 8192 - ladder)
     limits = sorted(slope * end + channel.intercept for end in ends)
     return Column(
         name=name or f"channel {channel.number}",
@@ -135,6 +144,15 @@ def _column(
         values=counts * slope + channel.intercept,
         number=channel.number,
         time_s=time[:: channel.divisor][: len(counts)] if header.packed else time,
-        resolution=abs(slope),
+        resolution=abs(slope) * ladder,
         limits=(limits[0], limits[1]),
     )
+
+
+def _unused_low_bits(counts: IntArray) -> int:
+    """Return 2^k when the low k bits are never set: a 12-bit converter in a 16-bit word has k = 4.
+
+    1 for a few samples, which may all be even by chance.
+    """
+    used = int(np.bitwise_or.reduce(counts)) if len(counts) >= _ENOUGH else 1
+    return used & -used or 1

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -17,8 +17,16 @@ from pendpipe.formats.windaq_header import WindaqHeader
 _COMMENT_FLAG: Final = -0x80000000
 _PAUSE: Final = 2.0
 """Stamps are whole seconds: less than this is no pause."""
+_GAP: Final = re.compile(r"gap (\d{1,9}\.\d{1,9}) s\b")
+_WORD: Final = struct.Struct("<i")
+_LONGEST_TEXT: Final = 1024
 _LONGEST_TAIL: Final = 4096
 """Bytes behind the samples of a recording with a damaged header; more is not sought."""
+
+
+def gap_comment(missing_s: float) -> str:
+    """Say the length of a gap so that `scan_times` understands it: ``gap 0.350000 s``."""
+    return f"gap {missing_s:.9f} s"
 
 
 @dataclass(frozen=True)
@@ -39,9 +47,17 @@ class Trailers:
 
 
 def parse_trailers(
-    data: bytes, at: int, event_bytes: int, header: WindaqHeader, scans: int
+    data: bytes,
+    at: int,
+    event_bytes: int,
+    header: WindaqHeader,
+    scans: int,
+    *,
+    rising: bool = False,
 ) -> Trailers | None:
     """Read the trailers from byte `at`; ``None`` if what stands there can't be trailers.
+
+    With `rising` no two events may be at one scan: samples of zero would read as a list.
 
     Trailer 1 is a list of 32-bit integers: a pointer to a scan (to a sample, in HiRes
     files), then a time stamp if the pointer is not negative, then a comment's place if the
@@ -50,34 +66,46 @@ def parse_trailers(
     count = event_bytes // 4
     if event_bytes % 4 or at + event_bytes > len(data):
         return None
-    words = struct.unpack_from(f"<{count}i", data, at)
-    texts = data[at + event_bytes :]
+    texts_at = at + event_bytes
     per_scan = len(header.channels) if header.hires else 1
     events: list[Event] = []
     place, last = 0, -1
+
+    def word(place: int) -> int:
+        # One by one: a damaged size may promise a list as long as the file.
+        return int(_WORD.unpack_from(data, at + 4 * place)[0])
+
     while place < count:
-        pointer = words[place]
+        pointer = word(place)
         place += 1
         scan = abs(pointer) // per_scan
-        if not (last <= scan <= scans):
+        if not (last + rising <= scan <= scans):
             return None
         stamp, comment = None, ""
         if pointer >= 0:
             if place >= count:
                 return None
-            stamp = words[place]
+            stamp = word(place)
             place += 1
         # Pointers end at the number of samples; what lies far below zero is a comment.
-        if place < count and words[place] < _COMMENT_FLAG // 2:
-            offset = words[place] & 0x7FFFFFFF
+        if place < count and word(place) < _COMMENT_FLAG // 2:
+            offset = word(place) & 0x7FFFFFFF
             place += 1
-            if offset >= len(texts):
+            if texts_at + offset >= len(data):
                 return None
-            comment = texts[offset:].split(b"\0")[0].decode("latin-1").strip()
+            comment = _text(
+                data[texts_at + offset : texts_at + offset + _LONGEST_TEXT].split(b"\0", 1)[0]
+            )
         events.append(Event(scan, stamp, comment))
         last = scan
-    names = tuple(text.decode("latin-1").strip() for text in texts.split(b"\0"))
-    return Trailers(tuple(events), names[: len(header.channels)])
+    width = len(header.channels)
+    names = data[texts_at : texts_at + width * _LONGEST_TEXT].split(b"\0", width)[:width]
+    return Trailers(tuple(events), tuple(map(_text, names)))
+
+
+def _text(text: bytes) -> str:
+    """Turn a text of the file into one line."""
+    return " ".join(text[:_LONGEST_TEXT].decode("latin-1").split())
 
 
 def _texts_from(data: bytes) -> int:
@@ -137,14 +165,14 @@ def _consistent(
     # The last number of the list may end in NULs, which read as empty texts.
     least = max(8, -(-(texts_from - at) // 4) * 4)
     for event_bytes in sorted({8, least, least + 4, least + 8}, reverse=True):
-        texts = data[at + event_bytes :]
-        enough = event_bytes <= rest and texts.count(0) >= len(header.channels)
-        if not enough or at + event_bytes < texts_from:
+        if event_bytes > rest or at + event_bytes < texts_from:
+            continue
+        if data.count(0, at + event_bytes) < len(header.channels):
             continue
         changed = replace(header, data_bytes=size, event_bytes=event_bytes)
-        trailers = parse_trailers(data, at, event_bytes, header, size // (2 * len(header.channels)))
-        scans = [event.scan for event in trailers.events] if trailers else []
-        if trailers is not None and scans and all(a < b for a, b in pairwise(scans)):
+        scans = size // (2 * len(header.channels))
+        trailers = parse_trailers(data, at, event_bytes, header, scans, rising=True)
+        if trailers is not None and trailers.events:
             return changed, trailers
     return None
 
@@ -157,9 +185,9 @@ def scan_times(
     WinDaq strings the samples together over a pause; only the stamp of the event that
     follows tells of it. A stamp that is ahead of the samples by more than two seconds (and
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
-    known to a second.
+    known to a second. A comment of `gap_comment` says it exactly, where the stamp agrees.
     """
-    time = np.arange(scans, dtype=np.float64) * header.interval_s
+    steps = np.zeros(scans)
     notes = []
     lag, since = 0.0, 0.0
     for event in events:
@@ -167,12 +195,18 @@ def scan_times(
             continue
         expected = event.scan * header.interval_s + lag
         missing = event.stamp_s - expected
-        if missing > max(_PAUSE, 0.01 * (expected - since)):
-            time[event.scan :] += missing
-            lag += missing
+        told = _GAP.match(event.comment)
+        if told and abs(missing - float(told[1])) <= _PAUSE:
+            missing = float(told[1])
+            notes.append(f"gap of {missing:.6g} s before scan {event.scan}, by its comment")
+        elif missing > max(_PAUSE, 0.01 * (expected - since)):
             notes.append(f"pause of {missing:.0f} s before scan {event.scan}, by its time stamp")
+        else:
+            missing = 0.0
+        steps[event.scan] += missing
+        lag += missing
         since = event.stamp_s
-    return time, notes
+    return np.arange(scans, dtype=np.float64) * header.interval_s + np.cumsum(steps), notes
 
 
 def markers(events: Sequence[Event], time_s: FloatArray) -> tuple[Marker, ...]:

@@ -100,6 +100,10 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
             )
         notes.append(f"the sample interval in the header ({interval:g} s) can't be true")
         interval = 1.0 / options.sample_rate
+    compression = struct.unpack_from("<i", data, 44)[0]
+    if compression < 1:
+        # WinDaq itself refuses such a file, by its byte 44.
+        notes.append(f"the header's compression of the display ({compression}) can't be true")
     flags = struct.unpack_from("<H", data, 100)[0]
     state = data[65] >> 6
     circular = size == 1536 or place.suffix.lower() in (".wdc", ".whc")

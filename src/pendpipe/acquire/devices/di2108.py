@@ -1,4 +1,4 @@
-"""Simulated DI-1100 to DI-4108 in CDC mode (dataq-facts A8)."""
+"""Simulated DI-1100 to DI-4718B in CDC mode (dataq-facts A8)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SimulatedDI2108:
     @property
     def information(self) -> dict[str, str]:
         """The answers to ``info``."""
-        number = self.model.split("-")[1]
+        number = self.model.removeprefix("DI-")
         return {"0": "DATAQ", "1": number, "2": "0.141", "6": "5F2A9C01", "9": "60000000"}
 
     @property
@@ -138,3 +138,25 @@ class SimulatedDI4108(SimulatedDI2108):
 
     model: ClassVar[str] = "DI-4108"
     full_scales: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
+
+
+class SimulatedDI2108P(SimulatedDI2108):
+    """Eight channels of 16 bits in three ranges; no ``deca``."""
+
+    model: ClassVar[str] = "DI-2108-P"
+    full_scales: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.5)
+    limits: ClassVar[dict[str, tuple[int, int]]] = {**SimulatedDI2108.limits, "deca": (1, 1)}
+
+
+class SimulatedDI4208(SimulatedDI2108):
+    """Eight channels of 16 bits in six ranges."""
+
+    model: ClassVar[str] = "DI-4208"
+    full_scales: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class SimulatedDI4718B(SimulatedDI2108):
+    """Eight channels of 16 bits, +-5 V."""
+
+    model: ClassVar[str] = "DI-4718B"
+    full_scales: ClassVar[tuple[float, ...]] = (5.0,)

@@ -13,7 +13,10 @@ from pendpipe.acquire.devices.di2108 import (
     SimulatedDI1110,
     SimulatedDI1120,
     SimulatedDI2108,
+    SimulatedDI2108P,
     SimulatedDI4108,
+    SimulatedDI4208,
+    SimulatedDI4718B,
 )
 from pendpipe.acquire.devices.dialect import Dialect
 
@@ -29,6 +32,9 @@ DEVICES: Final[Mapping[str, Callable[[], Dialect]]] = {
     "di1110": SimulatedDI1110,
     "di1120": SimulatedDI1120,
     "di2108": SimulatedDI2108,
+    "di2108p": SimulatedDI2108P,
     "di4108": SimulatedDI4108,
+    "di4208": SimulatedDI4208,
+    "di4718b": SimulatedDI4718B,
 }
 """What may follow ``simulated:``."""

@@ -6,7 +6,16 @@ from collections.abc import Mapping
 from typing import Final
 
 from pendpipe.acquire.drivers.base import Driver
-from pendpipe.acquire.drivers.cdc import DI1100, DI1110, DI1120, DI2108, DI4108
+from pendpipe.acquire.drivers.cdc import (
+    DI1100,
+    DI1110,
+    DI1120,
+    DI2108,
+    DI2108P,
+    DI4108,
+    DI4208,
+    DI4718B,
+)
 from pendpipe.acquire.drivers.di149 import DI149, DI155
 from pendpipe.acquire.drivers.di245 import DI245
 from pendpipe.acquire.drivers.legacy import DI154RS, DI194RS
@@ -22,7 +31,10 @@ DRIVERS: Final[Mapping[str, type[Driver]]] = {
     "di1110": DI1110,
     "di1120": DI1120,
     "di2108": DI2108,
+    "di2108p": DI2108P,
     "di4108": DI4108,
+    "di4208": DI4208,
+    "di4718b": DI4718B,
 }
 """The driver of each model, by the name used on the command line."""
 

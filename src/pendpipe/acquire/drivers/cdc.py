@@ -1,4 +1,4 @@
-"""The USB family of the DI-1100 to DI-4108 in CDC mode: text commands, binary words.
+"""The USB family of the DI-1100 to DI-4718B in CDC mode: text commands, binary words.
 
 ``start`` is not echoed. A device whose buffer overflows writes ``stop 01`` (02, 03) into
 its data and falls silent (dataq-facts A8).
@@ -60,7 +60,8 @@ class DI2108(TextDriver):
         self._command(f"srate {divisor}")
         if self.decimations > 1:
             self._command(f"dec {decimation}")
-        self._command(f"deca {further}")
+        if self.further_decimations > 1:
+            self._command(f"deca {further}")
         # The last reading, no mean: a mean would be a filter.
         self._command("filter * 0", needed=False)
         rate = _BASE_HZ / (divisor * decimation * further)
@@ -147,6 +148,32 @@ class DI4108(DI2108):
 
     model: ClassVar[str] = "DI-4108"
     ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
+
+
+class DI2108P(DI2108):
+    """The DI-2108-P: as the DI-2108, +-10, +-5 or +-2.5 V, no ``deca``.
+
+    Its ranges from 0 V up are not used: a pendulum swings about its rest.
+    """
+
+    model: ClassVar[str] = "DI-2108-P"
+    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.5)
+    further_decimations: ClassVar[int] = 1
+
+
+class DI4208(DI2108):
+    """The DI-4208 over USB: 8 channels, 16 bits, +-2 to +-100 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4208"
+    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class DI4718B(DI2108):
+    """The DI-4718B: 8 channels, 16 bits, +-5 V behind its amplifiers, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4718B"
+    range_volts: ClassVar[float] = 5.0
+    ranges: ClassVar[tuple[float, ...]] = (5.0,)
 
 
 def _packet_code(bytes_per_second: float) -> int:

@@ -53,6 +53,11 @@ def refuse_another(port: str, found: Identity, model: str) -> Identity:
     InputError
         If it is another's.
     """
-    if found.model != model:
+    # How the hyphens of a name are written ("2108P", "2108-P") is not documented.
+    if _letters(found.model) != _letters(model):
         raise InputError(port, f"this is a {found.model}, no {model}", "give its --model")
     return found
+
+
+def _letters(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
