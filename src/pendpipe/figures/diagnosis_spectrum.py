@@ -104,7 +104,7 @@ def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     lines = np.fft.rfft((residual - np.mean(residual)) * window)
     density = np.asarray(2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2), dtype=np.float64)
     frequency = np.fft.rfftfreq(count, interval)
-    return _banded(frequency[2:-1], density[2:-1])
+    return _banded(np.asarray(frequency[2:-1], dtype=np.float64), density[2:-1])
 
 
 def _banded(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
