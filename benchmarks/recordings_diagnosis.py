@@ -72,10 +72,8 @@ def row(name: str, content: Mapping[str, Any]) -> str:
     before, after = (content[key]["residual_rms_rad"] for key in ("baseline", "improved"))
     left = after / content["noise_rms_rad"]
     found = "; ".join(effect(each) for each in content["effects"])
-    return (
-        f"| {name} | {content['verdict']} | {found} | {compact(before, unit)}, {compact(after, unit)}"
-        f" | {left:.3g} | {content['unexplained']['p_value']:.2g} | {known} |"
-    )
+    sizes = f"{compact(before, unit)}, {compact(after, unit)}"
+    return f"| {name} | {content['verdict']} | {found} | {sizes} | {left:.3g} | {content['unexplained']['p_value']:.2g} | {known} |"
 
 
 def effect(found: Mapping[str, Any]) -> str:
