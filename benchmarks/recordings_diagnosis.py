@@ -73,7 +73,8 @@ def row(name: str, content: Mapping[str, Any]) -> str:
     left = after / content["noise_rms_rad"]
     found = "; ".join(effect(each) for each in content["effects"])
     sizes = f"{compact(before, unit)}, {compact(after, unit)}"
-    return f"| {name} | {content['verdict']} | {found} | {sizes} | {left:.3g} | {content['unexplained']['p_value']:.2g} | {known} |"
+    rest = f"{left:.3g} | {content['unexplained']['p_value']:.2g}"
+    return f"| {name} | {content['verdict']} | {found} | {sizes} | {rest} | {known} |"
 
 
 def effect(found: Mapping[str, Any]) -> str:
