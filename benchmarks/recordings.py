@@ -12,6 +12,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from benchmarks.recordings_diagnosis import section
 from pendpipe.files import read_json
 
 ROOT = Path(__file__).parents[1]
@@ -97,6 +98,7 @@ def main() -> None:
         if drawn.exists():
             shutil.copyfile(drawn, images / f"recording-{name}.svg")
             lines += [f"![Decay of {name}](images/recording-{name}.svg)", ""]
+    lines += section(RESULTS, [record["record"] for record in records], images)
     text = "\n".join(lines)
     print(text)
     (ROOT / "docs/recordings.md").write_text(text, encoding="utf-8")

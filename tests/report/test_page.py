@@ -224,3 +224,41 @@ def test_the_command_writes_the_page_whole_or_not_at_all(
     assert not out.exists()
     assert main([*words, str(example.summary)]) == 0
     Outline(out.read_text(encoding="utf-8"))
+
+
+def diagnosed(name: str) -> dict[str, Any]:
+    """A diagnosis that has found one of two effects which it can't tell apart."""
+    model = {
+        "parameters": {"amplitude": {"value": 0.25, "unit": "rad"}},
+        "residual_rms_rad": 2.36e-3, "chi2_per_dof": 569.0,
+    }  # fmt: skip
+    effect = {
+        "id": "circular-error", "probability": 0.7,
+        "indistinguishable_from": [{"id": "cubic-stiffness", "probability": 0.25}],
+    }  # fmt: skip
+    return {
+        "verdict": "missing-physics", "p_value": 1e-9, "noise_rms_rad": 1e-4, "baseline": model,
+        "improved": {**model, "residual_rms_rad": 1e-4, "chi2_per_dof": 1.01},
+        "effects": [effect], "statement": f"Eq. 8 leaves 2.36 mrad in {name}.",
+    }  # fmt: skip
+
+
+def test_the_verdicts_of_the_diagnosis_are_on_the_page(example: Any, tmp_path: Path) -> None:
+    from pendpipe.diagnose.not_analysable import not_analysable
+    from pendpipe.files import write_json
+
+    found, refused, none = (entry["record"] for entry in example.content["records"][:3])
+    write_json(tmp_path / found / "diagnosis/diagnosis.json", diagnosed(found))
+    empty = not_analysable("eq8", "two half cycles are too few")
+    write_json(tmp_path / refused / "diagnosis/diagnosis.json", empty)
+    page = render({}, example.content, {}, tmp_path, tmp_path)
+    Outline(page)
+    section = page[page.index('id="diagnosis"') : page.index('id="records"')]
+    assert "circular-error 70 % (or cubic-stiffness 25 %)" in section
+    assert "2.36 mrad → 100 µrad" in section
+    assert "missing physics" in section
+    assert "not analysable" in section
+    assert f"Eq. 8 leaves 2.36 mrad in {found}." in section
+    assert none not in section
+    silent = render({"diagnose": {"enabled": False}}, example.content, {}, tmp_path, tmp_path)
+    assert 'id="diagnosis"' not in silent

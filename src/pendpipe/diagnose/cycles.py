@@ -98,8 +98,7 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
     count = int(number.max()) + 1
 
     def total(values: FloatArray) -> FloatArray:
-        sums = np.bincount(number, weights=weight * values, minlength=count)
-        return np.asarray(sums, dtype=np.float64)
+        return np.bincount(number, weights=weight * values, minlength=count).astype(np.float64)
 
     size = total(parts[0])
     # The middle of a cycle is a turning point of the model, where all about it is known.

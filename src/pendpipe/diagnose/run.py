@@ -86,6 +86,8 @@ def diagnose_recording(
     )  # fmt: skip
 
 
+# Trials far from any motion overflow; they are looked at, and thrown away.
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def diagnose_decay(
     part: Recording, points: Any, *, baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None, seed: int = 0, level: float = LEVEL,

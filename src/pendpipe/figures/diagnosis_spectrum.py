@@ -102,9 +102,9 @@ def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     interval = float(time[-1] - time[0]) / (count - 1)
     window = np.hanning(count)
     lines = np.fft.rfft((residual - np.mean(residual)) * window)
-    density = 2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2)
-    frequency = np.asarray(np.fft.rfftfreq(count, interval), dtype=np.float64)
-    return _banded(frequency[2:-1], density[2:-1])
+    density = np.asarray(2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2), dtype=np.float64)
+    frequency = np.fft.rfftfreq(count, interval)
+    return _banded(np.asarray(frequency[2:-1], dtype=np.float64), density[2:-1])
 
 
 def _banded(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,66 @@
+"""Values of a model that is far from the readings, from a window that grows.
+
+Over a whole record at large amplitude the phase of a wrong start is off by many turns, and no
+step of Gauss and Newton finds back. Over the first cycles it is not: there the model is
+fitted, then over more and more of the record, each time from where the last one ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.model import OMEGA, Model
+from pendpipe.diagnose.noise import white_noise
+from pendpipe.diagnose.refine import refine
+
+_FIRST: Final = 4
+"""Cycles of the first window."""
+_GROWTH: Final = 1.6
+_ROUNDS: Final = 8
+
+
+def grown(
+    model: Model, data: Data, noise_rms: float, start: FloatArray, *, held: Iterable[int] = ()
+) -> FloatArray:
+    """Fit the beginning of a record, then more and more of it.
+
+    Parameters
+    ----------
+    model
+        The baseline with effects.
+    data
+        All readings.
+    noise_rms
+        Standard deviation of one.
+    start
+        Values that are right for the first cycles at least (from turning points).
+    held
+        Indices of what is not fitted.
+
+    Returns
+    -------
+    FloatArray
+        Values from which the whole record can be fitted, shape (size,).
+
+    Raises
+    ------
+    NoMotionError
+        If the model can't be evaluated over the first cycles.
+    """
+    value = np.asarray(start, dtype=np.float64)
+    fixed = tuple(held)
+    count = int(_FIRST * 2.0 * np.pi / value[OMEGA] / data.interval_s)
+    while count < len(data):
+        part = data.first(count)
+        short = replace(model, time_s=part.time_s, _last={})
+        value = refine(
+            short, part, white_noise(part, noise_rms), value, held=fixed, rounds=_ROUNDS
+        ).value
+        count = int(_GROWTH * count)
+    return value

@@ -1,0 +1,189 @@
+"""The figures of a diagnosis show where the readings and the models differ."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe.diagnose import diagnose_recording
+from pendpipe.diagnose.cycles import cycles
+from pendpipe.figures import (
+    diagnosis_codes,
+    diagnosis_curve,
+    diagnosis_cycles,
+    diagnosis_map,
+    diagnosis_spectrum,
+)
+from pendpipe.figures.data import NothingToDrawError
+from pendpipe.figures.diagnosis import draw_diagnosis
+from pendpipe.figures.diagnosis_data import Shown, shown
+from pendpipe.recording import Recording
+
+FREQUENCY_HZ, LINEAR, AMPLITUDE, NOISE_RAD = 0.9, 0.012, 0.25, 1e-4
+OMEGA = 2.0 * math.pi * FREQUENCY_HZ
+TIME_S = np.arange(1500) / 15.0
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Any:
+    """The diagnosis of a pendulum with circular error, integrated by scipy."""
+
+    def rate(_: float, state: np.ndarray) -> list[float]:
+        x, v = state
+        return [v, -OMEGA * OMEGA * math.sin(x) - 2.0 * LINEAR * v]
+
+    solved = solve_ivp(
+        rate, (0.0, TIME_S[-1]), [AMPLITUDE, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
+    )
+    noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
+    return diagnose_recording(Recording(TIME_S, solved.y[0] + noise, "angle_rad"))
+
+
+@pytest.fixture(scope="module")
+def content(outcome: Any) -> Shown:
+    return shown(outcome)
+
+
+def test_the_frequency_of_the_readings_is_that_of_a_real_pendulum(content: Shown) -> None:
+    """The frequency is f0 (1 - A^2/16); at 0.25 rad the next term is 1e-5 of it."""
+    spans = content.measured
+    expected = FREQUENCY_HZ * (1.0 - spans.amplitude**2 / 16.0)
+    pull = (spans.frequency_hz - expected) / spans.frequency_sd_hz
+    assert len(pull) > 10
+    assert np.sqrt(np.mean(pull**2)) < 2.0
+    assert spans.frequency_hz[0] - FREQUENCY_HZ < -1e-3
+
+
+def test_the_loss_of_the_readings_is_the_viscous_rate(content: Shown) -> None:
+    spans = content.measured
+    pull = (spans.loss - LINEAR) / spans.loss_sd
+    assert np.sqrt(np.mean(pull**2)) < 2.0
+
+
+def test_a_model_on_its_own_clock_has_its_own_amplitude_and_phase(content: Shown) -> None:
+    at = content.baseline.at
+    own = cycles(at.reading, content.data.weight, at, 0.0)
+    assert np.diff(own.phase) == pytest.approx(2.0 * math.pi, abs=1e-6)
+    expected = np.interp(own.time_s, at.sampled.time_s, at.sampled.amplitude)
+    assert own.amplitude == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:
+    (axes,) = diagnosis_cycles.draw_frequency(content).axes
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["Eq. 8", "with circular-error", "readings"]
+    flat, bent = (line.get_ydata() for line in axes.lines[1:3])
+    points = axes.containers[0][0].get_ydata()
+    assert np.ptp(flat) < 0.05 * np.ptp(bent)
+    assert np.std(points - bent) < 0.1 * np.std(points - flat)
+    assert "Hz" in axes.get_ylabel()
+
+
+def test_the_figure_of_the_damping_shows_losses_less_the_baselines(content: Shown) -> None:
+    upper, lower = diagnosis_cycles.draw_damping(content).axes
+    assert "1/Q" in upper.get_ylabel()
+    assert lower.lines[1].get_ydata() == pytest.approx(0.0, abs=1e-9)
+    expected = 2e3 * LINEAR / OMEGA
+    assert np.median(upper.containers[0][0].get_ydata()) == pytest.approx(expected, rel=0.01)
+
+
+def test_the_map_is_loud_before_and_quiet_after(content: Shown) -> None:
+    before = diagnosis_map.residual_map(content, content.baseline)
+    assert content.extended is not None
+    after = diagnosis_map.residual_map(content, content.extended)
+    assert np.nanmax(np.abs(before)) > 50.0
+    assert np.nanstd(after) == pytest.approx(1.0, abs=0.15)
+    # A phase that runs away shows where the velocity is largest, not at the turning points.
+    rows = np.nanmean(before**2, axis=1)
+    quarter = diagnosis_map.PHASES // 4
+    assert rows[quarter] > 10.0 * rows[0]
+
+
+def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:
+    """White noise of rms s, read every dt: s sqrt(2 dt)."""
+    assert content.extended is not None
+    frequency, density = diagnosis_spectrum.spectrum(content, content.extended)
+    expected = NOISE_RAD * math.sqrt(2.0 * content.data.interval_s)
+    upper = frequency > 1.0
+    assert np.sqrt(np.mean(density[upper] ** 2)) == pytest.approx(expected, rel=0.06)
+    level = diagnosis_spectrum.noise_level(content, frequency)
+    assert level == pytest.approx(expected, rel=0.06)
+
+
+def test_the_spectrum_of_a_tone_stands_at_its_frequency(content: Shown) -> None:
+    at, time = content.baseline.at, content.data.time_s
+    tone = np.sin(2.0 * math.pi * 3.3 * time)
+    loud = replace(content, data=replace(content.data, values=at.reading + tone, lattice=None))
+    frequency, density = diagnosis_spectrum.spectrum(loud, content.baseline)
+    assert frequency[np.argmax(density)] == pytest.approx(3.3, abs=0.05)
+
+
+def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> None:
+    content = shown(outcome)
+    for module in (diagnosis_curve, diagnosis_codes):
+        with pytest.raises(NothingToDrawError):
+            module.draw(content)
+    drawn = draw_diagnosis(outcome, tmp_path)
+    assert [path.stem for path in drawn] == [
+        "residual_map", "residual_spectrum", "damping", "frequency",
+    ]  # fmt: skip
+    for path in drawn:
+        words = "".join(ET.parse(path).getroot().itertext())
+        assert "Eq. 8" in words
+        assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+
+
+def curve(**more: Any) -> dict[str, Any]:
+    at = np.geomspace(0.02, 0.2, 20)
+    return {
+        "argument": "amplitude, rad", "ordinate": "extra loss rate, 1/s", "at": at,
+        "value": 1e-3 * at, "sd": np.full(20, 1e-4), **more,
+    }  # fmt: skip
+
+
+def named(outcome: Any, found: dict[str, Any]) -> Shown:
+    content = shown(outcome)
+    effect = replace(content.diagnosis.effects[0], identifier="unnamed-damping", curve=found)
+    return replace(content, diagnosis=replace(content.diagnosis, effects=(effect,)))
+
+
+def test_an_unnamed_effect_is_drawn_with_its_95_percent_band(outcome: Any) -> None:
+    (axes,) = diagnosis_curve.draw(named(outcome, curve())).axes
+    band = axes.collections[0].get_paths()[0].vertices
+    assert np.ptp(band[np.isclose(band[:, 0], 20.0), 1]) == pytest.approx(2 * 1.96e-4)
+    assert axes.get_xlabel() == "Amplitude (mrad)"
+    assert axes.get_ylabel() == "Extra loss rate (s⁻¹)"
+
+
+def test_a_loss_has_its_local_exponent_below(outcome: Any) -> None:
+    found = curve(local_exponent=np.full(20, 1.5), local_exponent_sd=np.full(20, 0.1))
+    _, lower = diagnosis_curve.draw(named(outcome, found)).axes
+    assert lower.lines[0].get_ydata() == pytest.approx(1.5)
+    assert "exponent" in lower.get_ylabel()
+
+
+def test_codes_are_counted_where_they_matter(outcome: Any) -> None:
+    content = shown(outcome)
+    step = 5e-3
+    values = step * np.round(content.data.values / step)
+    clipped = np.minimum(values, 20 * step)
+    effect = replace(content.diagnosis.effects[0], identifier="clipping")
+    content = replace(
+        content,
+        data=replace(content.data, values=clipped, step=step, lattice=None),
+        diagnosis=replace(content.diagnosis, effects=(effect,)),
+    )
+    (axes,) = diagnosis_codes.draw(content).axes
+    heights = [bar.get_height() for bar in axes.patches]
+    assert sum(heights) == len(clipped)
+    top = round((20 * step - clipped.min()) / step)
+    assert heights[top] == np.count_nonzero(clipped == 20 * step)
+    expected = axes.lines[0].get_ydata()
+    assert max(heights) > 2 * max(expected)
