@@ -176,7 +176,8 @@ def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | N
     """The 95 % interval of an effect's parameter of that unit."""
     from pendpipe.diagnose.values import effect_parameters
 
-    for found in effect_parameters(fit, effect).values():
+    # The instant and the frequency stand behind the sizes.
+    for found in reversed(effect_parameters(fit, effect).values()):
         if found.unit == unit:
             return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
     return None

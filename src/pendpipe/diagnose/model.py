@@ -229,6 +229,11 @@ class Model:
             if delay is not None:
                 times = times + delay
         sampled = sample_pieces(pieces, times)
+        turned = sampled.phase[[0, -1]]
+        if not np.all(np.isfinite(sampled.phase)) or np.ptp(turned) > 4.0 * np.pi * len(
+            motion.time_s
+        ):
+            raise NoMotionError("the readings' clock is out of reach")
         pendulum = self.pendulum(value)
         reading = value[OFFSET] + self._averaging(value) * sampled.angle
         for effect, place in self.places():

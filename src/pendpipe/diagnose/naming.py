@@ -15,6 +15,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, Lead
 from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
@@ -24,6 +25,10 @@ CLASS: Final = 6.0
 _MOST: Final = 9
 _NEAR: Final = 16.0
 _ALIKE: Final = 0.98
+_LOST: Final = 1.0
+"""Phase in rad from which a model has lost the motion."""
+_FROM_AFAR: Final = 4
+"""How many leads are then followed from the first cycles on."""
 _MUCH: Final = 0.5
 """Part of the best gain that a name must explain to go before a curve."""
 
@@ -58,12 +63,14 @@ class Rival:
 
 def refit_leads(
     base: Fit, data: Data, noise: Noise, detection: Detection, *, held: Sequence[int],
-    gross: bool, most: int = _MOST,
+    gross: bool, origin: FloatArray, most: int = _MOST,
 ) -> list[Rival]:  # fmt: skip
     """Refit the leading effects nonlinearly; the best first."""
-    fits = []
+    fits: list[tuple[Lead, Fit]] = []
     for lead in _worth_refitting(detection, gross, most):
         fit = _refitted(base, data, noise, lead, held)
+        if base.slip_rad > _LOST and len(fits) < _FROM_AFAR:
+            fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
         if fit is not None:
             fits.append((lead, fit))
     if not fits:
@@ -147,6 +154,30 @@ def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[in
         return refine(base.model.adding(effect), data, noise, start, held=held)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
+
+
+def _from_afar(
+    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], origin: FloatArray
+) -> Fit | None:
+    """Refit from the first cycles on, where the base has lost the phase."""
+    effect = lead.effect
+    if isinstance(effect, FreedParameter) or effect.kind == "unnamed":
+        return None
+    sizes = np.ones(1) if effect.switch else np.zeros(effect.sizes)
+    known = base.value[len(origin) :]
+    start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
+    model = base.model.adding(effect)
+    try:
+        value = grown(model, data, noise.white_rms, start, held=held)
+        return refine(model, data, noise, value, held=held)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+
+
+def _better(one: Fit | None, other: Fit | None) -> Fit | None:
+    if one is None or other is None:
+        return one or other
+    return one if one.chi2 <= other.chi2 else other
 
 
 def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection, detect, prepare
@@ -32,7 +33,7 @@ _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
 _DOUBT: Final = 10.0
 """By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
-_PART: Final = 0.3
+_PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
@@ -130,6 +131,7 @@ class _State:
     data: Data
     noise: Noise
     holding: list[int]
+    origin: FloatArray
     steps: list[Step] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     first: Detection | None = None
@@ -144,7 +146,7 @@ def search(
     data, held = beginning.data, beginning.held
     progress(f"fitting {baseline} to {data.used} readings")
     fit = refine(beginning.model, data, first_noise(beginning), beginning.value, held=held)
-    state = _State(*settled(fit, data, first_noise(beginning), held), list(held))
+    state = _State(*settled(fit, data, first_noise(beginning), held), list(held), beginning.value)
     start = state.fit.value
     forensics = Forensics(samples, level)
     while len(state.steps) < _MOST:
@@ -181,7 +183,13 @@ def _add_one(
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
     rivals = refit_leads(
-        state.fit, state.data, state.noise, state.now, held=state.holding, gross=gross
+        state.fit,
+        state.data,
+        state.noise,
+        state.now,
+        held=state.holding,
+        gross=gross,
+        origin=state.origin,
     )
     if not gross and rivals and kicked_at_random(state, rivals[0], forensics, progress):
         return False
@@ -231,7 +239,9 @@ def _doubt_redness(
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
     if other.p_value > level * CATALOGUE_SHARE:
         return
-    rivals = refit_leads(fit, data, noise, other, held=state.holding, gross=False, most=3)
+    rivals = refit_leads(
+        fit, data, noise, other, held=state.holding, gross=False, most=3, origin=state.origin
+    )
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
