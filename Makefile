@@ -24,6 +24,7 @@ bench: .venv/installed-bench
 evidence: .venv/installed
 	$(RUN) python -m benchmarks.acquisition
 	$(RUN) python -m benchmarks.evidence
+	$(RUN) python -m benchmarks.diagnosis
 
 # What CI asks besides the tests.
 check: .venv/installed

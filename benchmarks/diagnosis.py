@@ -1,0 +1,174 @@
+"""How often `pendpipe diagnose` is right: nulls, single effects, pairs, and what is outside.
+
+The recordings come from the challenge's generator, which shares no code with what it judges;
+its oracle knows nuisances, noise and catalogue, and pays the same look-elsewhere. Every
+recording's outcome is kept under ``.evidence/diagnosis.jsonl``, so that a run can be broken
+off and taken up; `python -m benchmarks.diagnosis` makes what is missing and writes the table
+to ``docs/diagnosis.md``. ``--part 0.1`` makes a tenth of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Iterator
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
+PAGE: Final = Path("docs/diagnosis.md")
+MARK: Final = "These tables are made by `make evidence`."
+EFFECTS: Final = (
+    "circular-error", "cubic-stiffness", "quadratic-stiffness", "power-law-damping",
+    "stribeck-friction", "presliding-friction", "second-mode", "plane-coupling",
+    "periodic-drive", "frequency-drift", "damping-drift", "equilibrium-creep",
+    "equilibrium-step", "impulse", "sensor-quadratic", "sensor-cubic", "offset-drift",
+    "tone-pickup", "jitter", "glitches",
+)  # fmt: skip
+SIZES: Final = (9.0, 16.0, 25.0, 50.0, 100.0)
+PAIRS: Final = (
+    ("cubic-stiffness", "tone-pickup"), ("cubic-stiffness", "frequency-drift"),
+    ("quadratic-stiffness", "offset-drift"), ("sensor-cubic", "circular-error"),
+    ("equilibrium-step", "second-mode"), ("sensor-quadratic", "impulse"),
+)  # fmt: skip
+
+
+class Case(NamedTuple):
+    """One recording to be made and diagnosed."""
+
+    family: str
+    names: tuple[str, ...]
+    size: float
+    number: int
+
+    @property
+    def key(self) -> str:
+        """What it is known by in the journal."""
+        return f"{self.family}:{'+'.join(self.names)}:{self.size:g}:{self.number}"
+
+
+def cases(part: float) -> Iterator[Case]:
+    """All recordings of the evidence, or a part of each kind."""
+    from pendpipe.challenge.items import outside_names
+
+    def numbers(whole: int) -> range:
+        return range(max(1, round(part * whole)))
+
+    for number in numbers(1000):
+        yield Case("null", (), 0.0, number)
+    for number in numbers(20):
+        for name in EFFECTS:
+            for size in SIZES:
+                yield Case("single", (name,), size, number)
+    for number in numbers(20):
+        for pair in PAIRS:
+            yield Case("pair", pair, 400.0, number)
+        for name in outside_names():
+            yield Case("outside", (name,), 200.0, number)
+
+
+def made(case: Case) -> Any:
+    """Make a recording, with its truth."""
+    from pendpipe.challenge.items import make_null, make_outside, make_pair, make_single
+
+    seed = [case.number, round(case.size), *map(ord, case.family + "".join(case.names))]
+    random = np.random.default_rng(seed)
+    if case.family == "null":
+        return make_null(random)
+    if case.family == "single":
+        return make_single(random, case.names[0], case.size, oracle=True)
+    if case.family == "pair":
+        return make_pair(random, *case.names, (case.size, case.size))
+    return make_outside(random, case.names[0], case.size)
+
+
+def diagnosed(case: Case) -> dict[str, Any]:
+    """Make and diagnose one recording."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    import tempfile
+
+    from pendpipe.challenge.recordings import write_recording
+    from pendpipe.diagnose.run import diagnose_recording
+    from pendpipe.dynamics.any_law import NoMotionError
+    from pendpipe.errors import InputError
+    from pendpipe.recording import read_plain
+
+    entry: dict[str, Any] = {"key": case.key, "family": case.family, "names": case.names,
+                             "size": case.size}  # fmt: skip
+    try:
+        item = made(case)
+    except ValueError as fault:
+        return {**entry, "not_made": str(fault)}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "recording.csv")
+        write_recording(path, item.scenario, item.codes)
+        recording = read_plain(path).as_motion()
+    began = time.process_time()
+    try:
+        found = diagnose_recording(
+            recording, baseline=item.truth["baseline"], seed=case.number
+        ).diagnosis
+    except (InputError, NoMotionError) as fault:
+        return {**entry, "refused": str(fault)}
+    oracle = item.truth.get("oracle") or {}
+    return {
+        **entry,
+        "cpu_s": time.process_time() - began,
+        "p_value": found.p_value,
+        "effects": [
+            [effect.identifier, effect.probability, [name for name, _ in effect.indistinguishable]]
+            for effect in found.effects
+        ],
+        "right": [[each["effect"], *(each.get("also") or [])] for each in item.truth["effects"]],
+        "oracle": {name: oracle.get(name) for name in ("detected", "named", "class")},
+    }
+
+
+def run(part: float, processes: int) -> list[dict[str, Any]]:
+    """Make what is missing; return all outcomes."""
+    JOURNAL.parent.mkdir(exist_ok=True)
+    known = {}
+    if JOURNAL.exists():
+        for line in JOURNAL.read_text(encoding="utf-8").splitlines():
+            entry = json.loads(line)
+            known[entry["key"]] = entry
+    wanted = list(cases(part))
+    todo = [case for case in wanted if case.key not in known]
+    with Pool(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
+        for done, entry in enumerate(pool.imap_unordered(diagnosed, todo), start=1):
+            known[entry["key"]] = entry
+            journal.write(json.dumps(entry, default=float) + "\n")
+            journal.flush()
+            if done % 20 == 0:
+                print(f"{done} of {len(todo)}", flush=True)
+    return [known[case.key] for case in wanted if case.key in known]
+
+
+def main() -> None:
+    """Run and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--part", type=float, default=1.0)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--table", action="store_true", help="write the table of what there is")
+    arguments = parser.parse_args()
+    from benchmarks.diagnosis_table import table
+
+    if arguments.table:
+        lines = JOURNAL.read_text(encoding="utf-8").splitlines()
+        outcomes = list({entry["key"]: entry for entry in map(json.loads, lines)}.values())
+    else:
+        outcomes = run(arguments.part, arguments.processes)
+    text = table(outcomes)
+    print(text)
+    page = PAGE.read_text(encoding="utf-8")
+    head = page[: page.index(MARK) + len(MARK)]
+    PAGE.write_text(f"{head}\n\n{text}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""The table of `benchmarks.diagnosis`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Outcome = dict[str, Any]
+
+
+def share(hits: int, count: int) -> str:
+    """A rate with its 95 % interval (Clopper and Pearson)."""
+    if count == 0:
+        return "-"
+    from scipy.stats import binomtest
+
+    low, high = binomtest(hits, count).proportion_ci(0.95, "exact")
+    return f"{hits}/{count} = {100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """All figures, as Markdown."""
+    done = [entry for entry in outcomes if "p_value" in entry]
+    refused = [entry for entry in outcomes if "refused" in entry]
+    not_made = [entry for entry in outcomes if "not_made" in entry]
+    cpu = sorted(entry["cpu_s"] for entry in done)
+    head = [
+        f"{len(done)} recordings of at most 4000 readings were diagnosed, {len(refused)} refused"
+        f" as not analysable, {len(not_made)} could not be made at the size asked."
+        f" CPU: median {cpu[len(cpu) // 2]:.1f} s, largest {cpu[-1]:.1f} s."
+    ]
+    parts = [_nulls(done), _detection(done), _naming(done), _pairs(done), _outside(done)]
+    return "\n\n".join([*head, *(part for part in parts if part)])
+
+
+def _of(done: Sequence[Outcome], family: str) -> list[Outcome]:
+    return [entry for entry in done if entry["family"] == family]
+
+
+def _named(entry: Outcome) -> list[list[str]]:
+    """The class of each effect that was reported, the leader first."""
+    return [[name, *rest] for name, _, rest in entry["effects"]]
+
+
+def _nulls(done: Sequence[Outcome]) -> str:
+    nulls = _of(done, "null")
+    alarms = [entry for entry in nulls if entry["effects"]]
+    names = ", ".join(sorted({entry["effects"][0][0] for entry in alarms}))
+    return f"**False alarms** at 1 % nominal: {share(len(alarms), len(nulls))}" + (
+        f"; accused were {names}." if alarms else "."
+    )
+
+
+def _detection(done: Sequence[Outcome]) -> str:
+    singles = _of(done, "single")
+    rows = ["| Delta chi^2 | detected | oracle | class right | oracle | first | oracle |",
+            "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for size in sorted({entry["size"] for entry in singles}):
+        part = [entry for entry in singles if entry["size"] == size]
+        counts = [sum(test(entry) for entry in part) for test in
+                  (_found, _oracle_found, _class, _oracle_class, _first, _oracle_first)]  # fmt: skip
+        cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
+        rows.append(f"| {size:g} ({len(part)}) | {cells} |")
+    return "**Single effects**\n\n" + "\n".join(rows) if singles else ""
+
+
+def _found(entry: Outcome) -> bool:
+    return bool(entry["effects"])
+
+
+def _oracle_found(entry: Outcome) -> bool:
+    return bool(entry["oracle"]["detected"])
+
+
+def _class(entry: Outcome) -> bool:
+    right = set(entry["right"][0])
+    return any(right & set(names) for names in _named(entry)[:1])
+
+
+def _first(entry: Outcome) -> bool:
+    return bool(entry["effects"]) and entry["effects"][0][0] in entry["right"][0]
+
+
+def _oracle_class(entry: Outcome) -> bool:
+    right = set(entry["right"][0])
+    return _oracle_found(entry) and bool(right & set(entry["oracle"]["class"] or []))
+
+
+def _oracle_first(entry: Outcome) -> bool:
+    return _oracle_found(entry) and entry["oracle"]["named"] in entry["right"][0]
+
+
+def _naming(done: Sequence[Outcome]) -> str:
+    singles = [entry for entry in _of(done, "single") if entry["size"] == 100.0]
+    if not singles:
+        return ""
+    rows = ["| effect | detected | class right | first | class size | oracle's | named instead |",
+            "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for name in sorted({entry["names"][0] for entry in singles}):
+        part = [entry for entry in singles if entry["names"][0] == name]
+        sizes = [len(_named(entry)[0]) for entry in part if entry["effects"]]
+        oracle = [len(entry["oracle"]["class"] or []) for entry in part if _oracle_found(entry)]
+        wrong = sorted({entry["effects"][0][0] for entry in part
+                        if entry["effects"] and not _class(entry)})  # fmt: skip
+        rows.append(
+            f"| {name} | {sum(map(_found, part))}/{len(part)} | {sum(map(_class, part))}"
+            f" | {sum(map(_first, part))} | {_mean(sizes)} | {_mean(oracle)} | {', '.join(wrong)} |"
+        )
+    sizes = [len(_named(entry)[0]) for entry in singles if entry["effects"]]
+    oracle = [len(entry["oracle"]["class"] or []) for entry in singles if _oracle_found(entry)]
+    return (
+        "**Naming at Delta chi^2 = 100**: the class holds the true effect in"
+        f" {share(sum(map(_class, singles)), len(singles))}, it comes first in"
+        f" {share(sum(map(_first, singles)), len(singles))} (the oracle:"
+        f" {sum(map(_oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
+        f" {_mean(oracle)}.\n\n" + "\n".join(rows)
+    )
+
+
+def _mean(values: Sequence[int]) -> str:
+    return f"{sum(values) / len(values):.1f}" if values else "-"
+
+
+def _pairs(done: Sequence[Outcome]) -> str:
+    pairs = _of(done, "pair")
+    if not pairs:
+        return ""
+    both = 0
+    for entry in pairs:
+        named = [set(names) for names in _named(entry)]
+        both += all(any(set(right) & names for names in named) for right in entry["right"])
+    return f"**Two effects at once** (400 each): both found in {share(both, len(pairs))}."
+
+
+def _outside(done: Sequence[Outcome]) -> str:
+    outside = _of(done, "outside")
+    if not outside:
+        return ""
+    unnamed = [entry for entry in outside
+               if any(name.startswith("unnamed") for name, _, _ in entry["effects"])]  # fmt: skip
+    wrong = [entry for entry in outside
+             if any(p > 0.8 and not name.startswith("unnamed") for name, p, _ in entry["effects"])
+             ]  # fmt: skip
+    rows = ["| what | unnamed | confident name | names |", "|---|---|---|---|"]
+    for name in sorted({entry["names"][0] for entry in outside}):
+        part = [entry for entry in outside if entry["names"][0] == name]
+        names = sorted({each[0] for entry in part for each in entry["effects"]})
+        rows.append(
+            f"| {name} | {sum(entry in unnamed for entry in part)}/{len(part)}"
+            f" | {sum(entry in wrong for entry in part)} | {', '.join(names)} |"
+        )
+    return (
+        f"**Outside the catalogue**: unnamed in {share(len(unnamed), len(outside))}; a name given"
+        f" with more than 80 % in {share(len(wrong), len(outside))} (some laws may have a right"
+        " name too).\n\n" + "\n".join(rows)
+    )
