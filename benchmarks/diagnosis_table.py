@@ -57,8 +57,8 @@ def _detection(done: Sequence[Outcome]) -> str:
             "|---|---|---|---|---|---|---|"]  # fmt: skip
     for size in sorted({entry["size"] for entry in singles}):
         part = [entry for entry in singles if entry["size"] == size]
-        counts = [sum(test(entry) for entry in part) for test in
-                  (_found, _oracle_found, _class, _oracle_class, _first, _oracle_first)]  # fmt: skip
+        tests = (_found, _oracle_found, _class, _oracle_class, _first, _oracle_first)
+        counts = [sum(test(entry) for entry in part) for test in tests]
         cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
         rows.append(f"| {size:g} ({len(part)}) | {cells} |")
     return "**Single effects**\n\n" + "\n".join(rows) if singles else ""
