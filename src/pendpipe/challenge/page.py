@@ -55,7 +55,7 @@ def _head(opened: Score, scores: Score) -> Iterator[str]:
     yield ""
     yield "A fresh set from a seed drawn at run time:"
     yield ""
-    yield "    snakemake --cores 2 challenge --config challenge_set=fresh"
+    yield "    PENDPIPE_CHALLENGE_SET=fresh snakemake --cores 2 challenge"
     yield ""
     yield "| | |"
     yield "|---|---|"
