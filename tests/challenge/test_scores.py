@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 from scipy.stats import norm
 
 from pendpipe.challenge import intervals
+from pendpipe.challenge.draw import draw, six_cases
 from pendpipe.challenge.page import page
 from pendpipe.challenge.score import score
+from pendpipe.challenge.solved import read_items
 
 
 def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:
@@ -166,3 +169,17 @@ def test_the_page_says_yes_and_no() -> None:
     assert "| yes |" in text
     assert "item-4 | cubic-stiffness" in text
     assert "(proof/power.svg)" in text
+
+
+def test_six_cases_are_chosen_by_rule_and_all_figures_drawn(tmp_path: Path) -> None:
+    content = opened(
+        (truth("single", K3, 60.0), answer(K3)),
+        (truth("single", "backlash"), answer("backlash")),
+        (truth("single", K3), answer(K3)),
+        (truth("single", "impulse"), answer(K3)),
+        *[(truth("null"), answer())] * 3,
+    )
+    cases = six_cases(read_items(content))
+    assert [item.name for item in cases] == ["item-1", "item-3"]
+    for name in draw(content, score(content), tmp_path):
+        assert (tmp_path / name).read_text(encoding="utf-8").startswith("<?xml")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -38,6 +39,22 @@ report = {
 (answer / "diagnosis.json").write_text(json.dumps({
     "verdict": "consistent", "p_value": 0.5, "effects": [], "report": report,
 }))
+"""
+
+# The released diagnosis, with everything that it opens written into its answer.
+WATCHED = """
+import json, os, sys
+from pathlib import Path
+
+seen = []
+def watch(event, arguments):
+    if event in ("open", "os.listdir", "os.scandir") and isinstance(arguments[0], (str, bytes)):
+        seen.append(os.path.abspath(os.fsdecode(arguments[0])))
+sys.addaudithook(watch)
+from pendpipe.cli import main
+main(["diagnose", "--figures", "none", *sys.argv[1:]])
+path = Path(sys.argv[sys.argv.index("--out") + 1]) / "diagnosis.json"
+path.write_text(json.dumps({**json.loads(path.read_text()), "opened": seen}))
 """
 
 
@@ -87,6 +104,23 @@ def test_the_solver_sees_one_recording_and_no_path_of_the_set(solved: Places) ->
         cwd = Path(content["cwd"])
         assert solved.sealed not in cwd.parents
         assert not cwd.exists()
+
+
+@pytest.mark.slow
+def test_the_released_diagnosis_opens_nothing_of_the_set(solved: Places, tmp_path: Path) -> None:
+    again = tmp_path / "set"
+    (again / "recordings").mkdir(parents=True)
+    manifest = json.loads(solved.manifest.read_text())
+    manifest["items"] = {"item-0001": manifest["items"]["item-0001"]}
+    (again / "manifest.json").write_text(json.dumps(manifest))
+    shutil.copy(solved.recording("item-0001"), again / "recordings")
+    solve_set(again, solver=[sys.executable, "-c", WATCHED])
+    answer = json.loads(answer_path(again, "item-0001").read_text())
+    assert answer["diagnosis"] is not None, answer["stderr"]
+    opened = answer["diagnosis"]["opened"]
+    assert any(path.endswith("recording.csv") for path in opened)
+    for place in (solved.sealed, solved.folder, again):
+        assert not [path for path in opened if path.startswith(str(place))]
 
 
 def test_the_recording_tells_what_a_laboratory_knows_and_no_more(solved: Places) -> None:

@@ -13,11 +13,6 @@ OPEN = f"results/challenge/{CHALLENGE_SET}"
 SEALED = f"results/challenge-sealed/{CHALLENGE_SET}"
 
 
-def option(name, value):
-    """An option of the command line, or nothing."""
-    return "" if value is None else f"--{name} {value}"
-
-
 rule challenge:
     input:
         f"{OPEN}/scores/scores.json",

@@ -69,3 +69,8 @@ def figure_files():
     return expand(
         "{results}/figures/{name}.{form}", results=RESULTS, name=names, form=FORMS
     )
+
+
+def option(name, value):
+    """An option of the command line, or nothing."""
+    return "" if value is None else f"--{name} {value}"

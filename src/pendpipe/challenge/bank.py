@@ -37,7 +37,9 @@ class Shape:
     details
         The motion's other parameters of this shape; those in `free` move in a refit.
     free
-        Names of shape parameters, on a logarithmic scale.
+        Names of shape parameters that a refit may move.
+    step
+        Step of `parameter` for differences.
     """
 
     effect: str
@@ -45,7 +47,7 @@ class Shape:
     parameter: str = ""
     details: tuple[tuple[str, float], ...] = ()
     free: tuple[str, ...] = ()
-    bends: float = 0.0  # whitened, unnormalised size per unit of the parameter
+    step: float = 0.0
 
 
 def laws(bench: Bench) -> Iterator[tuple[str, str, float, dict[str, float], tuple[str, ...]]]:
@@ -99,7 +101,7 @@ def integrated(bench: Bench) -> Iterator[Shape]:
         up = base.changed(**{name: held + step}, **details).run(time).angle_rad
         down = base.changed(**{name: held - step}, **details).run(time).angle_rad
         column = bench.gain * (up - down)[bench.kept] / (2.0 * step)
-        yield from _shape(bench, effect, column, name, details, free)
+        yield from _shape(bench, effect, column, name, details, free, step)
     step = 2e-4 * float(np.abs(bench.track.angle_rad).max())
     moved = base.changed(play=step).run(time).angle_rad - bench.track.angle_rad
     yield from _shape(bench, "backlash", bench.gain * moved[bench.kept] / step, "play")
@@ -167,7 +169,7 @@ def steps(bench: Bench) -> Iterator[tuple[str, FloatArray]]:
 
     def after(places: IntArray, state: FloatArray, more: FloatArray | float) -> FloatArray:
         """H(t - t0)·(response to a change of state at t0, plus more)."""
-        start = np.linalg.solve(motion[places], state[:, :, None])[:, :, 0]
+        start = np.einsum("pij,pj->pi", bench.back[kept][places], state)
         response: FloatArray = motion[:, 0, :] @ start.T + more
         return np.asarray(bench.gain * np.where(time[:, None] >= places, response, 0.0))
 
@@ -189,6 +191,7 @@ def _shape(
     parameter: str = "",
     details: dict[str, float] | None = None,
     free: tuple[str, ...] = (),
+    step: float = 0.0,
 ) -> Iterator[Shape]:
     """Whiten, project, normalise; nothing where the baseline absorbs it."""
     columns = columns.reshape(bench.count, -1)
@@ -203,4 +206,4 @@ def _shape(
     if unit.shape[1] == 2:
         unit = np.linalg.qr(unit)[0]
     pairs = tuple(sorted((details or {}).items()))
-    yield Shape(effect, unit, parameter, pairs, free, float(size[0]))
+    yield Shape(effect, unit, parameter, pairs, free, step)

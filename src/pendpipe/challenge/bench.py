@@ -7,7 +7,7 @@ central differences of the challenge's own integrator.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -97,14 +97,18 @@ class Bench:
         track = point.motion.run(self.scenario.time_s)
         return np.asarray(self.gain * track.angle_rad + point.level_rad)
 
-    def tangent(self, point: Point, names: Sequence[str] | None = None) -> FloatArray:
-        """Sensitivities of the kept readings, a column a parameter (unit: its step)."""
+    def tangent(self, point: Point, more: Mapping[str, float] | None = None) -> FloatArray:
+        """Sensitivities of the kept readings, a column a parameter (unit: its step).
+
+        `more` are torques beside the baseline's, with their steps.
+        """
         columns = []
-        for name in names or self.names:
+        sizes = self.sizes | dict(more or {})
+        for name in (*self.names, *(more or ())):
             if name == "offset":
                 columns.append(np.full(len(self.kept), self.scenario.sd_rad))
                 continue
-            size = self.sizes[name]
+            size = sizes[name]
             up = self.reading(point.moved(name, size))
             down = self.reading(point.moved(name, -size))
             columns.append(0.5 * (up - down))
@@ -124,6 +128,15 @@ class Bench:
             columns.append(_state(up) - _state(down))
             columns[-1] /= 2.0 * size
         return np.stack(columns, axis=2)
+
+    @cached_property
+    def back(self) -> FloatArray:
+        """Inverse of the propagator; nought where the motion has all but died away."""
+        (a, b), (c, d) = self.propagator.transpose(1, 2, 0)
+        determinant = a * d - b * c
+        alive = np.abs(determinant) > 1e-12
+        scale = np.where(alive, 1.0 / np.where(alive, determinant, 1.0), 0.0)
+        return np.asarray(scale[:, None, None] * np.array([[d, -b], [-c, a]]).transpose(2, 0, 1))
 
     def state_change(self, name: str) -> FloatArray:
         """Change of x and v at every sample with one parameter's step, (samples, 2)."""
@@ -146,9 +159,24 @@ class Bench:
         return self.whiten((reading - self.reading(self.truth))[self.kept])
 
     def refit(
-        self, reading: FloatArray, start: Point | None = None, rounds: int = 6
+        self,
+        reading: FloatArray,
+        start: Point | None = None,
+        rounds: int = 6,
+        more: Mapping[str, float] | None = None,
     ) -> tuple[Point, FloatArray, float]:
         """Fit the baseline to a reading by Gauss and Newton.
+
+        Parameters
+        ----------
+        reading
+            Whole record, rad.
+        start
+            Where to begin; the truth if None.
+        rounds
+            Steps at most.
+        more
+            Torques beside the baseline's that are free too, with their steps.
 
         Returns
         -------
@@ -163,8 +191,10 @@ class Bench:
 
         residual = left(point)
         best = float(residual @ residual)
-        units = [self.scenario.sd_rad if n == "offset" else self.sizes[n] for n in self.names]
-        jacobian, fresh = self.whiten(self.tangent(point)), True
+        sizes = self.sizes | {"offset": self.scenario.sd_rad} | dict(more or {})
+        names = (*self.names, *(more or ()))
+        units = [sizes[name] for name in names]
+        jacobian, fresh = self.whiten(self.tangent(point, more)), True
         for _ in range(rounds):
             if not (np.isfinite(best) and np.isfinite(jacobian).all()):
                 return point, residual, float("nan")
@@ -172,7 +202,7 @@ class Bench:
             share, gained = 1.0, 0.0
             while share > 0.02:
                 trial = point
-                for name, unit, by in zip(self.names, units, share * change, strict=True):
+                for name, unit, by in zip(names, units, share * change, strict=True):
                     trial = trial.moved(name, unit * by)
                 found = left(trial)
                 square = float(found @ found)
@@ -183,12 +213,12 @@ class Bench:
             if gained < 1e-3 * best + 1e-3:
                 if fresh:
                     break
-                jacobian, fresh = self.whiten(self.tangent(point)), True
+                jacobian, fresh = self.whiten(self.tangent(point, more)), True
                 continue
             fresh = False
             if share < 1.0 or gained > 0.3 * (best + gained):
                 # Far from straight: the old sensitivities no longer lead down.
-                jacobian, fresh = self.whiten(self.tangent(point)), True
+                jacobian, fresh = self.whiten(self.tangent(point, more)), True
         return point, residual, best
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.challenge.bench import Bench, Point
 from pendpipe.challenge.oracle import Oracle, Verdict
+from pendpipe.challenge.refitted import refitted
 from pendpipe.challenge.registry import kind_of
 from pendpipe.challenge.scenario import Scenario
 from pendpipe.challenge.shifted import shift_score
@@ -60,6 +61,8 @@ def judge(bench: Bench, point: Point, scenario: Scenario, codes: IntArray) -> Ve
     oracle = about(bench, point)
     residual = oracle.bench.residual(angle)
     more = {"dropped-samples": shift_score(bench, angle, residual)}
+    if more["dropped-samples"] == 0.0:
+        more |= refitted(oracle, angle, residual)
     verdict = oracle.judge(residual, codes, more)
     return replace(verdict, whiteness_p=whiteness(oracle.bench.off(residual)))
 

@@ -81,7 +81,7 @@ class Oracle:
         for effect, columns in bank.steps(bench):
             left = bench.off(bench.whiten(columns))
             norms = np.linalg.norm(left, axis=0)
-            known = norms > 1e-7 * norms.max()
+            known = norms > 1e-7 * max(float(norms.max()), 1e-300)
             self.steps.append((effect, left[:, known] / norms[known]))
         self.tones = Tones(bench)
         self.specials = Specials(bench)
@@ -143,7 +143,7 @@ class Oracle:
         codes
             The converter's codes, for its own faults.
         more
-            Scores found in other ways.
+            Scores found in other ways, by refits for example.
         """
         scores = {name: float(u[0]) for name, u in self.scores(residual[:, None]).items()}
         if codes is not None:
@@ -156,7 +156,8 @@ class Oracle:
                 share = scenario.sd_rad**2 / (scenario.noise.white_sd**2 + coarse**2)
                 scores = {name: value * share for name, value in scores.items()}
             scores |= of_codes
-        scores |= more or {}
+        for name, value in (more or {}).items():
+            scores[name] = max(value, scores.get(name, 0.0))
         threshold, by_effect = self.levels()
         by_effect = {name: by_effect.get(name, threshold) for name in scores}
         ranking = ranked(scores)

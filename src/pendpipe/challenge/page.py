@@ -37,7 +37,8 @@ def page(opened: Score, scores: Score, figures: list[str], folder: str) -> str:
     figures, folder
         Names of the drawn figures, and where they lie beside the page.
     """
-    parts = [_head(opened, scores), _promises(scores), _detection(scores), _naming(scores)]
+    parts = [_head(opened, scores), _promises(scores), _rules(), _detection(scores)]
+    parts += [_naming(scores)]
     parts += [_families(scores), _rest(scores), _missed(opened), _cases(opened)]
     lines = [line for part in parts for line in part]
     lines += ["## Figures", ""]
@@ -55,7 +56,7 @@ def _head(opened: Score, scores: Score) -> Iterator[str]:
     yield ""
     yield "A fresh set from a seed drawn at run time:"
     yield ""
-    yield "    snakemake --cores 2 challenge --config challenge_set=fresh"
+    yield "    PENDPIPE_CHALLENGE_SET=fresh snakemake --cores 2 challenge"
     yield ""
     yield "| | |"
     yield "|---|---|"
@@ -65,6 +66,26 @@ def _head(opened: Score, scores: Score) -> Iterator[str]:
     families = ", ".join(f"{count} {name}" for name, count in sorted(scores["families"].items()))
     yield f"| families | {families} |"
     yield f"| without a diagnosis | {len(scores['unsolved'])} |"
+    yield ""
+
+
+def _rules() -> Iterator[str]:
+    """How the answers are judged, laid down before any was seen."""
+    yield "## How it is judged"
+    yield ""
+    yield "- Δχ² is what is left, squared and whitened with the true noise, of the effect's"
+    yield "  change of a noise-free reading after the baseline was fitted anew; samples about a stop"
+    yield "  are left out. For random effects and codes it is the expected 2 ln L."
+    yield "- Nulls are Eq. 8 with 12 and 16 bits, stops, heavy-tailed noise, and in half of them"
+    yield "  noise that is red below 0.05 Hz. Calling red noise `coloured-noise` is no false alarm,"
+    yield "  since it is true; any other name is one, `glitches` for heavy tails too."
+    yield "- A class is the first name with what the answer calls indistinguishable from it; the"
+    yield "  oracle's are the names whose likelihood is within exp(-3) of its best."
+    yield "- An item without a diagnosis counts as not detected and not named."
+    yield "- Outside the catalogue a name is right if it is `unnamed-...` of the hidden kind, and"
+    yield "  confident above a probability of 0.8. Items are sized by what the best catalogue entry"
+    yield "  leaves; naming is asked where that is above 70."
+    yield "- A changed real recording is compared with its unchanged twin."
     yield ""
 
 

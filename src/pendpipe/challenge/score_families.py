@@ -39,20 +39,18 @@ def outside(items: list[Solved]) -> dict[str, Any]:
     def unnamed(item: Solved) -> bool:
         return item.effect["effect"] in item.answer.names
 
+    def wrong(item: Solved) -> bool:
+        named = item.answer.detected and not item.answer.lead.startswith("unnamed-")
+        return named and item.answer.probability > CONFIDENT
+
     return {
         "detected": intervals.of([item.answer.detected for item in items]),
         "unnamed_of_the_right_kind": intervals.of([unnamed(i) for i in large]),
         "unnamed_of_any_kind": intervals.of(
             [any(n.startswith("unnamed-") for n in i.answer.names) for i in large]
         ),
-        "confident_wrong_names": intervals.of(
-            [
-                i.answer.detected
-                and not i.answer.lead.startswith("unnamed-")
-                and i.answer.probability > CONFIDENT
-                for i in items
-            ]
-        ),
+        "confident_wrong_names": intervals.of([wrong(i) for i in items]),
+        "confident_wrong_names_of_large_ones": intervals.of([wrong(i) for i in large]),
         "named": dict(Counter(i.answer.lead for i in items if i.answer.detected)),
     }
 

@@ -22,7 +22,7 @@ from pendpipe.errors import InputError
 from pendpipe.files import read_json, write_json
 
 SOLVER: Final = (sys.executable, "-m", "pendpipe.cli", "diagnose", "--figures", "none")
-PATIENCE_S: Final = 300.0
+PATIENCE_S: Final = 600.0
 PASSED_ON: Final = (
     "PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "SYSTEMROOT", "PYTHONPATH", "NUMBA_CACHE_DIR",
     "XDG_CACHE_HOME", "LOCALAPPDATA", "VIRTUAL_ENV",
