@@ -9,8 +9,8 @@ NODE_SIZE = 360
 """Of the workspace of one panel; see `panel.py`."""
 HEAD = 2
 """The first numbers of a half cycle's row; see `half_cycle.py`."""
-MOST_POINTS = 18
-"""Half cycles in a table."""
+FEW_POINTS, MOST_POINTS = 12, 18
+"""Half cycles in a table: multiples of six (see `table.look_up`)."""
 MOST_PANELS = 4
 """Panels to a half cycle in a table."""
 DESCRIPTION = 6
@@ -37,7 +37,7 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    return NODE_SIZE + 4 + 6 * s + matrices + 4 * MOST_POINTS + DESCRIPTION + THETA
+    return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA
 
 
 def inputs_size(directions: int) -> int:

@@ -14,6 +14,7 @@ from pendpipe.dynamics.table import (
     HIGH,
     LOW,
     MORE_PANELS,
+    NARROWEST,
     PANELS,
     SMOOTH_FROM,
     WIDEST,
@@ -67,7 +68,7 @@ def _lay_out(
         room = min(room, log_y - math.log(SMOOTH_FROM * work.shape[0]))
     count, span = half_cycles_and_span(work.shape, log_y, half_cycles, room)
     panels = int(wanted[0])
-    while count > 1.5 * points_for(span):
+    while count > 1.5 * points_for(span) and span >= NARROWEST:
         outcome = build(work, log_y, span, panels, polynomials)
         if outcome == DONE:
             wanted[0] = panels

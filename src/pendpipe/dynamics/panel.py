@@ -162,7 +162,7 @@ def solve(
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = _renew(node, half_width)
         # The error left is the change times the rate at which changes shrink, once that is known.
-        if change <= 1e-13 * size or change * change <= 1e-13 * size * before:
+        if change <= 1e-12 * size or change * change <= 1e-12 * size * before:
             return _finish(node, shape, radius, half_width, tolerance)
         before = change
     return False

@@ -53,7 +53,6 @@ class Work(NamedTuple):
     """The half cycle in hand; see `half_cycle.py`."""
     rows: FloatArray
     """The half cycles that a table is made of, and one row of scratch."""
-    cosines: FloatArray
     segment: FloatArray
     """What the table spans; see `table.py`."""
     table: FloatArray
@@ -96,12 +95,11 @@ def carve(
         matrix(rest, points + 1, width),
         rest[(points + 1) * width :],
     )
-    cosines, rest = rest[: 4 * points], rest[4 * points :]
     segment, rest = rest[:DESCRIPTION], rest[DESCRIPTION:]
     table, rest = matrix(rest, points, width), rest[points * width :]
     total, rest = matrix(rest, s + 2, n), rest[(s + 2) * n :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
-        columns, chebyshev, amplitude, clock, row, rows, cosines, segment, table, total,
+        columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
         rest[:THETA], rest[THETA:],
     )  # fmt: skip
