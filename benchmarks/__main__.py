@@ -11,7 +11,9 @@ def main() -> None:
     """Run those named, or all that there are: modules of this package with a ``main``."""
     here = Path(__file__).parent
     there = [
-        name for name in ("engine", "estimators", "workflow") if (here / f"{name}.py").exists()
+        name
+        for name in ("engine", "estimators", "long_record", "workflow")
+        if (here / f"{name}.py").exists()
     ]
     for name in sys.argv[1:] or there:
         print(f"\n## {name}\n", flush=True)

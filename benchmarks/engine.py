@@ -10,17 +10,16 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
-import statistics
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from benchmarks import peers_engine as peers
+from benchmarks.table import Row, at_least, at_most, cpu_seconds, write
 from pendpipe.dynamics import (
     Eq8,
     Release,
@@ -44,51 +43,9 @@ turning_points(Eq8(3.0, viscous=0.01), Release(0.0, 0.1), count=100)
 """
 
 
-@dataclass(frozen=True)
-class Row:
-    """A measured figure beside its goal.
-
-    Parameters
-    ----------
-    what
-        What was measured.
-    value, unit
-        The figure.
-    goal
-        ``">= 30"`` or ``"<= 0.5"``.
-    """
-
-    what: str
-    value: float
-    unit: str
-    goal: str
-
-    @property
-    def met(self) -> bool:
-        """Whether the goal is met."""
-        relation, bound = self.goal.split()
-        return self.value >= float(bound) if relation == ">=" else self.value <= float(bound)
-
-
 def rows(rounds: int = 15) -> list[Row]:
     """Measure everything."""
     return [*_speeds(rounds), *_accuracies(), _first_call(rounds)]
-
-
-def _medians(
-    contenders: dict[str, tuple[Callable[[], object], int]], rounds: int
-) -> dict[str, float]:
-    """Return the median time of each contender (with its number of calls a round), s."""
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    for run, _ in contenders.values():
-        run()
-    for _ in range(rounds):
-        for name, (run, calls) in contenders.items():
-            for _ in range(calls):
-                begin = time.perf_counter()
-                run()
-                times[name].append(time.perf_counter() - begin)
-    return {name: statistics.median(values) for name, values in times.items()}
 
 
 def _speeds(rounds: int) -> list[Row]:
@@ -107,21 +64,27 @@ def _speeds(rounds: int) -> list[Row]:
     if importlib.util.find_spec("heyoka"):
         contenders["heyoka"] = (peers.heyoka_turning_points(MODEL, START.angle_rad, END_S), 4)
         contenders["heyoka grid"] = (peers.heyoka_samples(MODEL, START.angle_rad, SAMPLES), 2)
-    t = _medians(contenders, rounds)
+    t = cpu_seconds(contenders, rounds)
     slow = peers.solve_ivp_turning_points(MODEL, START.angle_rad, count)
-    t["solve_ivp"] = _medians({"solve_ivp": (slow, 1)}, 3)["solve_ivp"]
+    t["solve_ivp"] = cpu_seconds({"solve_ivp": (slow, 1)}, 3)["solve_ivp"]
     found = [
         Row(
-            "turning points (map) over solve_ivp DOP853", t["solve_ivp"] / t["map"], "x", ">= 10000"
+            f"time for {count} turning points: map, clock",
+            f"{1e6 * t['map']:.1f} us, {1e6 * t['clock']:.0f} us",
         ),
-        Row("32768 samples, time over one np.cos", t["samples"] / t["cos"], "x", "<= 0.5"),
-        Row("samples and 7-column Jacobian over np.cos", t["jacobian"] / t["cos"], "x", "<= 3"),
+        at_least("turning points, map over `solve_ivp` DOP853", t["solve_ivp"] / t["map"], 1e4),
+        at_most("32768 samples over one `np.cos` of them", t["samples"] / t["cos"], 0.5),
+        at_most("samples and 7-column Jacobian over one `np.cos`", t["jacobian"] / t["cos"], 3.0),
     ]
     if "heyoka" in t:
         found += [
-            Row("turning points (map) over heyoka", t["heyoka"] / t["map"], "x", ">= 30"),
-            Row("turning points (clock) over heyoka", t["heyoka"] / t["clock"], "x", ">= 5"),
-            Row("32768 samples over heyoka's grid", t["heyoka grid"] / t["samples"], "x", ">= 20"),
+            at_least("turning points, map over heyoka", t["heyoka"] / t["map"], 30.0),
+            at_least("turning points, phase clock over heyoka", t["heyoka"] / t["clock"], 5.0),
+            at_least(
+                "32768 samples over heyoka's `propagate_grid`",
+                t["heyoka grid"] / t["samples"],
+                20.0,
+            ),
         ]
     return found
 
@@ -134,7 +97,7 @@ def _accuracies() -> list[Row]:
     points = turning_points(MODEL, START, until_s=END_S)
     envelope = np.interp(SAMPLES, points.time_s, np.abs(points.angle_rad))
     error = float(np.max(np.abs(by_map - by_clock) / envelope))
-    found.append(Row("samples, map less clock, over the envelope", error, "", "<= 1e-9"))
+    found.append(at_most("error of the samples (map less clock) over the envelope", error, 1e-9))
     path = ROOT / "tests" / "dynamics" / "reference.py"
     if path.exists() and importlib.util.find_spec("mpmath") and importlib.util.find_spec("pytest"):
         times, angles = _forty_digits(path, points.time_s.size)
@@ -142,8 +105,10 @@ def _accuracies() -> list[Row]:
             own = turning_points(MODEL, START, until_s=END_S, method=method)  # type: ignore[arg-type]
             amplitude = float(np.max(np.abs(own.angle_rad / angles - 1.0)))
             phase = OMEGA * float(np.max(np.abs(own.time_s - times)))
-            found.append(Row(f"amplitudes ({method}) against 40 digits", amplitude, "", "<= 1e-10"))
-            found.append(Row(f"phases ({method}) against 40 digits", phase, "rad", "<= 1e-10"))
+            found.append(
+                at_most(f"amplitudes, {method}, against 40 digits (relative)", amplitude, 1e-10)
+            )
+            found.append(at_most(f"omega t, {method}, against 40 digits", phase, 1e-10, " rad"))
     return found
 
 
@@ -168,17 +133,15 @@ def _first_call(rounds: int) -> Row:
         command = [sys.executable, "-c", code]
         return lambda: subprocess.run(command, check=True, env=environment, cwd=ROOT)
 
-    t = _medians({"numpy": (process("import numpy"), 1), "call": (process(FIRST_CALL), 1)}, rounds)
-    return Row(
-        "first call in a process, beyond import numpy", t["call"] - t["numpy"], "s", "<= 0.5"
-    )
+    calls = {"numpy": (process("import numpy"), 1), "call": (process(FIRST_CALL), 1)}
+    t = cpu_seconds(calls, rounds, clock=time.perf_counter)
+    return at_most("first call in a fresh process, beyond `import numpy`", t["call"] - t["numpy"],
+                   0.5, " s")  # fmt: skip
 
 
 def main() -> None:
-    """Print the table."""
-    for row in rows():
-        word = "met" if row.met else "MISSED"
-        print(f"{row.what:48s} {row.value:12.3g} {row.unit:4s} goal {row.goal:10s} {word}")
+    """Measure, and write the part of the page."""
+    write("engine", "The engine of Eq. 8", rows())
 
 
 if __name__ == "__main__":
