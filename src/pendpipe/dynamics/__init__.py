@@ -28,11 +28,13 @@ from pendpipe.dynamics.laws import (
     linear,
 )
 from pendpipe.dynamics.model import JACOBIAN_COLUMNS, JOINT_JACOBIAN_COLUMNS, Eq8, Release
+from pendpipe.dynamics.residuals import Comparison, compare, residuals
 
 __all__ = [
     "JACOBIAN_COLUMNS",
     "JOINT_JACOBIAN_COLUMNS",
     "Autonomous",
+    "Comparison",
     "Driven",
     "DrivenMotion",
     "EnergyFriction",
@@ -48,8 +50,10 @@ __all__ = [
     "Restoring",
     "StribeckFriction",
     "TurningPoints",
+    "compare",
     "follow_driven",
     "linear",
+    "residuals",
     "sample",
     "sample_with_jacobian",
     "turning_points",

@@ -33,6 +33,9 @@ def run(
     angle_rad: FloatArray = NO_SAMPLES,
     jacobian: FloatArray = NONE,
     turning: FloatArray = NONE,
+    readings: FloatArray = NO_SAMPLES,
+    every: int = 1,
+    sums: FloatArray = NO_SAMPLES,
 ) -> tuple[int, bool]:
     """Call the engine; return the number of turning points and whether the last is the stop."""
     count = rates.size
@@ -42,6 +45,7 @@ def run(
     buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
     buffer[:CONSTANTS] = (
         *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
+        every,
     )  # fmt: skip
     if count:
         buffer[CONSTANTS : CONSTANTS + count] = rates
@@ -51,6 +55,7 @@ def run(
             _address(buffer), buffer.size, count, abs(release.angle_rad), tabulate,
             most, until_s, _address(time_s), time_s.size, _address(angle_rad),
             _address(jacobian), _address(turning), turning.shape[1],
+            _address(readings), readings.size, _address(sums),
         ),
         OVERDAMPED + 1,
     )  # fmt: skip

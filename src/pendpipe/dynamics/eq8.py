@@ -194,7 +194,7 @@ def sample(
     ValueError
         If the times are not as required, or `model` is overdamped.
     """
-    times = _checked(time_s, release)
+    times = checked_times(time_s, release)
     _check_method(method)
     if not isinstance(model, Eq8) and times.size:
         from pendpipe.dynamics.autonomous import follow
@@ -241,7 +241,7 @@ def sample_with_jacobian(
     jacobian
         (n, 8) or (n, 7), stored by columns. At c = 0 the derivative by c is that towards c > 0.
     """
-    times = _checked(time_s, release)
+    times = checked_times(time_s, release)
     _check_method(method)
     directions, rates = directions_of(model, hysteretic_share)
     angle_rad = np.empty(times.size)
@@ -255,7 +255,7 @@ def sample_with_jacobian(
     return angle_rad, jacobian.T
 
 
-def _checked(time_s: FloatArray, release: Release) -> FloatArray:
+def checked_times(time_s: FloatArray, release: Release) -> FloatArray:
     """Return the times as the engine needs them."""
     times = np.ascontiguousarray(time_s, dtype=np.float64)
     if times.ndim != 1 or (times.size and not math.isfinite(times[0] + times[-1])):

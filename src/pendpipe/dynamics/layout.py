@@ -15,8 +15,10 @@ MOST_PANELS = 4
 """Panels to a half cycle in a table."""
 DESCRIPTION = 6
 THETA = 512
-CONSTANTS = 9
-"""m, h, q, g, omega; time and offset of the release, and twice the side of the release."""
+CONSTANTS = 10
+"""m, h, q, g, omega; time and offset of the release, and twice the side of the release; every
+how many-th reading goes into the normal matrix."""
+MOMENTS = NODE_COUNT + 1
 
 RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
@@ -37,7 +39,18 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA
+    compared = MOMENTS + (1 + most_columns(s)) * THETA
+    return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA + compared
+
+
+def most_columns(sensitivities: int) -> int:
+    """Return the columns of the Jacobian: rates, omega, angle, time, offset."""
+    return sensitivities + 3 if sensitivities > 0 else 0
+
+
+def sums_size(columns: int) -> int:
+    """Return how many numbers a comparison gives: chi^2, gradient, normal matrix."""
+    return 1 + columns * (1 + columns)
 
 
 def inputs_size(directions: int) -> int:

@@ -127,7 +127,7 @@ def _emit_row(
 def march(
     constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
     most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray,
-    turning: FloatArray, buffer: FloatArray,
+    turning: FloatArray, readings: FloatArray, sums: FloatArray, buffer: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the pendulum from its release.
 
@@ -150,6 +150,9 @@ def march(
         The last column of the Jacobian, by the offset, is left to the caller.
     turning
         Receives the turning points, a column each; may be empty.
+    readings, sums
+        Readings at the times, and what receives their comparison (see `comparison.py`):
+        `angle_rad` then receives the residuals. Both may be empty.
 
     Returns
     -------
@@ -157,7 +160,7 @@ def march(
     """
     columns = rates.size + 1 if rates.size > 0 else 0
     polynomials = columns + 1 if time_s.size > 0 else 0
-    work = carve(buffer, constants, directions, rates, columns, polynomials)
+    work = carve(buffer, constants, directions, rates, readings, sums, columns, polynomials)
     shape, motion, signs = work.shape, work.motion, constants[7:9]
     work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
     for c in range(columns):

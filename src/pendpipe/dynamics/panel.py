@@ -55,6 +55,11 @@ def kernel(function: _F) -> _F:
     return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
+def adder(function: _F) -> _F:
+    """Compile a function whose sums may be taken in any order."""
+    return njit(**(_OPTIONS | {"fastmath": {"contract", "reassoc", "nsz"}}))(function)  # type: ignore[no-any-return]
+
+
 def part(function: _F) -> _F:
     """Compile a function that takes the whole workspace, too much to hand over, into its caller."""
     return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]

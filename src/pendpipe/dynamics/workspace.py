@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pendpipe.dynamics import layout
 from pendpipe.dynamics.layout import (
     DESCRIPTION,
+    MOMENTS,
     MOST_PANELS,
     MOST_POINTS,
     NODE_COUNT,
@@ -60,10 +61,23 @@ class Work(NamedTuple):
     """(S + 2, 17): the polynomials of the angle, its velocity and its derivatives."""
     theta: FloatArray
     """A block of places within a panel."""
+    readings: FloatArray
+    """What the samples are compared with; empty if they are not."""
+    sums: FloatArray
+    """What comes of it; see `comparison.py`."""
+    every: FloatArray
+    """(1,): every how many-th reading goes into the normal matrix."""
+    moments: FloatArray
+    """(18,): of the residuals of a block."""
+    power: FloatArray
+    """Residuals times a power of their place; also the places of some readings."""
+    some: FloatArray
+    """(columns, THETA): the Jacobian's columns at those places."""
     wanted: FloatArray
     """How `march` lays out its tables."""
 
 
+most_columns = kernel(layout.most_columns)
 panel_width = kernel(layout.panel_width)
 row_width = kernel(layout.row_width)
 
@@ -74,10 +88,12 @@ def carve(
     constants: FloatArray,
     directions: FloatArray,
     rates: FloatArray,
+    readings: FloatArray,
+    sums: FloatArray,
     sensitivities: int,
     polynomials: int,
 ) -> Work:
-    """Cut `buffer` and `constants` (m, h, q, g, omega, time, offset) into the arrays of a march."""
+    """Cut `buffer` and `constants` into the arrays of a march."""
     s, n = sensitivities, NODE_COUNT
     width = row_width(s, polynomials, MOST_PANELS)
     points = MOST_POINTS
@@ -98,8 +114,13 @@ def carve(
     segment, rest = rest[:DESCRIPTION], rest[DESCRIPTION:]
     table, rest = matrix(rest, points, width), rest[points * width :]
     total, rest = matrix(rest, s + 2, n), rest[(s + 2) * n :]
+    columns_shown = most_columns(s)
+    theta, rest = rest[:THETA], rest[THETA:]
+    moments, rest = rest[:MOMENTS], rest[MOMENTS:]
+    power, rest = rest[:THETA], rest[THETA:]
+    some, rest = matrix(rest, columns_shown, THETA), rest[columns_shown * THETA :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
-        rest[:THETA], rest[THETA:],
+        theta, readings, sums, constants[9:10], moments, power, some, rest,
     )  # fmt: skip

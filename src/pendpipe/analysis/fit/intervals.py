@@ -24,6 +24,7 @@ def intervals95(
     bounds: Bounds,
     indices: Sequence[int],
     held: Sequence[int] = (),
+    matrix: FloatArray | None = None,
 ) -> list[tuple[float, float]]:
     """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
 
@@ -39,13 +40,15 @@ def intervals95(
         The parameters whose intervals are wanted.
     held
         Parameters that are not fitted.
+    matrix
+        The covariance, where it is known.
 
     Notes
     -----
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    matrix = covariance(normal, held)
+    matrix = covariance(normal, held) if matrix is None else matrix
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     fitted = [j for j in range(len(value)) if j not in held]
     at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))

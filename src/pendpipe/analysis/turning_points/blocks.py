@@ -71,7 +71,7 @@ def _tracked(
 
     Every core takes a part of the record; all write into one table.
     """
-    interval = _even_interval(samples.time_s)
+    interval = even_interval(samples.time_s)
     if interval is None:
         return None
     # Numba comes along: it is little beside a record that is so long.
@@ -166,7 +166,7 @@ def _closed_up(columns: FloatArray, room: int, counts: list[int], half_period: f
     return total
 
 
-def _even_interval(time_s: FloatArray) -> float | None:
+def even_interval(time_s: FloatArray) -> float | None:
     """The interval between readings; None if they are not evenly spaced throughout."""
     last = len(time_s) - 1
     interval = float(time_s[-1] - time_s[0]) / last
