@@ -14,7 +14,7 @@ import pytest
 from numba import cfunc
 
 from pendpipe.dynamics import Eq8, compiled, machine_code
-from pendpipe.dynamics.layout import inputs_size, work_size
+from pendpipe.dynamics.layout import inputs_size, sums_size, work_size
 
 FIRST_CALL = """
 import sys
@@ -134,7 +134,10 @@ def test_every_compiled_source_is_watched() -> None:
 @pytest.mark.parametrize("directions", [0, 3, 4])
 @pytest.mark.parametrize("samples", [0, 1, 1000])
 @pytest.mark.parametrize("tabulate", [True, False])
-def test_the_engine_writes_only_where_it_may(directions: int, samples: int, tabulate: bool) -> None:
+@pytest.mark.parametrize("compared", [True, False])
+def test_the_engine_writes_only_where_it_may(
+    directions: int, samples: int, tabulate: bool, compared: bool
+) -> None:
     # The engine works on bare memory: everything it gets is embedded in guards here.
     guard = 100
 
@@ -156,12 +159,15 @@ def test_the_engine_writes_only_where_it_may(directions: int, samples: int, tabu
     ].ravel()
     time_s = np.linspace(0.0, 100.0, samples)
     angle, angle_at = guarded(samples)
-    jacobian, jacobian_at = guarded(columns * samples)
+    jacobian, jacobian_at = guarded(0 if compared else columns * samples)
+    sums, sums_at = guarded(sums_size(columns))
+    readings = np.zeros(samples)
     turning, turning_at = guarded((2 + 2 * columns) * 50)
     compiled.engine()(
         buffer_at, size, directions, 0.1, tabulate, 50 if samples == 0 else 2**60, 100.0,
         time_s.ctypes.data, samples, angle_at, jacobian_at, turning_at, 50,
+        readings.ctypes.data, samples if compared else 0, sums_at,
     )  # fmt: skip
-    for array in (buffer, angle, jacobian, turning):
+    for array in (buffer, angle, jacobian, turning, sums):
         np.testing.assert_array_equal(array[:guard], np.pi)
         np.testing.assert_array_equal(array[-guard:], np.pi)

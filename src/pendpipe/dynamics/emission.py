@@ -103,7 +103,7 @@ def emit(
         horner(work.total[0], z, angle_rad[at:stop])
         if work.readings.size > 0:
             subtract(work.readings[at:stop], angle_rad[at:stop])
-            compare(work, angle_rad[at : min(stop, end)], at, start, duration)
+            compare(work, angle_rad[at : min(stop, end)], start, duration)
         elif work.amplitude.size > 0:
             _emit_derivatives(work, z, t, jacobian, at)
         at = stop
@@ -151,7 +151,7 @@ def rest(
         work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0]
         work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
     if work.readings.size > 0:
-        compare_rest(work, angle_rad[first:], first)
+        compare_rest(work, angle_rad[first:])
         return
     for c in range(min(jacobian.shape[0], directions + 3)):
         for i in range(first, angle_rad.size):

@@ -34,7 +34,6 @@ def run(
     jacobian: FloatArray = NONE,
     turning: FloatArray = NONE,
     readings: FloatArray = NO_SAMPLES,
-    every: int = 1,
     sums: FloatArray = NO_SAMPLES,
 ) -> tuple[int, bool]:
     """Call the engine; return the number of turning points and whether the last is the stop."""
@@ -45,7 +44,6 @@ def run(
     buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
     buffer[:CONSTANTS] = (
         *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
-        every,
     )  # fmt: skip
     if count:
         buffer[CONSTANTS : CONSTANTS + count] = rates

@@ -15,10 +15,11 @@ MOST_PANELS = 4
 """Panels to a half cycle in a table."""
 DESCRIPTION = 6
 THETA = 512
-CONSTANTS = 10
-"""m, h, q, g, omega; time and offset of the release, and twice the side of the release; every
-how many-th reading goes into the normal matrix."""
+CONSTANTS = 9
+"""m, h, q, g, omega; time and offset of the release, and twice the side of the release."""
 MOMENTS = NODE_COUNT + 1
+PLACES = 8
+"""Of a panel, at which the normal matrix is taken; see `comparison.py`."""
 
 RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
@@ -39,7 +40,7 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    compared = MOMENTS + (1 + most_columns(s)) * THETA
+    compared = MOMENTS + THETA + most_columns(s) * PLACES
     return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA + compared
 
 

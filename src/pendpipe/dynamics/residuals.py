@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.model import Eq8, Release
 
-_ENOUGH = 10
-"""Readings in a half cycle that tell the normal matrix."""
-
 
 class Comparison(NamedTuple):
     """Readings against Eq. 8; J is the Jacobian of `sample_with_jacobian`, r the residual."""
@@ -26,7 +23,7 @@ class Comparison(NamedTuple):
     gradient: FloatArray
     """J' r, shape (8,)."""
     normal: FloatArray
-    """J' J, shape (8, 8), from about 10 readings in each half cycle."""
+    """J' J, shape (8, 8), for readings spread evenly within each half cycle."""
 
 
 def residuals(
@@ -48,8 +45,8 @@ def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatAr
     """Compare readings with Eq. 8, with the columns `JACOBIAN_COLUMNS`.
 
     The Jacobian is never written: the products that a fit needs are summed half cycle by
-    half cycle. The gradient is that over all readings; the normal matrix, which varies
-    slowly, is taken from some of them.
+    half cycle. The gradient is exact; the normal matrix takes the readings as spread evenly
+    within each half cycle (or its panels), and is exact but for that.
 
     Parameters
     ----------
@@ -63,15 +60,12 @@ def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatAr
     directions, rates = directions_of(model, None)
     columns = rates.size + 4
     residual, sums = np.empty(times.size), np.zeros(sums_size(columns))
-    span = (times[-1] - times[0]) * model.angular_frequency / np.pi if times.size else 0.0
-    every = max(1, int(times.size / max(span, 1.0) / _ENOUGH))
     if times.size:
         run(
             model, release, tabulate=True, directions=directions, rates=rates,
             until_s=float(times[-1]), time_s=times, angle_rad=residual, readings=readings,
-            every=every, sums=sums,
+            sums=sums,
         )  # fmt: skip
     lower = sums[1 + columns :].reshape(columns, columns)
     normal = lower + np.tril(lower, -1).T
-    normal *= times.size / max(normal[-1, -1], 1.0)
     return Comparison(residual, sums[1 : 1 + columns], normal)

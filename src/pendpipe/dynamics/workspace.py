@@ -12,6 +12,7 @@ from pendpipe.dynamics.layout import (
     MOST_POINTS,
     NODE_COUNT,
     NODE_SIZE,
+    PLACES,
     THETA,
 )
 from pendpipe.dynamics.panel import kernel
@@ -65,14 +66,12 @@ class Work(NamedTuple):
     """What the samples are compared with; empty if they are not."""
     sums: FloatArray
     """What comes of it; see `comparison.py`."""
-    every: FloatArray
-    """(1,): every how many-th reading goes into the normal matrix."""
     moments: FloatArray
     """(18,): of the residuals of a block."""
     power: FloatArray
-    """Residuals times a power of their place; also the places of some readings."""
+    """Residuals times a power of their place."""
     some: FloatArray
-    """(columns, THETA): the Jacobian's columns at those places."""
+    """(columns, 8): the Jacobian's columns at some places of the panel."""
     wanted: FloatArray
     """How `march` lays out its tables."""
 
@@ -118,9 +117,9 @@ def carve(
     theta, rest = rest[:THETA], rest[THETA:]
     moments, rest = rest[:MOMENTS], rest[MOMENTS:]
     power, rest = rest[:THETA], rest[THETA:]
-    some, rest = matrix(rest, columns_shown, THETA), rest[columns_shown * THETA :]
+    some, rest = matrix(rest, columns_shown, PLACES), rest[columns_shown * PLACES :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
-        theta, readings, sums, constants[9:10], moments, power, some, rest,
+        theta, readings, sums, moments, power, some, rest,
     )  # fmt: skip

@@ -133,9 +133,7 @@ def _result(
         samples=len(residual),
         turning_points=len(points),
     )
-    hysteretic, viscous, said = split_quality_factors(
-        fitted.minimum.value, matrix, fixed
-    )
+    hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, matrix, fixed)
     warnings = [*points.notes, *warnings_of(result, stretched), *said, *fitted.start.warnings]
     if not fitted.minimum.converged:
         warnings.append("the waveform fit did not settle")

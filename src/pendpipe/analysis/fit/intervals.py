@@ -52,18 +52,22 @@ def intervals95(
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     fitted = [j for j in range(len(value)) if j not in held]
     at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))
+    half = math.sqrt(CHI2_95) * deviations
+    # The others follow a parameter that is moved to an end of its interval.
+    sizes = np.where(deviations > 0.0, deviations, 1.0)
+    follow = matrix[:, indices] * (half / sizes**2)[indices]
+    here, lower, upper = value[:, None], bounds.lower[:, None], bounds.upper[:, None]
+    inside = [((moved >= lower) & (moved <= upper)).all(axis=0)
+              for moved in (here - follow, here + follow)]  # fmt: skip
     result = []
-    for index in indices:
-        sd = float(deviations[index])
-        half = math.sqrt(CHI2_95) * sd
-        ends = [float(value[index]) - half, float(value[index]) + half]
-        if sd > 0.0:
-            follow = matrix[:, index] / matrix[index, index]
-            for k, step in enumerate((-half, half)):
-                if not (at_rest and bounds.hold(value + step * follow)):
-                    ends[k] = _profiled_end(
-                        value, normal, gradient, bounds, index, held, math.copysign(_FAR * sd, step)
-                    )
+    for position, index in enumerate(indices):
+        width = float(half[index])
+        ends = [float(value[index]) - width, float(value[index]) + width]
+        if width > 0.0:
+            for k, sign in enumerate((-1.0, 1.0)):
+                if not (at_rest and inside[k][position]):
+                    reach = sign * _FAR * float(deviations[index])
+                    ends[k] = _profiled_end(value, normal, gradient, bounds, index, held, reach)
         result.append((ends[0], ends[1]))
     return result
 

@@ -20,7 +20,8 @@ from pendpipe.analysis.turning_points.blocks import even_interval
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.tracking import track
 
-_HEAD: Final = 1 << 13
+_HEADS: Final = (1 << 11, 1 << 14, 1 << 17)
+"""Readings in which the first half cycles are looked for."""
 _FEWEST: Final = 16
 """Half cycles."""
 _SAMPLED: Final = 12.0
@@ -47,7 +48,7 @@ def quick_start(samples: Samples) -> Quick | None:
         return None
     values, noise, first_s = samples.values, samples.noise_rms, float(samples.time_s[0])
     least = max(7.0 * noise, 1.5 * (samples.step or 0.0))
-    for length in (_HEAD, 8 * _HEAD, len(samples)):
+    for length in (*_HEADS, len(samples)):
         found, at, half_period, side, level = first_places(values[:length], least, noise)
         if found or length >= len(samples):
             break

@@ -16,7 +16,9 @@ _SLACK = 0.02
 
 
 @njit(cache=True)
-def first_places(values: FloatArray, least: float, noise: float) -> tuple[bool, float, float, float, float]:
+def first_places(
+    values: FloatArray, least: float, noise: float
+) -> tuple[bool, float, float, float, float]:
     """Find the first half cycles by their extremes.
 
     Returns
@@ -48,9 +50,7 @@ def first_places(values: FloatArray, least: float, noise: float) -> tuple[bool, 
     # The loop itself knows them better.
     columns = np.empty((5, count))
     rates = np.zeros(3)
-    known, _, _ = track(
-        values, 0.0, 1.0, at, half_period, side, level, rates, noise, columns
-    )
+    known, _, _ = track(values, 0.0, 1.0, at, half_period, side, level, rates, noise, columns)
     if known < 8:
         return False, 0.0, 0.0, 0.0, 0.0
     half = known // 2

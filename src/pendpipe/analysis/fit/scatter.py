@@ -8,6 +8,20 @@ from numba import njit
 from pendpipe.arrays import FloatArray
 
 
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+def _against_parabola(
+    time_s: FloatArray, residual: FloatArray, start_s: float, stop_s: float
+) -> tuple[float, float]:
+    """Sums of the residual times a parabola, and of the parabola's square."""
+    inverse, product, square = 1.0 / (stop_s - start_s), 0.0, 0.0
+    for i in range(len(time_s)):
+        share = (time_s[i] - start_s) * inverse
+        form = share * (1.0 - share)
+        product += residual[i] * form
+        square += form * form
+    return product, square
+
+
 @njit(cache=True, error_model="numpy")
 def half_cycle_scatter(
     middles: FloatArray, time_s: FloatArray, residual: FloatArray
@@ -22,17 +36,14 @@ def half_cycle_scatter(
     ratio, half_cycles
         0 half cycles if one of them has fewer than three readings.
     """
-    total, i = 0.0, np.searchsorted(time_s, middles[0])
+    total, first = 0.0, int(np.searchsorted(time_s, middles[0]))
     for k in range(len(middles) - 1):
-        start_s, inverse = middles[k], 1.0 / (middles[k + 1] - middles[k])
-        product, square, first = 0.0, 0.0, i
-        while i < len(time_s) and time_s[i] < middles[k + 1]:
-            share = (time_s[i] - start_s) * inverse
-            form = share * (1.0 - share)
-            product += residual[i] * form
-            square += form * form
-            i += 1
-        if i < first + 3:
+        last = np.searchsorted(time_s[first:], middles[k + 1]) + first
+        if last < first + 3:
             return 1.0, 0
+        product, square = _against_parabola(
+            time_s[first:last], residual[first:last], middles[k], middles[k + 1]
+        )
         total += product * product / square
+        first = last
     return total / (len(middles) - 1), len(middles) - 1
