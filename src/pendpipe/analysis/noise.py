@@ -84,8 +84,7 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
 
     length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else len(values)
     number = min(_BLOCKS, len(values) // length)
-    starts = np.linspace(0, len(values) - length, number).astype(np.int64)
-    squares = block_squares(np.ascontiguousarray(values), starts, length)
+    squares = block_squares(np.ascontiguousarray(values), number, length)
     return max(floor, math.sqrt(_middle(squares) / _gain()))
 
 

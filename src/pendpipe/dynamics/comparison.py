@@ -79,9 +79,6 @@ def compare(work: Work, residual: FloatArray, start: float, duration: float) -> 
     """
     columns, directions = work.some.shape[0], work.rates.size
     theta = work.theta[: residual.size]
-    if columns == 0:
-        work.sums[0] += product(residual, residual)
-        return
     work.sums[0] += take_moments(residual, theta, work.power, work.moments)
     gradient, moments = work.sums[1 : 1 + columns], work.moments
     omega = work.motion[0]
@@ -153,13 +150,15 @@ def _add_products(work: Work, theta: FloatArray, middle: float, half: float) -> 
 
 
 @part
-def compare_rest(work: Work, residual: FloatArray) -> None:
+def compare_rest(work: Work, level: float, first: int) -> None:
     """Add what the readings after the stop say; the columns there are in `work.some[:, 0]`."""
-    columns, count = work.some.shape[0], float(residual.size)
-    work.sums[0] += product(residual, residual)
-    total = 0.0
-    for i in range(residual.size):
-        total += residual[i]
+    columns, count = work.some.shape[0], float(work.readings.size - first)
+    total, square = 0.0, 0.0
+    for i in range(first, work.readings.size):
+        residual = work.readings[i] - level
+        total += residual
+        square += residual * residual
+    work.sums[0] += square
     for p in range(columns):
         work.sums[1 + p] += total * work.some[p, 0]
         for q in range(p + 1):

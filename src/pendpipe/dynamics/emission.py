@@ -100,12 +100,17 @@ def emit(
         z, t = work.theta[: stop - at], time_s[at:stop]
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
-        horner(work.total[0], z, angle_rad[at:stop])
-        if work.readings.size > 0:
-            subtract(work.readings[at:stop], angle_rad[at:stop])
-            compare(work, angle_rad[at : min(stop, end)], start, duration)
-        elif work.amplitude.size > 0:
-            _emit_derivatives(work, z, t, jacobian, at)
+        if work.readings.size > 0 and work.amplitude.size > 0:
+            residual = work.residual[: z.size]
+            horner(work.total[0], z, residual)
+            subtract(work.readings[at:stop], residual)
+            compare(work, residual[: min(stop, end) - at], start, duration)
+        else:
+            horner(work.total[0], z, angle_rad[at:stop])
+            if work.readings.size > 0:
+                subtract(work.readings[at:stop], angle_rad[at:stop])
+            elif work.amplitude.size > 0:
+                _emit_derivatives(work, z, t, jacobian, at)
         at = stop
     return end
 
@@ -138,10 +143,7 @@ def rest(
 ) -> None:  # fmt: skip
     """Write the samples after the stop: the last turning point, exactly."""
     directions, omega = work.rates.size, work.motion[0]
-    for i in range(first, angle_rad.size):
-        angle_rad[i] = signs[0] * y + work.motion[2]
-    if work.readings.size > 0:
-        subtract(work.readings[first:], angle_rad[first:])
+    level = signs[0] * y + work.motion[2]
     if work.amplitude.size > 0:
         by_omega = 0.0
         for c in range(directions):
@@ -150,9 +152,13 @@ def rest(
         work.some[directions, 0] = by_omega
         work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0]
         work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
+        if work.readings.size > 0:
+            compare_rest(work, level, first)
+            return
+    for i in range(first, angle_rad.size):
+        angle_rad[i] = level
     if work.readings.size > 0:
-        compare_rest(work, angle_rad[first:])
-        return
+        subtract(work.readings[first:], angle_rad[first:])
     for c in range(min(jacobian.shape[0], directions + 3)):
         for i in range(first, angle_rad.size):
             jacobian[c, i] = work.some[c, 0]

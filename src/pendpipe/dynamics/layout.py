@@ -40,7 +40,7 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    compared = MOMENTS + THETA + most_columns(s) * PLACES
+    compared = MOMENTS + 2 * THETA + most_columns(s) * PLACES
     return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA + compared
 
 

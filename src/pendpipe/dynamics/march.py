@@ -151,8 +151,8 @@ def march(
     turning
         Receives the turning points, a column each; may be empty.
     readings, sums
-        Readings at the times, and what receives their comparison (see `comparison.py`):
-        `angle_rad` then receives the residuals. Both may be empty.
+        Readings at the times: without rates `angle_rad` then receives the residuals, with them
+        `sums` their comparison (see `comparison.py`). Both may be empty.
 
     Returns
     -------

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class Comparison(NamedTuple):
     """Readings against Eq. 8; J is the Jacobian of `sample_with_jacobian`, r the residual."""
 
-    residual_rad: FloatArray
-    """Readings less model, shape (n,)."""
+    square: float
+    """r' r."""
     gradient: FloatArray
     """J' r, shape (8,)."""
     normal: FloatArray
@@ -59,13 +59,13 @@ def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatAr
     readings = np.ascontiguousarray(angle_rad, dtype=np.float64)
     directions, rates = directions_of(model, None)
     columns = rates.size + 4
-    residual, sums = np.empty(times.size), np.zeros(sums_size(columns))
+    sums = np.zeros(sums_size(columns))
     if times.size:
         run(
             model, release, tabulate=True, directions=directions, rates=rates,
-            until_s=float(times[-1]), time_s=times, angle_rad=residual, readings=readings,
-            sums=sums,
+            until_s=float(times[-1]), time_s=times, readings=readings, sums=sums,
         )  # fmt: skip
     lower = sums[1 + columns :].reshape(columns, columns)
-    normal = lower + np.tril(lower, -1).T
-    return Comparison(residual, sums[1 : 1 + columns], normal)
+    normal = lower + lower.T
+    normal.flat[:: columns + 1] *= 0.5
+    return Comparison(float(sums[0]), sums[1 : 1 + columns], normal)

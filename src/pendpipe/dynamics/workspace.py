@@ -68,6 +68,8 @@ class Work(NamedTuple):
     """What comes of it; see `comparison.py`."""
     moments: FloatArray
     """(18,): of the residuals of a block."""
+    residual: FloatArray
+    """Of a block of readings."""
     power: FloatArray
     """Residuals times a power of their place."""
     some: FloatArray
@@ -116,10 +118,11 @@ def carve(
     columns_shown = most_columns(s)
     theta, rest = rest[:THETA], rest[THETA:]
     moments, rest = rest[:MOMENTS], rest[MOMENTS:]
+    residual, rest = rest[:THETA], rest[THETA:]
     power, rest = rest[:THETA], rest[THETA:]
     some, rest = matrix(rest, columns_shown, PLACES), rest[columns_shown * PLACES :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
-        theta, readings, sums, moments, power, some, rest,
+        theta, readings, sums, moments, residual, power, some, rest,
     )  # fmt: skip

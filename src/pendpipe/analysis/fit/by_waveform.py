@@ -110,7 +110,7 @@ def _result(
     residual = fitted.problem.residual(fitted.minimum.value)
     dof = len(residual) - len(NAMES) + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
-    rms = float(np.sqrt(np.mean(residual**2)))
+    rms = math.sqrt(float(residual @ residual) / len(residual))
     chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
     # What rounding leaves is slow by nature; its likelihood knows that already.
     slow = noise.slow if fitted.problem.step == 0.0 else 1.0
@@ -173,9 +173,11 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     blamed on the rounding.
     """
     step, problem, value = samples.step, fitted.problem, fitted.minimum.value
+    if step is None:
+        return fitted
     residual = problem.residual(value)
-    rms = math.sqrt(float(np.mean(residual**2)))
-    if step is None or not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
+    rms = math.sqrt(float(residual @ residual) / len(residual))
+    if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
         return fitted
     # Few recordings are so coarse; the others need no numba.
     from pendpipe.analysis.fit.rounding import best_noise

@@ -55,17 +55,20 @@ def intervals95(
     half = math.sqrt(CHI2_95) * deviations
     # The others follow a parameter that is moved to an end of its interval.
     sizes = np.where(deviations > 0.0, deviations, 1.0)
-    follow = matrix[:, indices] * (half / sizes**2)[indices]
-    here, lower, upper = value[:, None], bounds.lower[:, None], bounds.upper[:, None]
-    inside = [((moved >= lower) & (moved <= upper)).all(axis=0)
-              for moved in (here - follow, here + follow)]  # fmt: skip
+    step = matrix[:, indices] * (half / sizes**2)[indices]
+    room = bounds.about(value)
+    inside = (
+        (-step >= room.lower[:, None]) & (-step <= room.upper[:, None]),
+        (step >= room.lower[:, None]) & (step <= room.upper[:, None]),
+    )
+    ok = [at_rest & side.all(axis=0) for side in inside]
     result = []
     for position, index in enumerate(indices):
         width = float(half[index])
         ends = [float(value[index]) - width, float(value[index]) + width]
         if width > 0.0:
             for k, sign in enumerate((-1.0, 1.0)):
-                if not (at_rest and inside[k][position]):
+                if not ok[k][position]:
                     reach = sign * _FAR * float(deviations[index])
                     ends[k] = _profiled_end(value, normal, gradient, bounds, index, held, reach)
         result.append((ends[0], ends[1]))

@@ -108,9 +108,9 @@ class Waveform:
             return refused
         try:
             if self.step == 0.0:
-                residual, gradient, normal = compare(model, release, self.time_s, self.values)
+                square, gradient, normal = compare(model, release, self.time_s, self.values)
                 weight = self.noise_rms**-2
-                chi2 = float(residual @ residual) * weight
+                chi2 = square * weight
                 gradient, normal = gradient * weight, normal * weight
             else:
                 chi2, gradient, normal = self._rounded(model, release)
