@@ -42,11 +42,16 @@ def changed(pendulum: MpmathPendulum, y: Any, name: str, step: Any) -> tuple[Mpm
 
 
 @pytest.mark.slow
-def test_turning_points_change_as_forty_digit_differences_say() -> None:
+@pytest.mark.parametrize(
+    "model",
+    [MODEL, Eq8(W, 1.0, 0.1, 0.3, 2e-3), Eq8(W, 1e-4, 1e-6, 1e-6, 1e-8)],
+    ids=["Q of 40", "Q of 4, near the stop", "Q of a hundred thousand"],
+)
+def test_turning_points_change_as_forty_digit_differences_say(model: Eq8) -> None:
     count = 8
     columns = [*RATES, "angle"]
     with mp.workdps(DIGITS):
-        pendulum = MpmathPendulum.of(MODEL)
+        pendulum = MpmathPendulum.of(model)
         by_time, by_angle = [], []
         for name in columns:
             up, down = (
@@ -61,7 +66,7 @@ def test_turning_points_change_as_forty_digit_differences_say() -> None:
             )
     for method in METHODS:
         points, times, angles = turning_points_with_jacobian(
-            MODEL, Release(0.0, Y), count, method=method
+            model, Release(0.0, Y), count, method=method
         )
         assert points.time_s.size == count
         assert times.shape == angles.shape == (count, len(JACOBIAN_COLUMNS))
