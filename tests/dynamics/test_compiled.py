@@ -81,9 +81,10 @@ def test_damaged_code_is_compiled_anew(kept: Path, monkeypatch: pytest.MonkeyPat
     assert machine_code.load(path) is None
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept))
     # The compiler itself takes half a minute: set-up runs it, and every test runs its code.
-    monkeypatch.setattr(compiled, "_compile", lambda: (1, "compiled anew"))
+    monkeypatch.setattr(compiled, "_compile", lambda: [a_small_function])
     renewed = compiled.engine.__wrapped__()
-    assert renewed.owner == "compiled anew"
+    assert renewed.owner == [a_small_function]
+    assert machine_code.load(path) is not None
 
 
 @cfunc("float64(float64)")
@@ -93,10 +94,10 @@ def a_small_function(x: float) -> float:
 
 def test_code_is_kept_and_found_again(tmp_path: Path) -> None:
     path = tmp_path / "new folder" / "code"
-    machine_code.keep(path, a_small_function.inspect_llvm(), a_small_function.native_name)
+    machine_code.keep(path, [(a_small_function.inspect_llvm(), a_small_function.native_name)])
     loaded = machine_code.load(path)
     assert loaded is not None
-    address, _owner = loaded
+    (address,), _owner = loaded
     function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(address)
     assert function(2.0) == math.sqrt(2.0) + math.cos(2.0)
 

@@ -80,7 +80,7 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
     floor = quantisation_rms(step)
     if len(values) < 2 * _ORDER:
         return floor
-    from pendpipe.analysis.noise_kernels import block_squares
+    from pendpipe.analysis.turning_points.plain import block_squares
 
     length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else len(values)
     number = min(_BLOCKS, len(values) // length)
@@ -95,7 +95,7 @@ def white_rms(residual: FloatArray) -> float:
     """
     if len(residual) < 2 * _ORDER:
         return float(np.sqrt(np.mean(residual**2)))
-    from pendpipe.analysis.noise_kernels import fourth_square
+    from pendpipe.analysis.turning_points.plain import fourth_square
 
     square = float(fourth_square(np.ascontiguousarray(residual)))
     return math.sqrt(square / ((len(residual) - _ORDER) * _gain()))

@@ -7,10 +7,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.scatter import half_cycle_scatter
 from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.plain import half_cycle_scatter
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 

@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.turning_points.plain import track
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
+from pendpipe.analysis.turning_points.shape import LEVEL_BLOCK, LossRates, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
@@ -74,9 +75,6 @@ def _tracked(
     interval = even_interval(samples.time_s)
     if interval is None:
         return None
-    # Numba comes along: it is little beside a record that is so long.
-    from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
-
     cores = min(os.cpu_count() or 1, _CORES, max(1, len(samples) // (2 * block)))
     starts = [len(samples) * k // cores for k in range(cores)]
     heads = [_start(samples, start, measure_block, block // 64) for start in starts]
@@ -91,12 +89,12 @@ def _tracked(
     def follow(k: int) -> tuple[int, float, float]:
         head, start = known[k], starts[k]
         stop = (*starts, len(samples))[k + 1] + overlap
-        return track(
-            samples.values[start:stop], float(samples.time_s[start]), interval,
-            float(head.time_s[1]), 0.5 / head.apparent_frequency_hz, float(head.side[1]),
-            float(head.level_rad[0]), np.array(_rates(head)), known[0].noise_rms_rad,
-            columns[:, k * room : (k + 1) * room],
-        )  # fmt: skip
+        begin = [
+            float(samples.time_s[start]), interval, float(head.time_s[1]),
+            0.5 / head.apparent_frequency_hz, float(head.side[1]), float(head.level_rad[0]),
+            known[0].noise_rms_rad, *_rates(head),
+        ]  # fmt: skip
+        return track(samples.values[start:stop], np.array(begin), columns, k * room, room)
 
     with ThreadPoolExecutor(cores) as pool:
         parts = list(pool.map(follow, range(cores)))

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import find_step, noise_rms
-from pendpipe.analysis.noise_kernels import extent, stays
+from pendpipe.analysis.turning_points.plain import extent, stays
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Recording

@@ -11,13 +11,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from numba import njit
 
+from pendpipe.analysis.turning_points.shape import LANES, LEVEL_BLOCK
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.views import matrix
 
-LEVEL_BLOCK = 256
-"""Half cycles over which level and period are one number each."""
 _BATCH = 8
 """Half cycles that are measured where the loop expects them, before it looks where they were.
 
@@ -30,17 +29,10 @@ _CLEAR = 8.0
 """Standard deviations by which an amplitude must stand out for its phase to be used."""
 _SAMPLED = 16
 """Every how many-th half cycle tells the noise."""
-_LANES = 16
-"""The tables are filled up with zeros to a multiple of this: the compiler's loop has no rest."""
+_KEPT: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 
 
-# No reference counts: two threads that count on one array wait for each other.
-_TIGHT: dict[str, Any] = {
-    "cache": True, "nogil": True, "_nrt": False, "fastmath": True, "error_model": "numpy",
-}  # fmt: skip
-
-
-@njit(**_TIGHT)
+@njit(**_KEPT, fastmath=True)
 def _products(piece: FloatArray, tables: FloatArray, level: float) -> tuple[float, float, float]:
     """Sums of readings less level times each of the tables."""
     even, odd, rest = 0.0, 0.0, 0.0
@@ -53,7 +45,7 @@ def _products(piece: FloatArray, tables: FloatArray, level: float) -> tuple[floa
     return even, odd, rest
 
 
-@njit(**_TIGHT)
+@njit(**_KEPT, fastmath=True)
 def _squares(piece: FloatArray, level: float) -> float:
     """Sum of the squares of readings less level."""
     total = 0.0
@@ -62,7 +54,7 @@ def _squares(piece: FloatArray, level: float) -> float:
     return total
 
 
-@njit(**_TIGHT)
+@njit(**_KEPT, fastmath=True)
 def _fit_batch(
     values: FloatArray, first: float, period: float, reach: int, step: float,
     tables: FloatArray, level: float, found: FloatArray,
@@ -93,73 +85,74 @@ def _fit_batch(
     return int(found.shape[1])
 
 
-@njit(cache=True, nogil=True)
-def _tables(reach: int, step: float) -> tuple[FloatArray, float, float, float]:
-    """Weights of the readings from -reach to reach about a turning, `step` of phase apart.
+@njit(**_KEPT)
+def _fill_tables(reach: int, step: float, tables: FloatArray) -> tuple[float, float, float]:
+    """Write the weights of the readings from -reach to reach about a turning, `step` apart.
+
+    Rows of `tables`: for the cosine's factor, the sine's, and the sum of what they leave.
 
     Returns
     -------
-    tables
-        For the cosine's factor, the sine's, and the sum of what they leave.
     flat, even, odd
         Sums of the cosine, its square, and the sine's square.
     """
     number = 2 * reach + 1
-    tables = np.zeros((3, -(-number // _LANES) * _LANES))
-    phase = (np.arange(number) - reach) * step
-    cosine, sine = np.cos(phase), np.sin(phase)
-    flat, even, odd = np.sum(cosine), np.sum(cosine * cosine), np.sum(sine * sine)
-    tables[0, :number] = cosine / even
-    tables[1, :number] = sine / odd
-    tables[2, :number] = 1.0 - cosine * (flat / even)
-    return tables, flat, even, odd
+    flat, even, odd = 0.0, 0.0, 0.0
+    for i in range(tables.shape[1]):
+        cosine = math.cos((i - reach) * step) if i < number else 0.0
+        sine = math.sin((i - reach) * step) if i < number else 0.0
+        tables[0, i], tables[1, i] = cosine, sine
+        flat, even, odd = flat + cosine, even + cosine * cosine, odd + sine * sine
+    for i in range(tables.shape[1]):
+        cosine = tables[0, i]
+        tables[2, i] = 1.0 - cosine * (flat / even) if i < number else 0.0
+        tables[0, i] = cosine / even
+        tables[1, i] /= odd
+    return flat, even, odd
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**_KEPT)
 def track(
-    values: FloatArray,
-    start_s: float,
-    interval_s: float,
-    centre_s: float,
-    half_period_s: float,
-    side: float,
-    level: float,
-    rates: FloatArray,
-    noise: float,
-    columns: FloatArray,
-) -> tuple[int, float, float]:
+    values: FloatArray, start: FloatArray, columns: FloatArray, first: int, room: int,
+    result: FloatArray, work: FloatArray,
+) -> int:  # fmt: skip
     """Fit half cycle after half cycle, each placed by those before it.
 
     Parameters
     ----------
-    values, start_s, interval_s
+    values
         Readings, evenly spaced.
-    centre_s, half_period_s, side
-        The first half cycle: time of its turning, half period, +1 above the level.
-    level
-        Where the level is at first; it is estimated anew every `LEVEL_BLOCK` half cycles.
-    rates
-        a, b, c of Eq. 13, so small that they shift times only (see `shape.py`).
-    noise
-        Rms of one reading.
+    start
+        See `plain.track`: the time of the first reading and the interval; time of turning,
+        half period, side and level of the first half cycle; the noise; a, b, c.
     columns
-        To be filled: time, its sd, signed angle, its sd, level; shape (5, room).
+        To be filled from column `first` on, `room` columns at most: time, its sd, signed
+        angle, its sd, level.
+    result
+        To be filled: sum of squares about some of the fits, and its degrees of freedom.
+    work
+        Room for the tables and a batch; the loop ends if the half period outgrows it.
 
     Returns
     -------
-    count
+    int
         Half cycles measured: up to the end, or to where the lock is lost.
-    residual_square, freedom
-        Sum of squares about some of the fits, and its degrees of freedom.
     """
-    room, count, residual, freedom = columns.shape[1], 0, 0.0, 0.0
+    start_s, interval_s, centre_s, half_period_s = start[0], start[1], start[2], start[3]
+    side, level, noise, rates = start[4], start[5], start[6], start[7:10]
+    table = columns[:, first : first + room]
+    count, residual, freedom = 0, 0.0, 0.0
     period, locked = half_period_s, True
-    batch = np.empty((3, _BATCH))
+    batch, rest = matrix(work, 3, _BATCH), work[3 * _BATCH :]
     while locked and count < room:
         w = math.pi / half_period_s
         reach = int(0.5 * (half_period_s / interval_s - 1.0))
         number = 2 * reach + 1
-        tables, flat, even, odd = _tables(reach, w * interval_s)
+        length = (number + LANES - 1) // LANES * LANES
+        if 3 * length > rest.size:
+            break
+        tables = matrix(rest, 3, length)
+        flat, even, odd = _fill_tables(reach, w * interval_s, tables)
         sd, late_sd = noise / math.sqrt(even), noise / (math.sqrt(odd) * w)
         second, in_time = noise * noise / odd, 1.0 / w
         score, block = 0.0, count
@@ -182,9 +175,9 @@ def track(
                 if not (a > _CLEAR * sd and abs(late) < _LOST):
                     break
                 shift = (rates[0] * a + 0.75 * rates[1] + rates[2] * inverse) * in_time
-                columns[0, count] = centre_s + j * period + (late - shift) * in_time
-                columns[1, count] = late_sd * inverse
-                columns[2, count] = side * (a + 0.5 * (b * late - second * inverse))
+                table[0, count] = centre_s + j * period + (late - shift) * in_time
+                table[1, count] = late_sd * inverse
+                table[2, count] = side * (a + 0.5 * (b * late - second * inverse))
                 score += found[2, j]
                 total += late
                 count += 1
@@ -199,8 +192,9 @@ def track(
             shift = score / ((count - block) * (number - flat * flat / even))
             level += shift
             for k in range(block, count):
-                columns[2, k] -= flat / even * shift
-                columns[3, k] = sd
-                columns[4, k] = level
+                table[2, k] -= flat / even * shift
+                table[3, k] = sd
+                table[4, k] = level
         half_period_s = period
-    return count, residual, freedom
+    result[0], result[1] = residual, freedom
+    return count
