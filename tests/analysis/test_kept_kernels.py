@@ -9,14 +9,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pendpipe.analysis.turning_points import compiled
+from pendpipe.analysis.turning_points import compiled, plain
 from pendpipe.analysis.turning_points.shape import HARMONICS
+from pendpipe.physics.decay import amplitude
 
 FOLDER = Path(compiled.__file__).parent
 
+FIT = """
+import sys
+import numpy as np
+from pendpipe.analysis.fit import fit_recording
+from pendpipe.recording import Recording
+time_s = np.arange(4000) / 100.0
+angle = 0.1 * np.exp(-0.02 * time_s) * np.cos(3.0 * time_s)
+noise = 1e-5 * np.random.default_rng(5).standard_normal(len(time_s))
+fit = fit_recording(Recording(time_s, angle + noise, "angle_rad"))
+print(abs(fit.value("b") - 0.02) < 1e-3, "numba" in sys.modules, "scipy" in sys.modules)
+"""
 MEASURE = """
 import sys
 import numpy as np
@@ -30,10 +42,11 @@ print(len(points) > 30, "numba" in sys.modules, "scipy" in sys.modules)
 """
 
 
-def test_a_new_process_measures_turning_points_without_numba() -> None:
+@pytest.mark.parametrize("code", [MEASURE, FIT], ids=["turning points", "waveform"])
+def test_a_new_process_measures_and_fits_without_numba(code: str) -> None:
     compiled.count_half_cycles(np.arange(3.0), np.array([1, -1, 1]), np.zeros(3, dtype=np.int64))
     run = subprocess.run(
-        [sys.executable, "-c", MEASURE], env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        [sys.executable, "-c", code], env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert run.stdout.split() == ["True", "False", "False"]
@@ -133,3 +146,40 @@ def test_smoothing_leaves_a_parabola_alone(count: int, period: float, drift: flo
     centre, half_period = compiled.smooth_times(number, time_s, np.ones(count), 9.0, number)
     np.testing.assert_allclose(centre, time_s, rtol=1e-9, atol=1e-9 * period)
     np.testing.assert_allclose(half_period, period * (1.0 + 2.0 * drift * number), rtol=1e-7)
+
+
+def test_what_is_said_of_readings_is_what_numpy_says() -> None:
+    values = np.random.default_rng(3).standard_normal(5000)
+    assert plain.fourth_square(values) == pytest.approx(np.sum(np.diff(values, n=4) ** 2))
+    blocks = plain.block_squares(values, 7, 100)
+    starts = (len(values) - 100) * np.arange(7) // 6
+    expected = [np.mean(np.diff(values[s : s + 100], n=4) ** 2) for s in starts]
+    np.testing.assert_allclose(blocks, np.sort(expected))
+    assert plain.extent(values) == (True, values.min(), values.max())
+    for bad in (np.nan, np.inf, -np.inf):
+        assert plain.extent(np.append(values, bad)) == (False, values.min(), values.max())
+    clipped = np.clip(np.sin(np.arange(1000) * 0.05), -0.9, 0.9)
+    high = clipped == 0.9
+    runs = np.count_nonzero(np.diff(high.astype(int)) == 1) + int(high[0])
+    assert plain.stays(clipped, 0.9) == (np.count_nonzero(high), runs)
+
+
+def test_half_cycles_of_white_noise_scatter_as_it() -> None:
+    time_s = np.arange(60_000) * 0.01
+    noise = 0.3 * np.random.default_rng(4).standard_normal(len(time_s))
+    ratio, count = plain.half_cycle_scatter(np.arange(1.0, 599.0), time_s, noise)
+    assert count == 597
+    assert ratio == pytest.approx(0.3**2, rel=4.0 * np.sqrt(2.0 / 597))
+    assert plain.half_cycle_scatter(np.array([1.0, 2.0, 2.01, 3.0]), time_s, noise)[1] == 0
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 0.05), st.floats(0.0, 1e-3))
+def test_the_losses_of_equation_13_come_out_of_its_integral(a: float, b: float, c: float) -> None:
+    time_s, omega = np.arange(60.0), np.pi
+    y = amplitude(time_s, 0.1, a, b, c)
+    assume(y[-1] > 0.01)
+    found = plain.decay(time_s, y, 1e-6)
+    fitted = amplitude(time_s, found[3], *found[:3])
+    np.testing.assert_allclose(fitted, y, rtol=0, atol=1e-4)
+    assert found[:3].min() >= 0.0
+    assert found[4] * omega == pytest.approx(np.pi, abs=0.01)

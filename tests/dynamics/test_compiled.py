@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
+import math
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba import cfunc
 
-from pendpipe.dynamics import compiled, machine_code
+from pendpipe.dynamics import Eq8, compiled, machine_code
+from pendpipe.dynamics.layout import inputs_size, sums_size, work_size
 
 FIRST_CALL = """
 import sys
@@ -68,14 +73,33 @@ def test_numba_works_in_a_process_that_has_loaded_the_kept_code(kept: Path) -> N
     assert first_call(kept, NUMBA_AFTERWARDS) == ["11", "False", "False", "3.0", "zero"]
 
 
-@pytest.mark.slow
-def test_damaged_code_is_compiled_anew(kept: Path) -> None:
+def test_damaged_code_is_compiled_anew(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = kept / compiled.file_name()
     code = path.read_bytes()
+    assert machine_code.load(path) is not None
     path.write_bytes(code[:-1] + bytes([code[-1] ^ 1]))
     assert machine_code.load(path) is None
-    assert first_call(kept)[:2] == ["11", "True"]
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept))
+    # The compiler itself takes half a minute: set-up runs it, and every test runs its code.
+    monkeypatch.setattr(compiled, "_compile", lambda: [a_small_function])
+    renewed = compiled.engine.__wrapped__()
+    assert renewed.owner == [a_small_function]
     assert machine_code.load(path) is not None
+
+
+@cfunc("float64(float64)")
+def a_small_function(x: float) -> float:
+    return math.sqrt(x) + math.cos(x)
+
+
+def test_code_is_kept_and_found_again(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "code"
+    machine_code.keep(path, [(a_small_function.inspect_llvm(), a_small_function.native_name)])
+    loaded = machine_code.load(path)
+    assert loaded is not None
+    (address,), _owner = loaded
+    function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(address)
+    assert function(2.0) == math.sqrt(2.0) + math.cos(2.0)
 
 
 @pytest.mark.parametrize(
@@ -106,3 +130,45 @@ def test_every_compiled_source_is_watched() -> None:
         if "kernel" in path.read_text() or "@part" in path.read_text()
     }
     assert importing_numba <= set(compiled.SOURCES)
+
+
+@pytest.mark.parametrize("directions", [0, 3, 4])
+@pytest.mark.parametrize("samples", [0, 1, 1000])
+@pytest.mark.parametrize("tabulate", [True, False])
+@pytest.mark.parametrize("compared", [True, False])
+def test_the_engine_writes_only_where_it_may(
+    directions: int, samples: int, tabulate: bool, compared: bool
+) -> None:
+    # The engine works on bare memory: everything it gets is embedded in guards here.
+    guard = 100
+
+    def guarded(size: int) -> tuple[np.ndarray, int]:
+        array = np.full(size + 2 * guard, np.pi)
+        return array, array.ctypes.data + 8 * guard
+
+    model = Eq8(3.2, 0.4, 0.01, 0.02, 1e-4)
+    sensitivities = directions + 1 if directions else 0
+    size = inputs_size(directions) + work_size(sensitivities, sensitivities + 1 if samples else 0)
+    columns = directions + 4 if directions else 0
+    buffer, buffer_at = guarded(size)
+    inside = buffer[guard : guard + size]
+    inside[:] = 0.0
+    inside[:9] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0)
+    inside[9 : 9 + directions] = 0.1
+    inside[9 + directions : inputs_size(directions)] = model.shape_derivatives()[
+        :directions
+    ].ravel()
+    time_s = np.linspace(0.0, 100.0, samples)
+    angle, angle_at = guarded(samples)
+    jacobian, jacobian_at = guarded(0 if compared else columns * samples)
+    sums, sums_at = guarded(sums_size(columns))
+    readings = np.zeros(samples)
+    turning, turning_at = guarded((2 + 2 * columns) * 50)
+    compiled.engine()(
+        buffer_at, size, directions, 0.1, tabulate, 50 if samples == 0 else 2**60, 100.0,
+        time_s.ctypes.data, samples, angle_at, jacobian_at, turning_at, 50,
+        readings.ctypes.data, samples if compared else 0, sums_at,
+    )  # fmt: skip
+    for array in (buffer, angle, jacobian, turning, sums):
+        np.testing.assert_array_equal(array[:guard], np.pi)
+        np.testing.assert_array_equal(array[-guard:], np.pi)

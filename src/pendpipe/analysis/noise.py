@@ -37,22 +37,24 @@ def find_step(values: FloatArray) -> float | None:
     float or None
         The step in the unit of `values`; None when the readings lie on no lattice.
     """
-    levels = np.unique(values[:_LATTICE])
-    if levels.size < 3:
-        return None
-    span = levels[-1] - levels[0]
-    gaps = np.diff(levels)
+    levels = np.sort(values[:_LATTICE])
+    gaps = levels[1:] - levels[:-1]
     # Readings that differ by a rounding error of the file are one level.
-    gaps = gaps[gaps > 1e-7 * span]
+    gaps = gaps[gaps > 1e-7 * (levels[-1] - levels[0])]
     if gaps.size < 2:
         return None
-    smallest = float(gaps.min())
-    step = float(np.median(gaps[gaps < 1.5 * smallest]))
+    step = _middle(np.sort(gaps[gaps < 1.5 * gaps.min()]))
     ratio = gaps / step
-    near = ratio < 50.0
-    if np.max(np.abs(ratio[near] - np.round(ratio[near]))) > 0.1:
+    ratio = ratio[ratio < 50.0]
+    if np.abs(ratio - np.round(ratio)).max() > 0.1:
         return None
     return step
+
+
+def _middle(ascending: FloatArray) -> float:
+    """The median of sorted numbers."""
+    half = len(ascending) // 2
+    return 0.5 * float(ascending[half] + ascending[-1 - half])
 
 
 def noise_rms(values: FloatArray, step: float | None = None) -> float:
@@ -78,13 +80,12 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
     floor = quantisation_rms(step)
     if len(values) < 2 * _ORDER:
         return floor
-    if len(values) < 4 * _BLOCK:
-        return max(floor, _block_rms(values[None, :]))
-    length = _BLOCK + _ORDER
+    from pendpipe.analysis.turning_points.plain import block_squares
+
+    length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else len(values)
     number = min(_BLOCKS, len(values) // length)
-    starts = np.linspace(0, len(values) - length, number).astype(np.int64)
-    blocks = values[starts[:, None] + np.arange(length)]
-    return max(floor, _block_rms(blocks))
+    squares = block_squares(np.ascontiguousarray(values), number, length)
+    return max(floor, math.sqrt(_middle(squares) / _gain()))
 
 
 def white_rms(residual: FloatArray) -> float:
@@ -94,29 +95,15 @@ def white_rms(residual: FloatArray) -> float:
     """
     if len(residual) < 2 * _ORDER:
         return float(np.sqrt(np.mean(residual**2)))
-    difference = _fourth(residual)
-    return math.sqrt(float(difference @ difference) / (len(difference) * _gain()))
+    from pendpipe.analysis.turning_points.plain import fourth_square
 
-
-def _fourth(values: FloatArray) -> FloatArray:
-    """Fourth differences along the last axis."""
-    return (
-        values[..., :-4]
-        - 4.0 * values[..., 1:-3]
-        + 6.0 * values[..., 2:-2]
-        - 4.0 * values[..., 3:-1]
-        + values[..., 4:]
-    )
+    square = float(fourth_square(np.ascontiguousarray(residual)))
+    return math.sqrt(square / ((len(residual) - _ORDER) * _gain()))
 
 
 def _gain() -> float:
     """Sum of the squared binomial weights: what white noise is multiplied by."""
     return float(math.comb(2 * _ORDER, _ORDER))
-
-
-def _block_rms(blocks: FloatArray) -> float:
-    squares = np.mean(_fourth(blocks) ** 2, axis=-1)
-    return math.sqrt(float(np.median(squares)) / _gain())
 
 
 def undithered_rms(amplitude: FloatArray, step: float | None, noise: float) -> FloatArray:

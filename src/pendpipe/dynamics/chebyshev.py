@@ -46,6 +46,19 @@ def powers_of_chebyshev(count: int) -> FloatArray:
     return rows
 
 
+def gauss_nodes(count: int) -> FloatArray:
+    """Return the `count` Chebyshev points inside -1 to 1, at which a table is made."""
+    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def gauss_analysis(count: int) -> FloatArray:
+    """Return the matrix that turns values at `gauss_nodes` into Chebyshev coefficients."""
+    angles = np.pi * np.outer(np.arange(count), np.arange(count) + 0.5) / count
+    matrix = 2.0 / count * np.cos(angles)
+    matrix[0] *= 0.5
+    return np.ascontiguousarray(matrix)
+
+
 ANALYSIS: FloatArray = _analysis()
 INTEGRATION: FloatArray = _integration(ANALYSIS)
 # Transposed, so that a product runs along contiguous columns.

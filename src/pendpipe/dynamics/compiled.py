@@ -16,14 +16,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
 SOURCES = (
-    "chebyshev.py", "emission.py", "entry.py", "half_cycle.py", "layout.py", "march.py",
-    "panel.py", "sensitivities.py", "table.py", "views.py", "workspace.py",
+    "chebyshev.py", "comparison.py", "emission.py", "entry.py", "half_cycle.py", "layout.py",
+    "march.py", "panel.py", "polynomials.py", "sensitivities.py", "table.py", "views.py",
+    "workspace.py",
 )  # fmt: skip
 _POINTER, _INTEGER, _NUMBER = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _ENTRY = ctypes.CFUNCTYPE(
     _INTEGER,
     _POINTER, _INTEGER, _INTEGER, _NUMBER, _INTEGER, _INTEGER, _NUMBER,
-    _POINTER, _INTEGER, _POINTER, _POINTER, _POINTER, _INTEGER,
+    _POINTER, _INTEGER, _POINTER, _POINTER, _POINTER, _INTEGER, _POINTER, _INTEGER, _POINTER,
 )  # fmt: skip
 
 

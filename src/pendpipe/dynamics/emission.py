@@ -5,29 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from pendpipe.dynamics.comparison import compare, compare_rest, subtract
 from pendpipe.dynamics.layout import NODE_COUNT
 from pendpipe.dynamics.panel import kernel, part
+from pendpipe.dynamics.polynomials import horner
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.workspace import Work
 
 _BLOCK = 16
-
-
-@kernel
-def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
-    """Evaluate the polynomial of degree 16 with coefficients `c` at `theta`.
-
-    Written out, so that the compiler keeps the coefficients in registers.
-    """
-    c0, c1, c2, c3, c4, c5, c6, c7, c8 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]
-    c9, c10, c11, c12, c13, c14, c15, c16 = c[9], c[10], c[11], c[12], c[13], c[14], c[15], c[16]
-    for i in range(theta.size):
-        z = theta[i]
-        upper = ((((((((c16 * z + c15) * z + c14) * z + c13) * z + c12) * z) + c11) * z) + c10) * z
-        lower = ((((((upper + c9) * z + c8) * z + c7) * z + c6) * z + c5) * z + c4) * z
-        out[i] = (((lower + c3) * z + c2) * z + c1) * z + c0
 
 
 @kernel
@@ -113,9 +100,17 @@ def emit(
         z, t = work.theta[: stop - at], time_s[at:stop]
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
-        horner(work.total[0], z, angle_rad[at:stop])
-        if work.amplitude.size > 0:
-            _emit_derivatives(work, z, t, jacobian, at)
+        if work.readings.size > 0 and work.amplitude.size > 0:
+            residual = work.residual[: z.size]
+            horner(work.total[0], z, residual)
+            subtract(work.readings[at:stop], residual)
+            compare(work, residual[: min(stop, end) - at], start, duration)
+        else:
+            horner(work.total[0], z, angle_rad[at:stop])
+            if work.readings.size > 0:
+                subtract(work.readings[at:stop], angle_rad[at:stop])
+            elif work.amplitude.size > 0:
+                _emit_derivatives(work, z, t, jacobian, at)
         at = stop
     return end
 
@@ -148,17 +143,22 @@ def rest(
 ) -> None:  # fmt: skip
     """Write the samples after the stop: the last turning point, exactly."""
     directions, omega = work.rates.size, work.motion[0]
+    level = signs[0] * y + work.motion[2]
+    if work.amplitude.size > 0:
+        by_omega = 0.0
+        for c in range(directions):
+            work.some[c, 0] = signs[0] * work.amplitude[c + 1]
+            by_omega -= work.rates[c] / omega * work.some[c, 0]
+        work.some[directions, 0] = by_omega
+        work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0]
+        work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
+        if work.readings.size > 0:
+            compare_rest(work, level, first)
+            return
     for i in range(first, angle_rad.size):
-        angle_rad[i] = signs[0] * y + work.motion[2]
-    if work.amplitude.size == 0:
-        return
-    by_omega = 0.0
-    for c in range(directions):
-        by_rate = signs[0] * work.amplitude[c + 1]
-        by_omega -= work.rates[c] / omega * by_rate
+        angle_rad[i] = level
+    if work.readings.size > 0:
+        subtract(work.readings[first:], angle_rad[first:])
+    for c in range(min(jacobian.shape[0], directions + 3)):
         for i in range(first, angle_rad.size):
-            jacobian[c, i] = by_rate
-    for i in range(first, angle_rad.size):
-        jacobian[directions, i] = by_omega
-        jacobian[directions + 1, i] = signs[0] * signs[1] * work.amplitude[0]
-        jacobian[directions + 2, i] = 0.0
+            jacobian[c, i] = work.some[c, 0]

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from pendpipe.dynamics.compiled import engine
-from pendpipe.dynamics.layout import (
-    CONSTANTS,
-    OVERDAMPED,
-    STOPPED,
-    inputs_size,
-    work_size,
-)
+from pendpipe.dynamics.engine import NO_LIMIT, directions_of, run
+from pendpipe.dynamics.model import Eq8
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.model import Eq8, Release
+    from pendpipe.dynamics.laws import Autonomous
+    from pendpipe.dynamics.model import Release
 
 Method = Literal["map", "clock"]
 """``"map"`` tabulates the half-cycle map and is the fast way; ``"clock"`` solves every half cycle
 by the phase clock and is the reference. They agree to 1e-10 of the amplitude, mostly to 1e-12."""
-
-_NO_SAMPLES: FloatArray = np.empty(0)
-_NONE: FloatArray = np.empty((0, 0))
-_NO_LIMIT = 2**62
 
 
 @dataclass(frozen=True)
@@ -53,67 +43,15 @@ class TurningPoints:
     rest_rad: float
 
 
-def _run(
-    model: Eq8,
-    release: Release,
-    method: Method,
-    *,
-    directions: FloatArray = _NONE,
-    rates: FloatArray = _NO_SAMPLES,
-    most: int = _NO_LIMIT,
-    until_s: float = math.inf,
-    time_s: FloatArray = _NO_SAMPLES,
-    angle_rad: FloatArray = _NO_SAMPLES,
-    jacobian: FloatArray = _NONE,
-    turning: FloatArray = _NONE,
-) -> tuple[int, bool]:
-    """Call the engine; return the number of turning points and whether the last is the stop."""
-    if method not in ("map", "clock"):
-        message = f'method must be "map" or "clock", not {method!r}'
-        raise ValueError(message)
-    count = rates.size
-    sensitivities = count + 1 if count else 0
-    polynomials = sensitivities + 1 if time_s.size else 0
-    side = -1.0 if release.angle_rad < 0.0 else 1.0
-    buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
-    buffer[:CONSTANTS] = (
-        *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
-    )  # fmt: skip
-    if count:
-        buffer[CONSTANTS : CONSTANTS + count] = rates
-        buffer[CONSTANTS + count : inputs_size(count)] = directions.ravel()
-    found, state = divmod(
-        engine()(
-            _address(buffer), buffer.size, count, abs(release.angle_rad), method == "map",
-            most, until_s, _address(time_s), time_s.size, _address(angle_rad),
-            _address(jacobian), _address(turning), turning.shape[1],
-        ),
-        OVERDAMPED + 1,
-    )  # fmt: skip
-    if state == OVERDAMPED:
-        message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
-        raise ValueError(message)
-    return found, state == STOPPED
-
-
-def _address(array: FloatArray) -> int:
-    """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
-    if array.size == 0:
-        return 0
-    if not array.flags.writeable:
-        return array.ctypes.data
-    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
-
-
 def turning_points(
-    model: Eq8,
+    model: Eq8 | Autonomous,
     release: Release,
     *,
     count: int | None = None,
     until_s: float | None = None,
     method: Method = "map",
 ) -> TurningPoints:
-    """Return the turning points of Eq. 8.
+    """Return the turning points of Eq. 8, or of any autonomous law (`laws.Autonomous`).
 
     Parameters
     ----------
@@ -132,28 +70,64 @@ def turning_points(
     ValueError
         If there is no end to the motion asked for, or `model` is overdamped.
     """
-    if count is None and until_s is None and model.coulomb == 0.0:
+    if count is None and until_s is None and not _comes_to_rest(model):
         message = "give count or until_s: without Coulomb friction the motion has no end"
         raise ValueError(message)
     if count is not None and count < 1:
         message = f"count must be at least 1, not {count}"
         raise ValueError(message)
-    most = _NO_LIMIT if count is None else count
+    most = NO_LIMIT if count is None else count
+    _check_method(method)
     end_s = math.inf if until_s is None else until_s
     if not end_s >= release.time_s:
         message = f"until_s is {end_s}, before the release at {release.time_s}"
         raise ValueError(message)
+    if not isinstance(model, Eq8):
+        return _autonomous_turning_points(model, release, most, end_s, method)
     room = 1024 if math.isinf(end_s) else _half_cycles(model, release, end_s) + 16
     while True:
         turning = np.empty((2, min(most, room)))
-        found, stopped = _run(
-            model, release, method, most=min(most, room), until_s=end_s, turning=turning
+        found, stopped = run(
+            model,
+            release,
+            tabulate=method == "map",
+            most=min(most, room),
+            until_s=end_s,
+            turning=turning,
         )
         if stopped or found == most or found < room:
             break
         room *= 4
     time_s, angle_rad = turning[0, :found], turning[1, :found]
     return TurningPoints(time_s, angle_rad, stopped, float(angle_rad[-1]) if stopped else math.nan)
+
+
+def _check_method(method: str) -> None:
+    """Refuse an unknown method."""
+    if method not in ("map", "clock"):
+        message = f'method must be "map" or "clock", not {method!r}'
+        raise ValueError(message)
+
+
+def _comes_to_rest(model: Eq8 | Autonomous) -> bool:
+    """Say whether friction is left at rest at the equilibrium."""
+    if isinstance(model, Eq8):
+        return model.coulomb > 0.0
+    return model.sticks(0.0) and bool(model.friction(np.zeros(1), np.zeros(1))[0] > 0.0)
+
+
+def _autonomous_turning_points(
+    law: Autonomous, release: Release, most: int, end_s: float, method: Method
+) -> TurningPoints:
+    """Return turning points by `autonomous.follow`."""
+    from pendpipe.dynamics.autonomous import follow
+
+    motion = follow(law, release, most, end_s, tabulate=method == "map")
+    kept = int(np.searchsorted(motion.time_s, end_s, side="right"))
+    angle_rad = motion.angle_rad[:kept] + release.offset_rad
+    stopped = motion.stopped and kept == motion.time_s.size
+    rest_rad = float(angle_rad[-1]) if stopped else math.nan
+    return TurningPoints(motion.time_s[:kept], angle_rad, stopped, rest_rad)
 
 
 def _half_cycles(model: Eq8, release: Release, until_s: float) -> int:
@@ -181,11 +155,18 @@ def turning_points_with_jacobian(
     if count < 1:
         message = f"count must be at least 1, not {count}"
         raise ValueError(message)
-    directions, rates = _directions(model, hysteretic_share)
+    _check_method(method)
+    directions, rates = directions_of(model, hysteretic_share)
     columns = rates.size + 4
     turning = np.empty((2 + 2 * columns, count))
-    found, stopped = _run(
-        model, release, method, directions=directions, rates=rates, most=count, turning=turning
+    found, stopped = run(
+        model,
+        release,
+        tabulate=method == "map",
+        directions=directions,
+        rates=rates,
+        most=count,
+        turning=turning,
     )
     turning = turning[:, :found]
     rest_rad = float(turning[1, -1]) if stopped else math.nan
@@ -194,9 +175,9 @@ def turning_points_with_jacobian(
 
 
 def sample(
-    model: Eq8, release: Release, time_s: FloatArray, *, method: Method = "map"
+    model: Eq8 | Autonomous, release: Release, time_s: FloatArray, *, method: Method = "map"
 ) -> FloatArray:
-    """Return the readings of Eq. 8 at given times, in rad, offset included.
+    """Return the readings of Eq. 8, or of an autonomous law, at given times; rad, with offset.
 
     Parameters
     ----------
@@ -213,11 +194,24 @@ def sample(
     ValueError
         If the times are not as required, or `model` is overdamped.
     """
-    times = _checked(time_s, release)
+    times = checked_times(time_s, release)
+    _check_method(method)
+    if not isinstance(model, Eq8) and times.size:
+        from pendpipe.dynamics.autonomous import follow
+
+        motion = follow(model, release, NO_LIMIT, float(times[-1]), tabulate=method == "map")
+        return motion.sample(times) + release.offset_rad
     angle_rad = np.empty(times.size)
-    if times.size:
+    if isinstance(model, Eq8) and times.size:
         until_s = float(times[-1])
-        _run(model, release, method, until_s=until_s, time_s=times, angle_rad=angle_rad)
+        run(
+            model,
+            release,
+            tabulate=method == "map",
+            until_s=until_s,
+            time_s=times,
+            angle_rad=angle_rad,
+        )
     return angle_rad
 
 
@@ -247,20 +241,21 @@ def sample_with_jacobian(
     jacobian
         (n, 8) or (n, 7), stored by columns. At c = 0 the derivative by c is that towards c > 0.
     """
-    times = _checked(time_s, release)
-    directions, rates = _directions(model, hysteretic_share)
+    times = checked_times(time_s, release)
+    _check_method(method)
+    directions, rates = directions_of(model, hysteretic_share)
     angle_rad = np.empty(times.size)
     jacobian = np.empty((rates.size + 4, times.size))
     if times.size:
-        _run(
-            model, release, method, directions=directions, rates=rates,
+        run(
+            model, release, tabulate=method == "map", directions=directions, rates=rates,
             until_s=float(times[-1]), time_s=times, angle_rad=angle_rad, jacobian=jacobian,
         )  # fmt: skip
         jacobian[-1] = 1.0
     return angle_rad, jacobian.T
 
 
-def _checked(time_s: FloatArray, release: Release) -> FloatArray:
+def checked_times(time_s: FloatArray, release: Release) -> FloatArray:
     """Return the times as the engine needs them."""
     times = np.ascontiguousarray(time_s, dtype=np.float64)
     if times.ndim != 1 or (times.size and not math.isfinite(times[0] + times[-1])):
@@ -274,23 +269,3 @@ def _checked(time_s: FloatArray, release: Release) -> FloatArray:
         message = f"time_s starts at {times[0]}, before the release at {release.time_s}"
         raise ValueError(message)
     return times
-
-
-def _directions(model: Eq8, hysteretic_share: float | None) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of the model's shape by its rates, and the rates."""
-    derivatives = model.shape_derivatives()
-    rates = np.array([model.quadratic, model.hysteretic, model.viscous, model.coulomb])
-    if hysteretic_share is None:
-        return derivatives, rates
-    total = model.hysteretic + model.viscous
-    if not 0.0 <= hysteretic_share <= 1.0:
-        message = f"hysteretic_share must lie between 0 and 1, not {hysteretic_share}"
-        raise ValueError(message)
-    if abs(model.hysteretic - hysteretic_share * total) > 1e-9 * total:
-        message = f"hysteretic_share is {hysteretic_share}, but {model} has another"
-        raise ValueError(message)
-    joint = hysteretic_share * derivatives[1] + (1.0 - hysteretic_share) * derivatives[2]
-    return (
-        np.stack([derivatives[0], joint, derivatives[3]]),
-        np.array([model.quadratic, total, model.coulomb]),
-    )

@@ -9,14 +9,17 @@ NODE_SIZE = 360
 """Of the workspace of one panel; see `panel.py`."""
 HEAD = 2
 """The first numbers of a half cycle's row; see `half_cycle.py`."""
-MOST_POINTS = 18
-"""Half cycles in a table."""
+FEW_POINTS, MOST_POINTS = 12, 18
+"""Half cycles in a table: multiples of six (see `table.look_up`)."""
 MOST_PANELS = 4
 """Panels to a half cycle in a table."""
 DESCRIPTION = 6
 THETA = 512
 CONSTANTS = 9
 """m, h, q, g, omega; time and offset of the release, and twice the side of the release."""
+MOMENTS = NODE_COUNT + 1
+PLACES = 8
+"""Of a panel, at which the normal matrix is taken; see `comparison.py`."""
 
 RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
@@ -37,7 +40,18 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    return NODE_SIZE + 4 + 6 * s + matrices + 4 * MOST_POINTS + DESCRIPTION + THETA
+    compared = MOMENTS + 2 * THETA + most_columns(s) * PLACES
+    return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA + compared
+
+
+def most_columns(sensitivities: int) -> int:
+    """Return the columns of the Jacobian: rates, omega, angle, time, offset."""
+    return sensitivities + 3 if sensitivities > 0 else 0
+
+
+def sums_size(columns: int) -> int:
+    """Return how many numbers a comparison gives: chi^2, gradient, normal matrix."""
+    return 1 + columns * (1 + columns)
 
 
 def inputs_size(directions: int) -> int:

@@ -14,6 +14,7 @@ from pendpipe.dynamics.table import (
     HIGH,
     LOW,
     MORE_PANELS,
+    NARROWEST,
     PANELS,
     SMOOTH_FROM,
     WIDEST,
@@ -67,7 +68,7 @@ def _lay_out(
         room = min(room, log_y - math.log(SMOOTH_FROM * work.shape[0]))
     count, span = half_cycles_and_span(work.shape, log_y, half_cycles, room)
     panels = int(wanted[0])
-    while count > 1.5 * points_for(span):
+    while count > 1.5 * points_for(span) and span >= NARROWEST:
         outcome = build(work, log_y, span, panels, polynomials)
         if outcome == DONE:
             wanted[0] = panels
@@ -126,7 +127,7 @@ def _emit_row(
 def march(
     constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
     most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray,
-    turning: FloatArray, buffer: FloatArray,
+    turning: FloatArray, readings: FloatArray, sums: FloatArray, buffer: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the pendulum from its release.
 
@@ -149,6 +150,9 @@ def march(
         The last column of the Jacobian, by the offset, is left to the caller.
     turning
         Receives the turning points, a column each; may be empty.
+    readings, sums
+        Readings at the times: without rates `angle_rad` then receives the residuals, with them
+        `sums` their comparison (see `comparison.py`). Both may be empty.
 
     Returns
     -------
@@ -156,7 +160,7 @@ def march(
     """
     columns = rates.size + 1 if rates.size > 0 else 0
     polynomials = columns + 1 if time_s.size > 0 else 0
-    work = carve(buffer, constants, directions, rates, columns, polynomials)
+    work = carve(buffer, constants, directions, rates, readings, sums, columns, polynomials)
     shape, motion, signs = work.shape, work.motion, constants[7:9]
     work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
     for c in range(columns):

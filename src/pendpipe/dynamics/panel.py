@@ -55,6 +55,11 @@ def kernel(function: _F) -> _F:
     return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
+def adder(function: _F) -> _F:
+    """Compile a function whose sums may be taken in any order."""
+    return njit(**(_OPTIONS | {"fastmath": {"contract", "reassoc", "nsz"}}))(function)  # type: ignore[no-any-return]
+
+
 def part(function: _F) -> _F:
     """Compile a function that takes the whole workspace, too much to hand over, into its caller."""
     return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]
@@ -162,7 +167,7 @@ def solve(
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = _renew(node, half_width)
         # The error left is the change times the rate at which changes shrink, once that is known.
-        if change <= 1e-13 * size or change * change <= 1e-13 * size * before:
+        if change <= 1e-12 * size or change * change <= 1e-12 * size * before:
             return _finish(node, shape, radius, half_width, tolerance)
         before = change
     return False

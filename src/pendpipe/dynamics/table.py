@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.chebyshev import powers_of_chebyshev
+from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
-from pendpipe.dynamics.layout import HEAD, MOST_POINTS
+from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS
 from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.workspace import panel_width, row_width
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 WIDEST = 5.2
 """The widest range of ln y that one table spans, and its points; see `points_for`."""
+NARROWEST = 0.01
+"""A narrower range would suffer from the rounding of ln y."""
 SMOOTH_FROM = 20.0
 """Below this multiple of m, half cycles are solved one by one."""
 _LOSS_TOLERANCE = 5e-11
@@ -31,16 +33,18 @@ _WAVEFORM_TOLERANCE = 1e-10
 _LOW_POWERS = 4
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
+_FEW_NODES, _MANY_NODES = gauss_nodes(FEW_POINTS), gauss_nodes(MOST_POINTS)
+_FEW_ANALYSIS, _MANY_ANALYSIS = gauss_analysis(FEW_POINTS), gauss_analysis(MOST_POINTS)
 
 # Entries of a segment's description.
-LOW, HIGH, MIDDLE, HALF_SPAN, POINTS, PANELS = range(6)
+LOW, HIGH, MIDDLE, INVERSE, POINTS, PANELS = range(6)
 DONE, MORE_PANELS, LESS_SPAN = range(3)
 
 
 @kernel
 def points_for(span: float) -> int:
     """Return how many points, a multiple of six, resolve exp(+-ln y) over a span to 1e-13."""
-    return 12 if span < 1.6 else MOST_POINTS
+    return FEW_POINTS if span < 1.6 else MOST_POINTS
 
 
 @kernel
@@ -62,7 +66,7 @@ def half_cycles_and_span(
         loss = 2.0 * (delta / y + h + q * y) + math.pi * g + 1e-300
         if count + step / loss >= half_cycles:
             span += (half_cycles - count) * loss * 1.03 + 2.0 * loss
-            return half_cycles, min(span, room)
+            return half_cycles, min(max(span, NARROWEST), room)
         count += step / loss
         span += step
         y *= factor
@@ -77,18 +81,17 @@ def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) 
     wide for the points.
     """
     points, half = points_for(span), 0.5 * span
-    segment, cosines = work.segment, work.cosines
-    segment[MIDDLE], segment[HALF_SPAN] = log_y - half, half
+    segment = work.segment
+    segment[MIDDLE], segment[INVERSE] = log_y - half, 1.0 / half
     segment[POINTS], segment[PANELS] = points, panels
     width = row_width(work.sigma.size, polynomials, panels)
-    for i in range(4 * points):
-        cosines[i] = math.cos(0.5 * math.pi * i / points)
+    nodes = _MANY_NODES if points == MOST_POINTS else _FEW_NODES
     for i in range(points):
-        y = math.exp(log_y - half + half * cosines[2 * i + 1])
+        y = math.exp(log_y - half + half * nodes[i])
         if not even_half_cycle(work, y, panels, polynomials, work.rows[i]):
             return MORE_PANELS
     first, per_panel = HEAD + 2 * work.sigma.size, panel_width(polynomials)
-    if not _interpolate(points, width, work.rows, cosines, first, per_panel, work.table):
+    if not _interpolate(points, width, work.rows, first, per_panel, work.table):
         return LESS_SPAN
     segment[LOW], segment[HIGH] = log_y - span, log_y
     return DONE
@@ -99,7 +102,6 @@ def _interpolate(
     points: int,
     width: int,
     rows: FloatArray,
-    cosines: FloatArray,
     first: int,
     per_panel: int,
     table: FloatArray,
@@ -113,11 +115,12 @@ def _interpolate(
         least = min(least, rows[i, 0])
     resolved = True
     scratch = rows[MOST_POINTS]
+    analysis = _MANY_ANALYSIS if points == MOST_POINTS else _FEW_ANALYSIS
     for k in range(points):
         for j in range(width):
             scratch[j] = 0.0
         for i in range(points):
-            weight = (2.0 if k > 0 else 1.0) / points * cosines[(k * (2 * i + 1)) % (4 * points)]
+            weight = analysis[k, i]
             for j in range(width):
                 scratch[j] += weight * rows[i, j]
         if k >= points - 2:
@@ -140,7 +143,7 @@ def look_up(
     segment: FloatArray, table: FloatArray, log_y: float, width: int, row: FloatArray
 ) -> None:
     """Write the half cycle that starts at ln y = log_y to `row`."""
-    z = (log_y - segment[MIDDLE]) / segment[HALF_SPAN]
+    z = (log_y - segment[MIDDLE]) * segment[INVERSE]
     for j in range(width):
         row[j] = 0.0
     # Horner's scheme on all entries at once, six powers in a pass to spare the memory.
@@ -157,7 +160,7 @@ def look_up_turning_point(
     segment: FloatArray, table: FloatArray, log_y: float
 ) -> tuple[float, float]:
     """Return the loss and the excess duration of the half cycle that starts at ln y = log_y."""
-    z = (log_y - segment[MIDDLE]) / segment[HALF_SPAN]
+    z = (log_y - segment[MIDDLE]) * segment[INVERSE]
     square = z * z
     # Even and odd powers apart: each half cycle waits for the one before, and so waits less.
     even_loss, odd_loss, even_excess, odd_excess = 0.0, 0.0, 0.0, 0.0

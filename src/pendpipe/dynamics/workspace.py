@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from pendpipe.dynamics import layout
 from pendpipe.dynamics.layout import (
     DESCRIPTION,
+    MOMENTS,
     MOST_PANELS,
     MOST_POINTS,
     NODE_COUNT,
     NODE_SIZE,
+    PLACES,
     THETA,
 )
 from pendpipe.dynamics.panel import kernel
@@ -53,7 +55,6 @@ class Work(NamedTuple):
     """The half cycle in hand; see `half_cycle.py`."""
     rows: FloatArray
     """The half cycles that a table is made of, and one row of scratch."""
-    cosines: FloatArray
     segment: FloatArray
     """What the table spans; see `table.py`."""
     table: FloatArray
@@ -61,10 +62,23 @@ class Work(NamedTuple):
     """(S + 2, 17): the polynomials of the angle, its velocity and its derivatives."""
     theta: FloatArray
     """A block of places within a panel."""
+    readings: FloatArray
+    """What the samples are compared with; empty if they are not."""
+    sums: FloatArray
+    """What comes of it; see `comparison.py`."""
+    moments: FloatArray
+    """(18,): of the residuals of a block."""
+    residual: FloatArray
+    """Of a block of readings."""
+    power: FloatArray
+    """Residuals times a power of their place."""
+    some: FloatArray
+    """(columns, 8): the Jacobian's columns at some places of the panel."""
     wanted: FloatArray
     """How `march` lays out its tables."""
 
 
+most_columns = kernel(layout.most_columns)
 panel_width = kernel(layout.panel_width)
 row_width = kernel(layout.row_width)
 
@@ -75,10 +89,12 @@ def carve(
     constants: FloatArray,
     directions: FloatArray,
     rates: FloatArray,
+    readings: FloatArray,
+    sums: FloatArray,
     sensitivities: int,
     polynomials: int,
 ) -> Work:
-    """Cut `buffer` and `constants` (m, h, q, g, omega, time, offset) into the arrays of a march."""
+    """Cut `buffer` and `constants` into the arrays of a march."""
     s, n = sensitivities, NODE_COUNT
     width = row_width(s, polynomials, MOST_PANELS)
     points = MOST_POINTS
@@ -96,12 +112,17 @@ def carve(
         matrix(rest, points + 1, width),
         rest[(points + 1) * width :],
     )
-    cosines, rest = rest[: 4 * points], rest[4 * points :]
     segment, rest = rest[:DESCRIPTION], rest[DESCRIPTION:]
     table, rest = matrix(rest, points, width), rest[points * width :]
     total, rest = matrix(rest, s + 2, n), rest[(s + 2) * n :]
+    columns_shown = most_columns(s)
+    theta, rest = rest[:THETA], rest[THETA:]
+    moments, rest = rest[:MOMENTS], rest[MOMENTS:]
+    residual, rest = rest[:THETA], rest[THETA:]
+    power, rest = rest[:THETA], rest[THETA:]
+    some, rest = matrix(rest, columns_shown, PLACES), rest[columns_shown * PLACES :]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
-        columns, chebyshev, amplitude, clock, row, rows, cosines, segment, table, total,
-        rest[:THETA], rest[THETA:],
+        columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
+        theta, readings, sums, moments, residual, power, some, rest,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
+from pendpipe.analysis.fit.quick import quick_start
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
@@ -80,11 +81,36 @@ def fit_waveform(
     marginalised: any share from 0 to 1 is as likely beforehand.
     """
     fixed = fixed or {}
-    fitted = _refined(_fit(samples, points, baseline, fixed), samples)
+    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
+    start = start_values(points, held_rates, fixed, baseline)
+    held = _held(held_rates, fixed, parts, baseline)
+    fitted = _refined(_fit(samples, points, start, held, parts), samples)
+    return _result(fitted, samples, points, baseline, fixed)[0]
+
+
+def fit_plain_waveform(samples: Samples) -> FitResult | None:
+    """As `fit_waveform`, for a record that a quick look (`quick.py`) finds plain.
+
+    None if it isn't, or if Eq. 8 and white noise do not explain the readings: then the
+    turning points must be found with care.
+    """
+    quick = quick_start(samples)
+    if quick is None:
+        return None
+    fitted = _refined(_fit(samples, quick.points, quick.start, (), {}), samples)
+    result, stretched = _result(fitted, samples, quick.points, "eq8", {})
+    return result if stretched == 1.0 and fitted.minimum.converged else None
+
+
+def _result(
+    fitted: _Fitted, samples: Samples, points: TurningPoints, baseline: Baseline,
+    fixed: Mapping[str, float],
+) -> tuple[FitResult, float]:  # fmt: skip
+    """Judge what the fit has left; return the result and what its variances were enlarged by."""
     residual = fitted.problem.residual(fitted.minimum.value)
     dof = len(residual) - len(NAMES) + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
-    rms = float(np.sqrt(np.mean(residual**2)))
+    rms = math.sqrt(float(residual @ residual) / len(residual))
     chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
     # What rounding leaves is slow by nature; its likelihood knows that already.
     slow = noise.slow if fitted.problem.step == 0.0 else 1.0
@@ -92,7 +118,7 @@ def fit_waveform(
     # The search weighed the readings by its own first guess of the noise.
     weighed = noise.rms if fitted.problem.step == 0.0 else fitted.problem.noise_rms
     scale = (fitted.problem.noise_rms / weighed) ** 2 / stretched
-    numbers, normal = _numbers(fitted, scale, samples)
+    numbers, matrix = _numbers(fitted, scale, samples)
     parameters = estimates(numbers, points.unit)
     result = FitResult(
         method="waveform",
@@ -107,27 +133,24 @@ def fit_waveform(
         samples=len(residual),
         turning_points=len(points),
     )
-    hysteretic, viscous, said = split_quality_factors(
-        fitted.minimum.value, covariance(normal, fitted.held), fixed
-    )
+    hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, matrix, fixed)
     warnings = [*points.notes, *warnings_of(result, stretched), *said, *fitted.start.warnings]
     if not fitted.minimum.converged:
         warnings.append("the waveform fit did not settle")
-    return replace(
+    full = replace(
         result,
         quality_factor_hysteretic=hysteretic,
         quality_factor_viscous=viscous,
         warnings=tuple(warnings),
     )
+    return full, stretched
 
 
 def _fit(
-    samples: Samples, points: TurningPoints, baseline: Baseline, fixed: Mapping[str, float]
-) -> _Fitted:
-    """Start from the turning points; grow the window where the phase would slip."""
-    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    start = start_values(points, held_rates, fixed, baseline)
-    held = _held(held_rates, fixed, parts, baseline)
+    samples: Samples, points: TurningPoints, start: Start, held: tuple[int, ...],
+    parts: Mapping[str, float],
+) -> _Fitted:  # fmt: skip
+    """Search from the start; grow the window where the phase would slip."""
     span = usable_span(samples, points, start)
     value, used = start.value, start.reliable
     while True:
@@ -150,9 +173,11 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     blamed on the rounding.
     """
     step, problem, value = samples.step, fitted.problem, fitted.minimum.value
+    if step is None:
+        return fitted
     residual = problem.residual(value)
-    rms = math.sqrt(float(np.mean(residual**2)))
-    if step is None or not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
+    rms = math.sqrt(float(residual @ residual) / len(residual))
+    if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
         return fitted
     # Few recordings are so coarse; the others need no numba.
     from pendpipe.analysis.fit.rounding import best_noise
@@ -190,13 +215,13 @@ def _held(
 
 
 def _numbers(fitted: _Fitted, scale: float, samples: Samples) -> tuple[Numbers, FloatArray]:
-    """The seven parameters, with covariance; and the normal matrix at the right noise."""
+    """The seven parameters; and the covariance of the fitted ones."""
     value, held = fitted.minimum.value, fitted.held
     quadratic = fitted.minimum.quadratic
     normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
     normal[SHARE, SHARE] += (1.0 - scale) * waveform.PRIOR_INVERSE
     first, jacobian = _first_turning_point(fitted, float(samples.time_s[0]))
-    matrix = propagated(jacobian, covariance(normal, held))
+    matrix = covariance(normal, held)
     numbers = np.array(
         [*value[:3], 0.5 * value[waveform.OMEGA] / math.pi, first[0], first[1],
          value[waveform.OFFSET]]
@@ -204,14 +229,14 @@ def _numbers(fitted: _Fitted, scale: float, samples: Samples) -> tuple[Numbers, 
     intervals = dict(
         zip(
             "abc",
-            intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held),
+            intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held, matrix),
             strict=True,
         )
     )
     at_bound = [
         name for index, name in enumerate("abc") if index not in held and value[index] <= 0.0
     ]
-    return Numbers(numbers, matrix, intervals, at_bound), normal
+    return Numbers(numbers, propagated(jacobian, matrix), intervals, at_bound), matrix
 
 
 def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:

@@ -24,6 +24,7 @@ def intervals95(
     bounds: Bounds,
     indices: Sequence[int],
     held: Sequence[int] = (),
+    matrix: FloatArray | None = None,
 ) -> list[tuple[float, float]]:
     """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
 
@@ -39,28 +40,37 @@ def intervals95(
         The parameters whose intervals are wanted.
     held
         Parameters that are not fitted.
+    matrix
+        The covariance, where it is known.
 
     Notes
     -----
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    matrix = covariance(normal, held)
+    matrix = covariance(normal, held) if matrix is None else matrix
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     fitted = [j for j in range(len(value)) if j not in held]
     at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))
+    half = math.sqrt(CHI2_95) * deviations
+    # The others follow a parameter that is moved to an end of its interval.
+    sizes = np.where(deviations > 0.0, deviations, 1.0)
+    step = matrix[:, indices] * (half / sizes**2)[indices]
+    room = bounds.about(value)
+    inside = (
+        (-step >= room.lower[:, None]) & (-step <= room.upper[:, None]),
+        (step >= room.lower[:, None]) & (step <= room.upper[:, None]),
+    )
+    ok = [at_rest & side.all(axis=0) for side in inside]
     result = []
-    for index in indices:
-        sd = float(deviations[index])
-        half = math.sqrt(CHI2_95) * sd
-        ends = [float(value[index]) - half, float(value[index]) + half]
-        if sd > 0.0:
-            follow = matrix[:, index] / matrix[index, index]
-            for k, step in enumerate((-half, half)):
-                if not (at_rest and bounds.hold(value + step * follow)):
-                    ends[k] = _profiled_end(
-                        value, normal, gradient, bounds, index, held, math.copysign(_FAR * sd, step)
-                    )
+    for position, index in enumerate(indices):
+        width = float(half[index])
+        ends = [float(value[index]) - width, float(value[index]) + width]
+        if width > 0.0:
+            for k, sign in enumerate((-1.0, 1.0)):
+                if not ok[k][position]:
+                    reach = sign * _FAR * float(deviations[index])
+                    ends[k] = _profiled_end(value, normal, gradient, bounds, index, held, reach)
         result.append((ends[0], ends[1]))
     return result
 

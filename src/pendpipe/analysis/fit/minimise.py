@@ -16,7 +16,7 @@ from pendpipe.arrays import FloatArray
 
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
 _SMALL: Final = 1e4
-_KEPT: Final = 3e-3
+_KEPT: Final = 1e-3
 
 
 class Quadratic(NamedTuple):
@@ -60,8 +60,9 @@ def minimise(
         The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
         standard deviations. That step is still taken, on trust.
     chi2_only
-        chi^2 at a point, where that costs less. A step that lowers chi^2 as promised, to
-        3e-3, has arrived within 0.05 standard deviations: it needs no new derivatives.
+        chi^2 at a point, where that costs less. A step that lowers chi^2 by 1 +- e times
+        what it promised is itself off by about e, and leaves e^2 of that to be gained: if
+        this is below 1e-3 (0.03 standard deviations), it needs no new derivatives.
     most
         Greatest number of evaluations.
     """
@@ -69,7 +70,9 @@ def minimise(
     now = evaluate(value)
     level, spent = 0, 1
     while spent < most:
-        damped = now.normal + _DAMPING[level] * np.diag(np.diag(now.normal))
+        damped = now.normal
+        if level > 0:
+            damped = damped + _DAMPING[level] * np.diag(np.diag(damped))
         step = bounded_step(damped, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         if promised < tolerance and level < 3:
@@ -77,7 +80,7 @@ def minimise(
         trial = bounds.clip(value + step)
         if chi2_only is not None and level == 0 and promised < _SMALL:
             reached = now.chi2 - chi2_only(trial)
-            if abs(reached - promised) < _KEPT:
+            if (reached - promised) ** 2 < _KEPT * promised:
                 return Minimum(trial, _moved(now, step), True, spent)
         then = evaluate(trial)
         spent += 1

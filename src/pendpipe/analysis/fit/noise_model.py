@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.plain import half_cycle_scatter
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 
@@ -50,15 +51,10 @@ def judge_noise(
 def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
     """Scatter of the residual's amplitude in each half cycle against white noise's."""
     middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
-    where = np.searchsorted(time, middles)
-    counts = np.diff(where)
-    if len(counts) < 9 or np.any(counts < 3):
+    if len(middles) < 10:
         return 1.0
-    part = slice(int(where[0]), int(where[-1]))
-    share = (time[part] - np.repeat(middles[:-1], counts)) / np.repeat(np.diff(middles), counts)
-    # A parabola is the half wave, near enough.
-    form = share * (1.0 - share)
-    products = np.add.reduceat(residual[part] * form, where[:-1] - where[0])
-    squares = np.add.reduceat(form * form, where[:-1] - where[0])
-    ratio = float(np.mean(products**2 / squares)) / rms**2
-    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(products)) else 1.0
+    ratio, half_cycles = half_cycle_scatter(middles, time, residual)
+    if half_cycles == 0:
+        return 1.0
+    ratio /= rms**2
+    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / half_cycles) else 1.0

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+
+_SINGULAR: Final = 1e12
+"""Of the scaled inverse: beyond, it is mostly rounding."""
 
 
 class Bounds(NamedTuple):
@@ -61,6 +64,10 @@ def bounded_step(
     held
         Entries that stay zero.
     """
+    if len(held) == 0:
+        step = solved(normal, gradient)
+        if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
+            return step
     free = [j for j in range(len(gradient)) if j not in held]
     walls = bounds.walls(free)
     for size in range(len(walls) + 1):
@@ -89,7 +96,7 @@ def _best(slope: FloatArray, wall: FloatArray, bounds: Bounds, on: list[int]) ->
 
 def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Solve a positive definite system whose parameters differ by many orders of size."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scale = 1.0 / np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
     scaled = matrix * scale[:, None] * scale
     try:
         return np.asarray(np.linalg.solve(scaled, right * scale) * scale)
@@ -106,7 +113,17 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     free = np.array([j for j in range(len(normal)) if j not in held], dtype=np.int64)
     part = normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))
-    inverse = np.linalg.pinv(part * scale[:, None] * scale, rcond=1e-14, hermitian=True)
+    scaled = part * scale[:, None] * scale
+    try:
+        inverse = np.linalg.inv(scaled)
+        sound = bool(np.abs(inverse).max(initial=0.0) < _SINGULAR)
+    except np.linalg.LinAlgError:
+        sound = False
+    if not sound:
+        inverse = np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    inverse *= scale[:, None] * scale
+    if len(free) == len(normal):
+        return np.asarray(inverse)
     result = np.zeros_like(normal)
-    result[np.ix_(free, free)] = inverse * scale[:, None] * scale
+    result[np.ix_(free, free)] = inverse
     return result

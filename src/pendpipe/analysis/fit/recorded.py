@@ -53,12 +53,14 @@ def fit_recording(
 
             points = find_turning_points(recording, place)
         return fit_points(points, baseline=baseline, fixed=fixed)
-    from pendpipe.analysis.fit.by_waveform import fit_waveform
+    from pendpipe.analysis.fit.by_waveform import fit_plain_waveform, fit_waveform
     from pendpipe.analysis.turning_points.samples import prepare
 
     samples = prepare(recording, place)
     if points is None:
-        # Numba comes along, which those who have the points need not wait for.
+        plain = fit_plain_waveform(samples) if baseline == "eq8" and not fixed else None
+        if plain is not None:
+            return plain
         from pendpipe.analysis.turning_points.find import turning_points_of
 
         points = turning_points_of(samples, place)

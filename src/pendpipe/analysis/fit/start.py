@@ -137,8 +137,8 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     first = float(start.value[5]) if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
-    y0 = float(points.amplitude_rad[0])
-    if 0.0 < _STOP * width < y0:
+    y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
+    if 0.0 < _STOP * width < y0 and end < 2.0 * _STOP * width:
         last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
     least = float(points.time_s[min(3, len(points) - 1)])
     begin = int(np.searchsorted(samples.time_s, first))

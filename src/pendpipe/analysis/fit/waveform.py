@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.fit.minimise import Quadratic
 from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
+from pendpipe.dynamics import Eq8, Release, compare, residuals, sample_with_jacobian
 
 NAMES: Final = ("a", "b", "c", "omega", "angle", "time", "offset", "share")
 A, B, C, OMEGA, ANGLE, TIME, OFFSET, SHARE = range(8)
@@ -48,6 +48,7 @@ class Waveform:
     noise_rms: float
     split: Mapping[str, float]
     step: float = 0.0
+    _last: dict[bytes, FloatArray] = field(default_factory=dict, compare=False, repr=False)
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
@@ -67,8 +68,12 @@ class Waveform:
         return float(value[SHARE]) * b, (1.0 - float(value[SHARE])) * b
 
     def residual(self, value: FloatArray) -> FloatArray:
-        """Readings less model, shape (n,)."""
-        return self.values - sample(*self.model(value), self.time_s)
+        """Readings less model, shape (n,); the last is kept, for it is asked for again."""
+        key = value.tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = residuals(*self.model(value), self.time_s, self.values)
+        return self._last[key]
 
     def chi2(self, value: FloatArray) -> float:
         """chi^2 with the share's prior; infinite where the model says nothing."""
@@ -101,24 +106,32 @@ class Waveform:
         model, release = self.model(value)
         if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
             return refused
-        chi2, gradient, normal = 0.0, np.zeros(size), np.zeros((size, size))
-        for first in range(0, len(self.time_s), _PIECE):
-            piece = slice(first, first + _PIECE)
-            try:
-                angle, raw = sample_with_jacobian(model, release, self.time_s[piece])
-            except ValueError:
-                # Overdamped: far from anything that turns.
-                return refused
-            part, slope, weight = self._weighed(self.values[piece] - angle)
-            chi2 += part
-            gradient += raw.T @ slope
-            if isinstance(weight, float):
-                normal += weight * (raw.T @ raw)
+        try:
+            if self.step == 0.0:
+                square, gradient, normal = compare(model, release, self.time_s, self.values)
+                weight = self.noise_rms**-2
+                chi2 = square * weight
+                gradient, normal = gradient * weight, normal * weight
             else:
-                normal += raw.T @ (raw * weight[:, None])
+                chi2, gradient, normal = self._rounded(model, release)
+        except ValueError:
+            # Overdamped: far from anything that turns.
+            return refused
         change = self.change(value)
         gradient, normal = change.T @ gradient, change.T @ normal @ change
         return self._with_prior(value, Quadratic(chi2, gradient, normal))
+
+    def _rounded(self, model: Eq8, release: Release) -> tuple[float, FloatArray, FloatArray]:
+        """As `compare`, with the weights that the rounding gives; over pieces of the record."""
+        chi2, gradient, normal = 0.0, np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
+        for first in range(0, len(self.time_s), _PIECE):
+            piece = slice(first, first + _PIECE)
+            angle, raw = sample_with_jacobian(model, release, self.time_s[piece])
+            part, score, weights = self._weighed(self.values[piece] - angle)
+            chi2 += part
+            gradient += raw.T @ score
+            normal += raw.T @ (raw * np.reshape(weights, (-1, 1)))
+        return chi2, gradient, normal
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""

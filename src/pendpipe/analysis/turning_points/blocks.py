@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.turning_points.plain import track
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
+from pendpipe.analysis.turning_points.shape import LEVEL_BLOCK, LossRates, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
@@ -71,12 +72,9 @@ def _tracked(
 
     Every core takes a part of the record; all write into one table.
     """
-    interval = _even_interval(samples.time_s)
+    interval = even_interval(samples.time_s)
     if interval is None:
         return None
-    # Numba comes along: it is little beside a record that is so long.
-    from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
-
     cores = min(os.cpu_count() or 1, _CORES, max(1, len(samples) // (2 * block)))
     starts = [len(samples) * k // cores for k in range(cores)]
     heads = [_start(samples, start, measure_block, block // 64) for start in starts]
@@ -91,12 +89,12 @@ def _tracked(
     def follow(k: int) -> tuple[int, float, float]:
         head, start = known[k], starts[k]
         stop = (*starts, len(samples))[k + 1] + overlap
-        return track(
-            samples.values[start:stop], float(samples.time_s[start]), interval,
-            float(head.time_s[1]), 0.5 / head.apparent_frequency_hz, float(head.side[1]),
-            float(head.level_rad[0]), np.array(_rates(head)), known[0].noise_rms_rad,
-            columns[:, k * room : (k + 1) * room],
-        )  # fmt: skip
+        begin = [
+            float(samples.time_s[start]), interval, float(head.time_s[1]),
+            0.5 / head.apparent_frequency_hz, float(head.side[1]), float(head.level_rad[0]),
+            known[0].noise_rms_rad, *_rates(head),
+        ]  # fmt: skip
+        return track(samples.values[start:stop], np.array(begin), columns, k * room, room)
 
     with ThreadPoolExecutor(cores) as pool:
         parts = list(pool.map(follow, range(cores)))
@@ -166,13 +164,14 @@ def _closed_up(columns: FloatArray, room: int, counts: list[int], half_period: f
     return total
 
 
-def _even_interval(time_s: FloatArray) -> float | None:
+def even_interval(time_s: FloatArray) -> float | None:
     """The interval between readings; None if they are not evenly spaced throughout."""
     last = len(time_s) - 1
     interval = float(time_s[-1] - time_s[0]) / last
-    at = np.linspace(0, last, 4096).astype(np.int64)
-    off = np.abs(time_s[at] - (time_s[0] + interval * at))
-    return interval if float(off.max()) < 0.01 * interval else None
+    every = max(1, last // 2048)
+    some = time_s[::every]
+    off = some - (time_s[0] + interval * every * np.arange(len(some)))
+    return interval if float(np.abs(off).max()) < 0.01 * interval else None
 
 
 def _pieces(

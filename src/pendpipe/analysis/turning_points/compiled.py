@@ -18,7 +18,8 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.compiled import kept, name_of
 
 SOURCES: Final = (
-    "entries.py", "kernels.py", "shape.py", "sums.py", "../../dynamics/views.py",
+    "entries.py", "kernels.py", "plain_entries.py", "plain_loops.py", "shape.py", "sums.py",
+    "tracking.py", "../../dynamics/views.py",
 )  # fmt: skip
 # The kinds of each entry's arguments: arrays of numbers (F) or integers (I), a number, an integer.
 ARGUMENTS: Final = {
@@ -28,6 +29,13 @@ ARGUMENTS: Final = {
     "plain_sums": "FFiiIFFifFFFF",
     "half_cycle_sums": "FFiiIFFifFiFFFF",
     "solve_half_cycles": "FFFiiFFF",
+    "fourth_square": "FiF",
+    "block_squares": "FiiFi",
+    "extent": "FiF",
+    "stays": "FifF",
+    "half_cycle_scatter": "FiFFiF",
+    "decay": "FFifFF",
+    "track": "FiFFiiiFFi",
 }
 _KINDS: Final[dict[str, Any]] = {
     "F": np.ctypeslib.ndpointer(np.float64, flags="C"),
@@ -49,16 +57,18 @@ def _compile() -> list[Any]:
 
 
 @cache
-def _entries() -> dict[str, Any]:
+def entries() -> dict[str, Any]:
+    """Return the compiled loops by name, as functions of arrays, integers and numbers."""
     addresses, owner = kept(file_name(), _compile)
-    entries: dict[str, Any] = {"owner": owner}
+    found: dict[str, Any] = {"owner": owner}
     for (name, letters), address in zip(ARGUMENTS.items(), addresses, strict=True):
         prototype = ctypes.CFUNCTYPE(ctypes.c_int64, *(_KINDS[letter] for letter in letters))
-        entries[name] = prototype(address)
-    return entries
+        found[name] = prototype(address)
+    return found
 
 
-def _numbers(values: Any) -> FloatArray:
+def numbers(values: Any) -> FloatArray:
+    """Return numbers as the loops need them."""
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
@@ -85,8 +95,8 @@ def extremes(values: FloatArray, stride: int, start: float, least: float) -> tup
         Positions of the extremes; `first` is +1 if the first one is a maximum.
     """
     found = np.empty(len(values) // (2 * stride) + 2, dtype=np.int64)
-    count = _entries()["extremes"](
-        _numbers(values), len(values), stride, start, least, found, len(found), np.empty(10)
+    count = entries()["extremes"](
+        numbers(values), len(values), stride, start, least, found, len(found), np.empty(10)
     )
     return found[: abs(count)].copy(), (count > 0) - (count < 0)
 
@@ -106,9 +116,9 @@ def smooth_times(
         Smoothed time and slope at each number in `at`.
     """
     centre, slope = np.empty(len(at)), np.empty(len(at))
-    _entries()["smooth_times"](
-        _numbers(number), _numbers(time_s), _numbers(weight), len(number), wanted,
-        _numbers(at), len(at), centre, slope, np.empty(15),
+    entries()["smooth_times"](
+        numbers(number), numbers(time_s), numbers(weight), len(number), wanted,
+        numbers(at), len(at), centre, slope, np.empty(15),
     )  # fmt: skip
     return centre, slope
 
@@ -134,8 +144,8 @@ def count_half_cycles(
     number = np.zeros(len(time_s), dtype=np.int64)
     if len(time_s) < 2:
         return number, len(time_s)
-    good = _entries()["count_half_cycles"](
-        _numbers(time_s), _integers(sign), _integers(gap_before), len(time_s),
+    good = entries()["count_half_cycles"](
+        numbers(time_s), _integers(sign), _integers(gap_before), len(time_s),
         float(np.median(np.diff(time_s[:6]))), number,
     )  # fmt: skip
     return number, good
@@ -174,14 +184,14 @@ def half_cycle_sums(
     gram, right = np.zeros((count, terms, terms)), np.zeros((count, terms))
     square = np.zeros(count)
     arguments = (
-        _numbers(time_s), _numbers(values), len(values), stride, _integers(edges),
-        _numbers(centre_s), _numbers(rate), count, level, _numbers(shape),
+        numbers(time_s), numbers(values), len(values), stride, _integers(edges),
+        numbers(centre_s), numbers(rate), count, level, numbers(shape),
     )  # fmt: skip
     if free or shape[:, 4:].any():
         work = np.empty(terms)
-        _entries()["half_cycle_sums"](*arguments, free, gram, right, square, work)
+        entries()["half_cycle_sums"](*arguments, free, gram, right, square, work)
     else:
-        _entries()["plain_sums"](*arguments, gram, right, square)
+        entries()["plain_sums"](*arguments, gram, right, square)
     return gram, right, square
 
 
@@ -207,8 +217,8 @@ def solve_half_cycles(
     count, terms = right.shape
     size = terms - 1
     solution, inverse = np.full((count, size, 2), np.nan), np.full((count, size, size), np.nan)
-    _entries()["solve_half_cycles"](
-        _numbers(gram), _numbers(right), _numbers(prior), count, terms, solution, inverse,
+    entries()["solve_half_cycles"](
+        numbers(gram), numbers(right), numbers(prior), count, terms, solution, inverse,
         np.empty(size * size + size),
     )  # fmt: skip
     return solution, inverse

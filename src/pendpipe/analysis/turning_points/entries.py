@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import cfunc, types
 
-from pendpipe.analysis.turning_points import kernels, sums
+from pendpipe.analysis.turning_points import kernels, plain_entries, sums
 from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.dynamics.views import matrix, vector
 
@@ -97,9 +97,9 @@ def _solve_half_cycles(
 
 def compiled_entries(arguments: dict[str, str]) -> list[Any]:
     """Compile the entries whose arguments are given, a letter each (see `compiled.ARGUMENTS`)."""
-    entries = []
+    entries, here = [], globals() | vars(plain_entries)
     for name, letters in arguments.items():
         signature = types.int64(*(_KINDS[letter] for letter in letters))
         make = cfunc(signature, _nrt=False, error_model="numpy")  # type: ignore[call-arg]
-        entries.append(make(globals()[f"_{name}"]))
+        entries.append(make(here[f"_{name}"]))
     return entries

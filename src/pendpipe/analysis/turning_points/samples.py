@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import find_step, noise_rms
+from pendpipe.analysis.turning_points.plain import extent, stays
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Recording
 
-_CHUNK: Final = 1 << 20
 _FEWEST: Final = 16
 _SATURATED: Final = 0.1
 
@@ -65,13 +65,14 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     if recording.quantity == "volts":
         recording = recording.as_motion()
     time, values = recording.time_s, recording.values
-    if recording.quality is not None or not _all_finite(values):
+    finite, low, high = extent(values)
+    if recording.quality is not None or not finite:
         time, values = time[recording.usable], values[recording.usable]
+        _, low, high = extent(values)
     if len(values) < _FEWEST:
         raise NotAnalysableError(
             place, f"{len(values)} readings are too few", "record at least three half cycles"
         )
-    low, high = float(values.min()), float(values.max())
     if low == high:
         raise NotAnalysableError(
             place, f"the channel is dead: it reads {low:.6g} throughout", "check the sensor"
@@ -89,13 +90,6 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     return Samples(time, values, recording.unit, step, noise_rms(values, step))
 
 
-def _all_finite(values: FloatArray) -> bool:
-    """Whether all are finite, looked through in pieces."""
-    return all(
-        bool(np.isfinite(values[i : i + _CHUNK]).all()) for i in range(0, len(values), _CHUNK)
-    )
-
-
 def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | Path) -> None:
     """Refuse a channel that spends its turning points at the end of its range.
 
@@ -105,15 +99,14 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
     """
     piece = values[: 1 << 18]
     for extreme in (low, high):
-        at = piece == extreme
-        share = np.count_nonzero(at) / len(piece)
+        count, runs = stays(piece, extreme)
+        share = count / len(piece)
         if share <= _SATURATED:
             continue
         levels = np.unique(piece)
         step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
         expected = math.sqrt(max(step, 1e-12) / (high - low))
-        runs = np.count_nonzero(np.diff(at.astype(np.int8)) == 1) + int(at[0])
-        if len(levels) > 16 and share > 2.0 * expected and np.count_nonzero(at) > 8 * runs:
+        if len(levels) > 16 and share > 2.0 * expected and count > 8 * runs:
             raise NotAnalysableError(
                 place,
                 f"the channel is saturated: {100.0 * share:.0f} % of the readings are"

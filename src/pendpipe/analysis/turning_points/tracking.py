@@ -1,163 +1,200 @@
 """One pass over a very long, evenly sampled record: a phase-locked loop of least squares.
 
-Every half cycle is fitted with a cosine and a sine about its expected turning. Their
-values at whole numbers of readings from there are tabulated, and turned by the fraction
-that remains, cos(p + q) = cos p cos q - sin p sin q, so that a reading costs three
-multiplications.
+Every half cycle is fitted with a cosine and a sine over an odd number of readings about the
+one nearest to its expected turning. There the two are orthogonal, so that the fit is two
+products with tables made once a block; the fraction of a reading between that one and the
+turning is made up for by turning the result, cos(p + q) = cos p cos q - sin p sin q.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
 from numba import njit
 
+from pendpipe.analysis.turning_points.shape import LANES, LEVEL_BLOCK
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.views import matrix
 
-LEVEL_BLOCK = 256
-"""Half cycles over which level and period are one number each."""
-_FOLLOW, _LEARN = 0.2, 0.02
-"""Share of a phase error that moves the next half cycle, and that changes the period."""
+_BATCH = 8
+"""Half cycles that are measured where the loop expects them, before it looks where they were.
+
+One by one each would wait for the one before, and the processor with them."""
+_FOLLOW, _LEARN = 0.7, 0.3
+"""Share of a batch's mean phase error that moves the next, and that changes the period."""
 _LOST = 0.3
 """Phase error in rad at which the lock counts as lost."""
 _CLEAR = 8.0
 """Standard deviations by which an amplitude must stand out for its phase to be used."""
 _SAMPLED = 16
 """Every how many-th half cycle tells the noise."""
+_KEPT: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 
 
-@njit(cache=True, fastmath=True, nogil=True)
-def _products(
-    piece: FloatArray, cosine: FloatArray, sine: FloatArray, level: float
-) -> tuple[float, float, float]:
-    """Sums of readings less level: alone, times cosine, times sine."""
-    alone, even, odd = 0.0, 0.0, 0.0
-    for i in range(len(piece)):
+@njit(**_KEPT, fastmath=True)
+def _products(piece: FloatArray, tables: FloatArray, level: float) -> tuple[float, float, float]:
+    """Sums of readings less level times each of the tables."""
+    even, odd, rest = 0.0, 0.0, 0.0
+    cosine, sine, rests = tables[0], tables[1], tables[2]
+    for i in range(piece.size):
         x = piece[i] - level
-        alone += x
         even += x * cosine[i]
         odd += x * sine[i]
-    return alone, even, odd
+        rest += x * rests[i]
+    return even, odd, rest
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@njit(**_KEPT, fastmath=True)
 def _squares(piece: FloatArray, level: float) -> float:
     """Sum of the squares of readings less level."""
     total = 0.0
-    for i in range(len(piece)):
+    for i in range(piece.size):
         total += (piece[i] - level) ** 2
     return total
 
 
-@njit(cache=True)
-def _running(column: FloatArray) -> FloatArray:
-    """Running sum, from zero."""
-    total = np.zeros(len(column) + 1)
-    for i in range(len(column)):
-        total[i + 1] = total[i] + column[i]
-    return total
+@njit(**_KEPT, fastmath=True)
+def _fit_batch(
+    values: FloatArray, first: float, period: float, reach: int, step: float,
+    tables: FloatArray, level: float, found: FloatArray,
+) -> int:  # fmt: skip
+    """Fit the half cycles expected at the readings `first`, `first` + `period`, ...
+
+    Fills `found` with factors of cosine and sine about the expected turning, and the sum of
+    what they leave, a column each; returns how many lie among the readings.
+    """
+    number, length = 2 * reach + 1, tables.shape[1]
+    for j in range(found.shape[1]):
+        at = first + j * period
+        middle = math.floor(at + 0.5)
+        lo = middle - reach
+        if lo < 0 or lo + number > values.size:
+            return j
+        if lo + length <= values.size:
+            even, odd, rest = _products(values[lo : lo + length], tables, level)
+        else:
+            even, odd, rest = _products(values[lo : lo + number], tables[:, :number], level)
+        phase = (middle - at) * step
+        square = phase * phase
+        cosine = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
+        sine = phase * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)))
+        found[0, j] = even * cosine - odd * sine
+        found[1, j] = even * sine + odd * cosine
+        found[2, j] = rest
+    return int(found.shape[1])
 
 
-@njit(cache=True, nogil=True)
+@njit(**_KEPT)
+def _fill_tables(reach: int, step: float, tables: FloatArray) -> tuple[float, float, float]:
+    """Write the weights of the readings from -reach to reach about a turning, `step` apart.
+
+    Rows of `tables`: for the cosine's factor, the sine's, and the sum of what they leave.
+
+    Returns
+    -------
+    flat, even, odd
+        Sums of the cosine, its square, and the sine's square.
+    """
+    number = 2 * reach + 1
+    flat, even, odd = 0.0, 0.0, 0.0
+    for i in range(tables.shape[1]):
+        cosine = math.cos((i - reach) * step) if i < number else 0.0
+        sine = math.sin((i - reach) * step) if i < number else 0.0
+        tables[0, i], tables[1, i] = cosine, sine
+        flat, even, odd = flat + cosine, even + cosine * cosine, odd + sine * sine
+    for i in range(tables.shape[1]):
+        cosine = tables[0, i]
+        tables[2, i] = 1.0 - cosine * (flat / even) if i < number else 0.0
+        tables[0, i] = cosine / even
+        tables[1, i] /= odd
+    return flat, even, odd
+
+
+@njit(**_KEPT)
 def track(
-    values: FloatArray,
-    start_s: float,
-    interval_s: float,
-    centre_s: float,
-    half_period_s: float,
-    side: float,
-    level: float,
-    rates: FloatArray,
-    noise: float,
-    columns: FloatArray,
-) -> tuple[int, float, float]:
+    values: FloatArray, start: FloatArray, columns: FloatArray, first: int, room: int,
+    result: FloatArray, work: FloatArray,
+) -> int:  # fmt: skip
     """Fit half cycle after half cycle, each placed by those before it.
 
     Parameters
     ----------
-    values, start_s, interval_s
+    values
         Readings, evenly spaced.
-    centre_s, half_period_s, side
-        The first half cycle: time of its turning, half period, +1 above the level.
-    level
-        Where the level is at first; it is estimated anew every `LEVEL_BLOCK` half cycles.
-    rates
-        a, b, c of Eq. 13, so small that they shift times only (see `shape.py`).
-    noise
-        Rms of one reading.
+    start
+        See `plain.track`: the time of the first reading and the interval; time of turning,
+        half period, side and level of the first half cycle; the noise; a, b, c.
     columns
-        To be filled: time, its sd, signed angle, its sd, level; shape (5, room).
+        To be filled from column `first` on, `room` columns at most: time, its sd, signed
+        angle, its sd, level.
+    result
+        To be filled: sum of squares about some of the fits, and its degrees of freedom.
+    work
+        Room for the tables and a batch; the loop ends if the half period outgrows it.
 
     Returns
     -------
-    count
+    int
         Half cycles measured: up to the end, or to where the lock is lost.
-    residual_square, freedom
-        Sum of squares about some of the fits, and its degrees of freedom.
     """
-    room, count, residual, freedom = columns.shape[1], 0, 0.0, 0.0
-    period = half_period_s
-    while count < room:
-        # The tables of one block of half cycles.
+    start_s, interval_s, centre_s, half_period_s = start[0], start[1], start[2], start[3]
+    side, level, noise, rates = start[4], start[5], start[6], start[7:10]
+    table = columns[:, first : first + room]
+    count, residual, freedom = 0, 0.0, 0.0
+    period, locked = half_period_s, True
+    batch, rest = matrix(work, 3, _BATCH), work[3 * _BATCH :]
+    while locked and count < room:
         w = math.pi / half_period_s
-        reach = int(0.5 * half_period_s / interval_s) + 3
-        phases = (np.arange(2 * reach + 1) - reach) * (w * interval_s)
-        cosines, sines = np.cos(phases), np.sin(phases)
-        sum_c, sum_s = _running(cosines), _running(sines)
-        sum_cc, sum_cs = _running(cosines * cosines), _running(cosines * sines)
-        information, score, coupling, block = 0.0, 0.0, 0.0, count
-        while count < room and count - block < LEVEL_BLOCK:
-            lo = math.ceil((centre_s - 0.5 * half_period_s - start_s) / interval_s)
-            hi = math.ceil((centre_s + 0.5 * half_period_s - start_s) / interval_s)
-            middle = round((centre_s - start_s) / interval_s)
-            if lo < 0 or hi > len(values):
-                break
-            p, q = lo - middle + reach, hi - middle + reach
-            piece = values[lo:hi]
-            alone, even, odd = _products(piece, cosines[p:q], sines[p:q], level)
-            rest = w * (start_s + middle * interval_s - centre_s)
-            co, si = math.cos(rest), math.sin(rest)
-            n = hi - lo
-            c_, s_ = sum_c[q] - sum_c[p], sum_s[q] - sum_s[p]
-            cc, cs = sum_cc[q] - sum_cc[p], sum_cs[q] - sum_cs[p]
-            ss = n - cc
-            f1, s1 = co * c_ - si * s_, si * c_ + co * s_
-            ff = co * co * cc - 2.0 * co * si * cs + si * si * ss
-            fs = co * si * (cc - ss) + (co * co - si * si) * cs
-            ss = n - ff
-            xf, xs = co * even - si * odd, si * even + co * odd
-            determinant = ff * ss - fs * fs
-            a = side * (xf * ss - xs * fs) / determinant
-            b = side * (xs * ff - xf * fs) / determinant
-            sd = noise * math.sqrt(ss / determinant)
-            late = b / a
-            if not (a > _CLEAR * sd and abs(late) < _LOST):
-                break
-            shift = (rates[0] * a + 0.75 * rates[1] + rates[2] / a) / w
-            columns[0, count] = centre_s + (late - shift) / w
-            columns[1, count] = noise * math.sqrt(ff / determinant) / (a * w)
-            columns[2, count] = side * (a + 0.5 * b * late - 0.5 * noise * noise / (ss * a))
-            columns[3, count] = sd
-            columns[4, count] = level
-            coupling = (f1 * ss - s1 * fs) / determinant
-            information += n - f1 * coupling - s1 * (s1 * ff - f1 * fs) / determinant
-            score += alone - side * (a * f1 + b * s1)
-            if count % _SAMPLED == 0:
-                residual += _squares(piece, level) - side * (a * xf + b * xs)
-                freedom += n - 2
-            count += 1
-            centre_s += period + _FOLLOW * late / w
-            period += _LEARN * late / w
-            side = -side
-        if count == block:
+        reach = int(0.5 * (half_period_s / interval_s - 1.0))
+        number = 2 * reach + 1
+        length = (number + LANES - 1) // LANES * LANES
+        if 3 * length > rest.size:
             break
-        shift = score / information
-        level += shift
-        for k in range(block, count):
-            columns[2, k] -= coupling * shift
-            columns[4, k] += shift
-        if count - block < LEVEL_BLOCK:
-            break
+        tables = matrix(rest, 3, length)
+        flat, even, odd = _fill_tables(reach, w * interval_s, tables)
+        sd, late_sd = noise / math.sqrt(even), noise / (math.sqrt(odd) * w)
+        second, in_time = noise * noise / odd, 1.0 / w
+        score, block = 0.0, count
+        while locked and count < room and count - block < LEVEL_BLOCK:
+            found = batch[:, : min(_BATCH, room - count)]
+            at = (centre_s - start_s) / interval_s
+            size = _fit_batch(
+                values, at, period / interval_s, reach, w * interval_s, tables, level, found
+            )
+            if size > 0 and count % _SAMPLED == 0:
+                lo = math.floor(at + 0.5) - reach
+                residual += _squares(values[lo : lo + number], level)
+                residual -= found[0, 0] ** 2 * even + found[1, 0] ** 2 * odd
+                freedom += number - 2
+            total, measured = 0.0, 0
+            for j in range(size):
+                a, b = side * found[0, j], side * found[1, j]
+                inverse = 1.0 / max(a, 1e-300)
+                late = b * inverse
+                if not (a > _CLEAR * sd and abs(late) < _LOST):
+                    break
+                shift = (rates[0] * a + 0.75 * rates[1] + rates[2] * inverse) * in_time
+                table[0, count] = centre_s + j * period + (late - shift) * in_time
+                table[1, count] = late_sd * inverse
+                table[2, count] = side * (a + 0.5 * (b * late - second * inverse))
+                score += found[2, j]
+                total += late
+                count += 1
+                measured += 1
+                side = -side
+            locked = measured == _BATCH
+            if measured > 0:
+                late = total / measured
+                centre_s += measured * period + _FOLLOW * late / w
+                period += _LEARN * late / (w * _BATCH)
+        if count > block:
+            shift = score / ((count - block) * (number - flat * flat / even))
+            level += shift
+            for k in range(block, count):
+                table[2, k] -= flat / even * shift
+                table[3, k] = sd
+                table[4, k] = level
         half_period_s = period
-    return count, residual, freedom
+    result[0], result[1] = residual, freedom
+    return count

@@ -1,0 +1,148 @@
+"""The Eq. 8 engine against its peers, as ratios in one run: ``python -m benchmarks.engine``.
+
+The reference record: f 0.516 Hz, y0 0.068 rad, b 0.01192 1/s (half hysteretic, half viscous),
+a 0.45 1/(rad s), c 1.4e-6 rad/s, 300 s. Contenders take turns, and the medians are compared.
+Peers that are not installed are left out.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks import peers_engine as peers
+from benchmarks.table import Row, at_least, at_most, cpu_seconds, write
+from pendpipe.dynamics import (
+    Eq8,
+    Release,
+    sample,
+    sample_with_jacobian,
+    turning_points,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ROOT = Path(__file__).parents[1]
+OMEGA = 2.0 * math.pi * 0.516
+MODEL = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
+START = Release(0.0, 0.068)
+END_S = 300.0
+SAMPLES = np.linspace(0.0, END_S, 32768)
+FIRST_CALL = """
+from pendpipe.dynamics import Eq8, Release, turning_points
+turning_points(Eq8(3.0, viscous=0.01), Release(0.0, 0.1), count=100)
+"""
+
+
+def rows(rounds: int = 15) -> list[Row]:
+    """Measure everything."""
+    return [*_speeds(rounds), *_accuracies(), _first_call(rounds)]
+
+
+def _speeds(rounds: int) -> list[Row]:
+    """Return the ratios of times."""
+    count = turning_points(MODEL, START, until_s=END_S).time_s.size
+    ours: dict[str, tuple[Callable[[], object], int]] = {
+        "cos": (lambda: np.cos(SAMPLES), 20),
+        "map": (lambda: turning_points(MODEL, START, until_s=END_S), 60),
+        "clock": (lambda: turning_points(MODEL, START, until_s=END_S, method="clock"), 20),
+        "samples": (lambda: sample(MODEL, START, SAMPLES), 20),
+        "jacobian": (
+            lambda: sample_with_jacobian(MODEL, START, SAMPLES, hysteretic_share=0.5), 20,
+        ),
+    }  # fmt: skip
+    contenders = dict(ours)
+    if importlib.util.find_spec("heyoka"):
+        contenders["heyoka"] = (peers.heyoka_turning_points(MODEL, START.angle_rad, END_S), 4)
+        contenders["heyoka grid"] = (peers.heyoka_samples(MODEL, START.angle_rad, SAMPLES), 2)
+    t = cpu_seconds(contenders, rounds)
+    slow = peers.solve_ivp_turning_points(MODEL, START.angle_rad, count)
+    t["solve_ivp"] = cpu_seconds({"solve_ivp": (slow, 1)}, 3)["solve_ivp"]
+    found = [
+        Row(
+            f"time for {count} turning points: map, clock",
+            f"{1e6 * t['map']:.1f} us, {1e6 * t['clock']:.0f} us",
+        ),
+        at_least("turning points, map over `solve_ivp` DOP853", t["solve_ivp"] / t["map"], 1e4),
+        at_most("32768 samples over one `np.cos` of them", t["samples"] / t["cos"], 0.5),
+        at_most("samples and 7-column Jacobian over one `np.cos`", t["jacobian"] / t["cos"], 3.0),
+    ]
+    if "heyoka" in t:
+        found += [
+            at_least("turning points, map over heyoka", t["heyoka"] / t["map"], 30.0),
+            at_least("turning points, phase clock over heyoka", t["heyoka"] / t["clock"], 5.0),
+            at_least(
+                "32768 samples over heyoka's `propagate_grid`",
+                t["heyoka grid"] / t["samples"],
+                20.0,
+            ),
+        ]
+    return found
+
+
+def _accuracies() -> list[Row]:
+    """Return the errors against 40 digits, as the tests compute them, and of the samples."""
+    found = []
+    by_map = sample(MODEL, START, SAMPLES)
+    by_clock = sample(MODEL, START, SAMPLES, method="clock")
+    points = turning_points(MODEL, START, until_s=END_S)
+    envelope = np.interp(SAMPLES, points.time_s, np.abs(points.angle_rad))
+    error = float(np.max(np.abs(by_map - by_clock) / envelope))
+    found.append(at_most("error of the samples (map less clock) over the envelope", error, 1e-9))
+    path = ROOT / "tests" / "dynamics" / "reference.py"
+    if path.exists() and importlib.util.find_spec("mpmath") and importlib.util.find_spec("pytest"):
+        times, angles = _forty_digits(path, points.time_s.size)
+        for method in ("map", "clock"):
+            own = turning_points(MODEL, START, until_s=END_S, method=method)  # type: ignore[arg-type]
+            amplitude = float(np.max(np.abs(own.angle_rad / angles - 1.0)))
+            phase = OMEGA * float(np.max(np.abs(own.time_s - times)))
+            found.append(
+                at_most(f"amplitudes, {method}, against 40 digits (relative)", amplitude, 1e-10)
+            )
+            found.append(at_most(f"omega t, {method}, against 40 digits", phase, 1e-10, " rad"))
+    return found
+
+
+def _forty_digits(path: Path, count: int) -> tuple[Any, Any]:
+    """Return the turning points to 40 digits, rounded."""
+    specification = importlib.util.spec_from_file_location("pendpipe_reference", path)
+    assert specification is not None
+    assert specification.loader is not None
+    reference = importlib.util.module_from_spec(specification)
+    sys.modules[specification.name] = reference
+    specification.loader.exec_module(reference)
+    with reference.mp.workdps(reference.DIGITS):
+        times, angles = reference.MpmathPendulum.of(MODEL).turning_points(START.angle_rad, count)
+    return np.array([float(t) for t in times]), np.array([float(x) for x in angles])
+
+
+def _first_call(rounds: int) -> Row:
+    """Return how much longer a process takes to call the engine than to import numpy."""
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+
+    def process(code: str) -> Callable[[], object]:
+        command = [sys.executable, "-c", code]
+        return lambda: subprocess.run(command, check=True, env=environment, cwd=ROOT)
+
+    calls = {"numpy": (process("import numpy"), 1), "call": (process(FIRST_CALL), 1)}
+    t = cpu_seconds(calls, rounds, clock=time.perf_counter)
+    return at_most("first call in a fresh process, beyond `import numpy`", t["call"] - t["numpy"],
+                   0.5, " s")  # fmt: skip
+
+
+def main() -> None:
+    """Measure, and write the part of the page."""
+    write("engine", "The engine of Eq. 8", rows())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""Readings against samples: chi^2, its gradient and its normal matrix, panel by panel.
+
+A fit needs the Jacobian J only in J'r and J'J. Every column of J is a polynomial in the place
+within the panel, so that J'r follows from the residuals' moments there, and J itself is never
+written. J'J is the number of readings times the mean over the part of the panel that they
+cover, by Gauss's rule: as exact as the readings are evenly spread within it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.dynamics.layout import MOMENTS, NODE_COUNT, PLACES
+from pendpipe.dynamics.panel import adder, part
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.workspace import Work
+
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(PLACES)
+
+
+@adder
+def subtract(readings: FloatArray, angle_rad: FloatArray) -> None:
+    """Put readings less angles in the place of the angles."""
+    for i in range(angle_rad.size):
+        angle_rad[i] = readings[i] - angle_rad[i]
+
+
+@adder
+def take_moments(
+    residual: FloatArray, theta: FloatArray, power: FloatArray, moments: FloatArray
+) -> float:
+    """Write the sums of residual x theta^k; return that of the residual's square."""
+    square = 0.0
+    for i in range(residual.size):
+        power[i] = residual[i]
+        square += residual[i] * residual[i]
+    # Six in a pass, to spare the memory.
+    for k in range(0, MOMENTS, 6):
+        m0, m1, m2, m3, m4, m5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(residual.size):
+            z, value = theta[i], power[i]
+            second = value * z * z
+            fourth = second * z * z
+            m0 += value
+            m1 += value * z
+            m2 += second
+            m3 += second * z
+            m4 += fourth
+            m5 += fourth * z
+            power[i] = fourth * z * z
+        moments[k], moments[k + 1], moments[k + 2] = m0, m1, m2
+        moments[k + 3], moments[k + 4], moments[k + 5] = m3, m4, m5
+    return square
+
+
+@adder
+def product(first: FloatArray, second: FloatArray) -> float:
+    """Return the sum of products."""
+    total = 0.0
+    for i in range(first.size):
+        total += first[i] * second[i]
+    return total
+
+
+@part
+def compare(work: Work, residual: FloatArray, start: float, duration: float) -> None:
+    """Add what a block of one panel says to `work.sums`.
+
+    Parameters
+    ----------
+    residual
+        Readings less samples of the block, whose places are in `work.theta`.
+    start, duration
+        Of the panel, in radians since the release.
+    """
+    columns, directions = work.some.shape[0], work.rates.size
+    theta = work.theta[: residual.size]
+    work.sums[0] += take_moments(residual, theta, work.power, work.moments)
+    gradient, moments = work.sums[1 : 1 + columns], work.moments
+    omega = work.motion[0]
+    middle, half = start + 0.5 * duration, 0.5 * duration
+    speed = product(work.total[1], moments[:NODE_COUNT])
+    moving = middle * speed + half * product(work.total[1], moments[1 : NODE_COUNT + 1])
+    for c in range(directions):
+        by_rate = product(work.total[3 + c], moments[:NODE_COUNT])
+        gradient[c] += by_rate
+        moving -= work.rates[c] * by_rate
+    gradient[directions] += moving / omega
+    gradient[directions + 1] += product(work.total[2], moments[:NODE_COUNT])
+    gradient[directions + 2] -= omega * speed
+    gradient[directions + 3] += moments[0]
+    _add_products(work, theta, middle, half)
+
+
+@adder
+def at_places(polynomial: FloatArray, place: FloatArray, out: FloatArray) -> None:
+    """Evaluate a polynomial of degree 16 at the places: even and odd powers wait less apart."""
+    for i in range(PLACES):
+        square = place[i] * place[i]
+        even, odd = polynomial[NODE_COUNT - 1], polynomial[NODE_COUNT - 2]
+        for k in range(NODE_COUNT - 3, 0, -2):
+            even, odd = even * square + polynomial[k], odd * square + polynomial[k - 1]
+        out[i] = even * square + polynomial[0] + place[i] * odd
+
+
+@adder
+def add_weighted(some: FloatArray, readings: float, normal: FloatArray) -> None:
+    """Add the mean products of the columns, times the number of readings."""
+    columns, w = some.shape[0], _WEIGHTS
+    half = 0.5 * readings
+    for p in range(columns):
+        f = some[p]
+        f0, f1, f2, f3 = f[0] * w[0], f[1] * w[1], f[2] * w[2], f[3] * w[3]
+        f4, f5, f6, f7 = f[4] * w[4], f[5] * w[5], f[6] * w[6], f[7] * w[7]
+        for q in range(p + 1):
+            g = some[q]
+            mean = (f0 * g[0] + f1 * g[1] + f2 * g[2] + f3 * g[3]) + (
+                f4 * g[4] + f5 * g[5] + f6 * g[6] + f7 * g[7]
+            )
+            normal[p * columns + q] += half * mean
+
+
+@part
+def _add_products(work: Work, theta: FloatArray, middle: float, half: float) -> None:
+    """Add the products of the Jacobian's columns where the readings are."""
+    columns, directions, omega = work.some.shape[0], work.rates.size, work.motion[0]
+    by_omega, by_time = work.some[directions], work.some[directions + 2]
+    place, readings = work.power[:PLACES], float(theta.size)
+    centre = 0.5 * (theta[0] + theta[theta.size - 1])
+    # Each reading stands for the time around it, half of that outside the first and the last.
+    reach = 0.5 * (theta[theta.size - 1] - theta[0]) * readings / max(readings - 1.0, 1.0)
+    for i in range(PLACES):
+        place[i] = centre + reach * _PLACES[i]
+    at_places(work.total[1], place, by_time)
+    at_places(work.total[2], place, work.some[directions + 1])
+    for i in range(PLACES):
+        by_omega[i] = (middle + half * place[i]) * by_time[i] / omega
+        by_time[i] *= -omega
+        work.some[directions + 3, i] = 1.0
+    for c in range(directions):
+        column, rate = work.some[c], work.rates[c] / omega
+        at_places(work.total[3 + c], place, column)
+        for i in range(PLACES):
+            by_omega[i] -= rate * column[i]
+    add_weighted(work.some, readings, work.sums[1 + columns :])
+
+
+@part
+def compare_rest(work: Work, level: float, first: int) -> None:
+    """Add what the readings after the stop say; the columns there are in `work.some[:, 0]`."""
+    columns, count = work.some.shape[0], float(work.readings.size - first)
+    total, square = 0.0, 0.0
+    for i in range(first, work.readings.size):
+        residual = work.readings[i] - level
+        total += residual
+        square += residual * residual
+    work.sums[0] += square
+    for p in range(columns):
+        work.sums[1 + p] += total * work.some[p, 0]
+        for q in range(p + 1):
+            work.sums[1 + columns + p * columns + q] += count * work.some[p, 0] * work.some[q, 0]

@@ -1,0 +1,92 @@
+"""The call of the compiled engine."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.dynamics.compiled import engine
+from pendpipe.dynamics.layout import CONSTANTS, OVERDAMPED, STOPPED, inputs_size, work_size
+
+if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.model import Eq8, Release
+
+NO_SAMPLES: FloatArray = np.empty(0)
+NONE: FloatArray = np.empty((0, 0))
+NO_LIMIT = 2**62
+
+
+def run(
+    model: Eq8,
+    release: Release,
+    *,
+    tabulate: bool,
+    directions: FloatArray = NONE,
+    rates: FloatArray = NO_SAMPLES,
+    most: int = NO_LIMIT,
+    until_s: float = math.inf,
+    time_s: FloatArray = NO_SAMPLES,
+    angle_rad: FloatArray = NO_SAMPLES,
+    jacobian: FloatArray = NONE,
+    turning: FloatArray = NONE,
+    readings: FloatArray = NO_SAMPLES,
+    sums: FloatArray = NO_SAMPLES,
+) -> tuple[int, bool]:
+    """Call the engine; return the number of turning points and whether the last is the stop."""
+    count = rates.size
+    sensitivities = count + 1 if count else 0
+    polynomials = sensitivities + 1 if time_s.size else 0
+    side = -1.0 if release.angle_rad < 0.0 else 1.0
+    buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
+    buffer[:CONSTANTS] = (
+        *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
+    )  # fmt: skip
+    if count:
+        buffer[CONSTANTS : CONSTANTS + count] = rates
+        buffer[CONSTANTS + count : inputs_size(count)] = directions.ravel()
+    found, state = divmod(
+        engine()(
+            _address(buffer), buffer.size, count, abs(release.angle_rad), tabulate,
+            most, until_s, _address(time_s), time_s.size, _address(angle_rad),
+            _address(jacobian), _address(turning), turning.shape[1],
+            _address(readings), readings.size, _address(sums),
+        ),
+        OVERDAMPED + 1,
+    )  # fmt: skip
+    if state == OVERDAMPED:
+        message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
+        raise ValueError(message)
+    return found, state == STOPPED
+
+
+def _address(array: FloatArray) -> int:
+    """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
+    if array.size == 0:
+        return 0
+    if not array.flags.writeable:
+        return array.ctypes.data
+    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
+
+
+def directions_of(model: Eq8, hysteretic_share: float | None) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of the model's shape by its rates, and the rates."""
+    derivatives = model.shape_derivatives()
+    rates = np.array([model.quadratic, model.hysteretic, model.viscous, model.coulomb])
+    if hysteretic_share is None:
+        return derivatives, rates
+    total = model.hysteretic + model.viscous
+    if not 0.0 <= hysteretic_share <= 1.0:
+        message = f"hysteretic_share must lie between 0 and 1, not {hysteretic_share}"
+        raise ValueError(message)
+    if abs(model.hysteretic - hysteretic_share * total) > 1e-9 * total:
+        message = f"hysteretic_share is {hysteretic_share}, but {model} has another"
+        raise ValueError(message)
+    joint = hysteretic_share * derivatives[1] + (1.0 - hysteretic_share) * derivatives[2]
+    return (
+        np.stack([derivatives[0], joint, derivatives[3]]),
+        np.array([model.quadratic, total, model.coulomb]),
+    )
