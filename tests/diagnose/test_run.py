@@ -1,0 +1,175 @@
+"""The diagnosis as a whole: the right name, the right size, and nothing said of noise."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnose import diagnose_recording
+from pendpipe.diagnose.model import OFFSET, OMEGA, B
+
+from .records import (
+    FREQUENCY_HZ,
+    LINEAR,
+    NOISE_RAD,
+    TRUTH,
+    VALUES,
+    accused,
+    diagnosed,
+    other_engine,
+    recording,
+)
+
+NAMES = tuple(VALUES)
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_eq_8_by_the_other_engine_is_consistent(seed: int) -> None:
+    found = diagnosed("null", seed).diagnosis
+    assert found.verdict == "consistent"
+    assert found.effects == ()
+    assert found.p_value > 0.01
+    assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=4.0 / np.sqrt(2 * 1500))
+    assert found.improved.parameters == found.baseline.parameters
+    for name, truth in (("frequency", FREQUENCY_HZ), ("offset", TRUTH[OFFSET])):
+        estimate = found.baseline.parameters[name]
+        assert abs(estimate.value - truth) < 4.0 * estimate.sd
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_is_named(name: str) -> None:
+    """It leads, or cannot be told from what leads; and it is the only accusation."""
+    outcome = diagnosed(name)
+    assert outcome.diagnosis.verdict == "missing-physics"
+    assert len(outcome.diagnosis.effects) == 1
+    assert name in accused(outcome)[0]
+    assert outcome.diagnosis.effects[0].p_value < 0.01
+    assert outcome.diagnosis.p_value < 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_parameters_are_those_that_were_put_in(name: str) -> None:
+    outcome = diagnosed(name)
+    effect = outcome.search.steps[0].winner.lead.effect
+    if effect.identifier != name or effect.switch:
+        pytest.skip(f"{effect.identifier} leads the class, or there is no free size")
+    found = outcome.diagnosis.effects[0].parameters
+    for parameter, truth in zip(effect.parameters, VALUES[name], strict=True):
+        estimate = found[parameter.name]
+        assert estimate.sd > 0.0
+        assert abs(estimate.value - truth) < 4.0 * estimate.sd
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_improved_model_leaves_noise(name: str) -> None:
+    found = diagnosed(name).diagnosis
+    assert found.unexplained_p_value > 0.001
+    assert found.improved.chi2_per_dof == pytest.approx(1.0, abs=4.0 * np.sqrt(2 / 1500))
+    assert found.improved.chi2_per_dof < found.baseline.chi2_per_dof
+    assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=0.08)
+    assert found.effects[0].delta_chi2 > 30.0
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "truth"),
+    [("circular-error", "frequency", TRUTH[OMEGA] / (2.0 * np.pi)),
+     ("sensor-quadratic", "offset", TRUTH[OFFSET]),
+     ("equilibrium-step", "offset", TRUTH[OFFSET])],
+)  # fmt: skip
+def test_what_was_left_out_had_spoiled_the_fit(name: str, parameter: str, truth: float) -> None:
+    found = diagnosed(name).diagnosis
+    before, after = found.baseline.parameters[parameter], found.improved.parameters[parameter]
+    assert abs(before.value - truth) > 5.0 * before.sd
+    assert abs(after.value - truth) < 4.0 * after.sd
+    assert abs(after.value - truth) < abs(before.value - truth)
+
+
+def test_lost_samples_are_counted_where_they_were_lost() -> None:
+    outcome = diagnosed("dropped-samples")
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["dropped-samples"]
+    effect = outcome.diagnosis.effects[0]
+    assert effect.parameters["samples"].value == 3.0
+    assert effect.location.time_s is not None
+    low, high = effect.location.time_s
+    assert low - 0.6 < 700 / 15.0 < high + 0.6
+    assert outcome.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+
+
+def test_two_effects_are_both_named() -> None:
+    outcome = diagnosed("two")
+    classes = accused(outcome)
+    assert len(classes) == 2
+    assert sum("equilibrium-step" in names for names in classes) == 1
+    assert sum("tone-pickup" in names for names in classes) == 1
+    assert outcome.diagnosis.unexplained_p_value > 0.001
+
+
+def test_a_viscous_baseline_lacks_coulomb_friction() -> None:
+    truth = LINEAR.copy()
+    truth[2] = 3e-4
+    outcome = diagnose_recording(recording(other_engine(truth), 3), baseline="viscous")
+    effect = outcome.diagnosis.effects[0]
+    assert effect.identifier == "coulomb-friction"
+    (estimate,) = effect.parameters.values()
+    assert abs(estimate.value - 3e-4) < 4.0 * estimate.sd
+    assert len(outcome.diagnosis.effects) == 1
+
+
+def test_a_viscous_pendulum_is_all_that_a_viscous_baseline_asks() -> None:
+    outcome = diagnose_recording(recording(other_engine(LINEAR), 4), baseline="viscous")
+    assert outcome.diagnosis.verdict == "consistent"
+    linear = outcome.diagnosis.baseline.parameters["b"]
+    assert abs(linear.value - LINEAR[B]) < 4.0 * linear.sd
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_wrong_prediction_is_a_parameter_and_no_missing_physics(factor: float) -> None:
+    """The true b comes out, where another was given (a and c are known too)."""
+    given = {"a": float(TRUTH[0]), "b": factor * float(TRUTH[B]), "c": float(TRUTH[2])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 5), fixed=given)
+    effect = outcome.diagnosis.effects[0]
+    assert effect.identifier == "parameter-b"
+    assert effect.kind == "parameter"
+    assert len(outcome.diagnosis.effects) == 1
+    found = outcome.diagnosis.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+def test_a_right_prediction_is_consistent() -> None:
+    given = {"a": float(TRUTH[0]), "b": float(TRUTH[B]), "c": float(TRUTH[2])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 5), fixed=given)
+    assert outcome.diagnosis.verdict == "consistent"
+    assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
+
+
+@pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
+def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> None:
+    for effect in diagnosed(name).diagnosis.effects:
+        rest = sum(probability for _, probability in effect.indistinguishable)
+        assert 0.0 < effect.probability
+        assert effect.probability + rest <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
+def test_the_result_is_json_without_nan(name: str) -> None:
+    content = diagnosed(name).diagnosis.as_json()
+    again = json.loads(json.dumps(content, allow_nan=False))
+    assert set(again) >= {
+        "schema_version", "baseline", "noise_rms_rad", "verdict", "p_value", "effects",
+        "improved", "held_out", "unexplained", "statement", "figures", "provenance",
+    }  # fmt: skip
+    for effect in again["effects"]:
+        assert set(effect) >= {
+            "id", "name", "kind", "equation", "parameters", "delta_chi2", "p_value_global",
+            "probability", "indistinguishable_from", "deciding_measurement", "location",
+        }  # fmt: skip
+        assert effect["deciding_measurement"]
+        assert effect["location"]["summary"]
+
+
+def test_the_seed_decides_the_draws_and_nothing_else() -> None:
+    record = recording(other_engine(TRUTH), 1)
+    again = diagnose_recording(record).diagnosis
+    assert again.as_json() == diagnosed("null").diagnosis.as_json()

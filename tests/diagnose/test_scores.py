@@ -1,0 +1,104 @@
+"""Scores: unit columns beside all that the baseline's own parameters can do."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, kstest
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.model import Model
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.scores import Bank, build_bank, local_p_values, tangent_basis
+from pendpipe.diagnose.search import applicable
+from pendpipe.effects.catalogue import CATALOGUE
+
+from .records import INTERVAL_S, TIME_S, TRUTH, other_engine, prepared
+
+
+@functools.cache
+def perfect() -> tuple[Fit, Data, Noise, Bank]:
+    """Readings without noise, so that what an effect does stands alone."""
+    data, noise = prepared(Model(TIME_S, INTERVAL_S).reading(TRUTH))
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH, held=(3,))
+    effects = [e for e in applicable(CATALOGUE, fit, "eq8", "rad") if not e.spectral]
+    return fit, data, noise, build_bank(fit, noise, effects)
+
+
+def white_residuals(draws: int) -> tuple[Bank, FloatArray]:
+    """What a fit leaves of white noise: nothing in its tangent space."""
+    _, _, _, bank = perfect()
+    drawn = np.random.default_rng(17).standard_normal((len(bank.basis), draws))
+    return bank, drawn - bank.basis @ (bank.basis.T @ drawn)
+
+
+def test_the_two_engines_agree_far_below_the_noise() -> None:
+    fit, _, _, _ = perfect()
+    assert np.abs(other_engine(TRUTH) - fit.at.reading).max() < 1e-7
+
+
+def test_columns_are_of_unit_length_and_beside_the_models_tangent_space() -> None:
+    """To single precision, in which they are kept."""
+    fit, _, _, bank = perfect()
+    basis = tangent_basis(fit)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-12)
+    columns = bank.columns.astype(float)
+    np.testing.assert_allclose(np.linalg.norm(columns, axis=0), 1.0, atol=1e-6)
+    assert np.abs(basis.T @ columns).max() < 1e-6
+    for candidate in bank.candidates:
+        own = columns[:, candidate.first : candidate.first + candidate.count]
+        np.testing.assert_allclose(own.T @ own, np.eye(candidate.count), atol=1e-5)
+
+
+NAMES = (
+    "frequency-drift", "damping-drift", "equilibrium-step", "amplitude-step", "frequency-step",
+    "impulse", "sensor-quadratic", "sensor-cubic", "cubic-stiffness", "offset-drift", "gain-drift",
+    "release-transient", "stribeck-friction",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_scores_its_size_times_its_columns_length(name: str) -> None:
+    """Eight standard deviations' worth, moved nonlinearly and refitted, to 3 %."""
+    fit, data, noise, bank = perfect()
+    rows = bank.rows()[name]
+    row = rows[len(rows) // 2]
+    candidate = bank.candidates[row]
+    size = 8.0 / bank.lengths[row]
+    truth = np.concatenate([TRUTH, [size], candidate.shape])
+    readings = fit.model.adding(candidate.effect).reading(truth)
+    moved = Data(data.time_s, readings, INTERVAL_S, True, data.weight)
+    left = refine(fit.model, moved, noise, TRUTH, held=(3,)).residual
+    assert bank.columns[:, candidate.first] @ left == pytest.approx(8.0, rel=0.03)
+    assert bank.scores(left)[row] == pytest.approx(64.0, rel=0.06)
+
+
+@pytest.mark.parametrize("name", ["sensor-cubic", "frequency-drift", "equilibrium-step"])
+def test_a_score_of_noise_is_chi_squared_of_one_degree_of_freedom(name: str) -> None:
+    bank, drawn = white_residuals(1500)
+    scores = bank.scores(drawn)[bank.rows()[name][0]]
+    assert kstest(scores, chi2(1).cdf).pvalue > 1e-3
+
+
+def test_a_size_that_cannot_be_negative_scores_with_its_own_sign_alone() -> None:
+    bank, drawn = white_residuals(1500)
+    sided = [row for row, c in enumerate(bank.candidates) if c.effect.one_sided]
+    assert sided
+    scores = bank.scores(drawn)[sided[0]]
+    none = np.count_nonzero(scores == 0.0)
+    assert abs(none - 750) < 4.0 * np.sqrt(1500 / 4)
+    assert kstest(scores[scores > 0.0], chi2(1).cdf).pvalue > 1e-3
+
+
+def test_local_p_values_of_noise_are_uniform_whatever_the_columns() -> None:
+    """Two-sided candidates of one column and of several alike."""
+    bank, drawn = white_residuals(600)
+    local = local_p_values(bank.scores(drawn), bank.freedom)
+    several = [row for row, c in enumerate(bank.candidates) if c.count > 1]
+    assert several
+    for row in (several[0], several[-1], bank.rows()["sensor-quadratic"][0]):
+        assert kstest(local[row], "uniform").pvalue > 1e-3
