@@ -128,9 +128,7 @@ def test_no_reading_is_believed_beyond_the_floor() -> None:
 def test_outliers_of_uneven_readings_do_not_make_the_noise() -> None:
     readings = white(np.random.default_rng(9))
     readings[::50] += 0.1
-    data = Data(
-        np.arange(COUNT) * INTERVAL_S, readings, INTERVAL_S, False, np.ones(COUNT)
-    )
+    data = Data(np.arange(COUNT) * INTERVAL_S, readings, INTERVAL_S, False, np.ones(COUNT))
     noise = estimate_noise(data, readings, MOTION_HZ, 0.0)
     assert noise.rms == pytest.approx(2.5e-4, rel=0.12)
 

@@ -148,7 +148,7 @@ def test_a_right_prediction_is_consistent() -> None:
 def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> None:
     for effect in diagnosed(name).diagnosis.effects:
         rest = sum(probability for _, probability in effect.indistinguishable)
-        assert 0.0 < effect.probability
+        assert effect.probability > 0.0
         assert effect.probability + rest <= 1.0 + 1e-12
 
 

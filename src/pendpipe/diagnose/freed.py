@@ -24,6 +24,7 @@ class FreedParameter(Effect):
     """
 
     kind = "parameter"
+    prior = 12.0
     parameters = ()
     deciding = "measure that parameter by itself"
 

@@ -29,6 +29,8 @@ _LOST: Final = 1.0
 """Phase in rad from which a model has lost the motion."""
 _FROM_AFAR: Final = 4
 """How many leads are then followed from the first cycles on."""
+_SHAPE: Final = 2.0
+"""What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
 _MUCH: Final = 0.5
 """Part of the best gain that a name must explain to go before a curve."""
 
@@ -134,13 +136,13 @@ def evidence(lead: Lead, gain: float, chance: Chance) -> float:
     local = float(gammaincc(0.5 * effect.sizes, 0.5 * gain))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     p_value = trials.global_p_value(local) if local > 1e-290 else 0.0
-    worth = equivalent(p_value, gain - _cost(effect.sizes, trials))
-    return worth + effect.prior
+    worth = equivalent(p_value, gain - _cost(effect.sizes, effect.count - effect.sizes, trials))
+    return worth - _SHAPE * max(effect.count - effect.sizes, 0) * (p_value > 0.0) + effect.prior
 
 
-def _cost(sizes: int, trials: Trials) -> float:
+def _cost(sizes: int, shapes: int, trials: Trials) -> float:
     """What free values and trials take off a gain too large for p-values."""
-    return 2.0 * math.log(max(trials.first, 1.0)) + 6.0 * (sizes - 1)
+    return 2.0 * math.log(max(trials.first, 1.0)) + 6.0 * (sizes - 1) + _SHAPE * shapes
 
 
 def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:

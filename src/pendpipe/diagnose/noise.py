@@ -14,12 +14,12 @@ from pendpipe.diagnose.data import Data
 _HARMONICS: Final = 7
 _WIDTH: Final = 0.08
 """Of the frequency: the band about each harmonic that a misfit may fill."""
-_FIRST: Final = 3
-"""The lowest cosine that is believed to be noise: a drift lies in those before."""
-_WORTH: Final = (4.0, 12.0)
+_FIRST: Final = 1
+"""The lowest cosine that may be noise: the level itself is fitted."""
+_WORTH: Final = (2.5, 12.0)
 """Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
 is missed accuses drifts and slow tones of the noise; a needless one costs little."""
-_STEEPEST: Final = 2.0
+_STEEPEST: Final = 1.6
 _OUTLIER: Final = 12.0
 """Power over the spectrum beyond which a cosine holds no noise but a line."""
 

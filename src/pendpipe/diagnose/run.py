@@ -192,9 +192,10 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     """The model without one effect, and who else could take its place in it."""
     effect = step.winner.lead.effect
     held = list(found.held)
+    model, value = beginning.model, found.improved.value[:8].copy()
     if isinstance(effect, FreedParameter):
         held.append(effect.index)
-    model, value = beginning.model, found.improved.value[:8]
+        value[effect.index] = beginning.value[effect.index]
     for other, place in found.improved.model.places():
         if other is not effect:
             model = model.adding(other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -11,6 +12,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection, detect, prepare
 from pendpipe.diagnose.faults import CATALOGUE_SHARE, Fault, Forensics, kicked_at_random
@@ -31,7 +33,7 @@ _SLIP: Final = 0.1
 _MOST: Final = 6
 _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
-_DOUBT: Final = 10.0
+_DOUBT: Final = 12.0
 """By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
 _PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
@@ -235,6 +237,7 @@ def _doubt_redness(
     """
     progress("the noise is red: is it an effect?")
     effects = [effect for effect in effects if effect.kind != "unnamed"]
+    assert state.now is not None
     fit, data, noise = settled(state.fit, state.data, state.noise, state.holding, red=False)
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
     if other.p_value > level * CATALOGUE_SHARE:
@@ -245,7 +248,8 @@ def _doubt_redness(
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
-    cost = _DOUBT + 2.0 * rivals[0].lead.effect.count
+    own = state.now.chance.own.get(rivals[0].lead.effect.key, Trials(1.0, 0.0))
+    cost = _DOUBT + 2.0 * math.log(own.first) + 3.0 * (rivals[0].lead.effect.sizes - 1)
     if _badness(extended, noise) + cost > _badness(state.fit, state.noise):
         return
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
