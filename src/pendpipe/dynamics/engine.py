@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +42,7 @@ def run(
     sensitivities = count + 1 if count else 0
     polynomials = sensitivities + 1 if time_s.size else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
-    buffer = np.zeros(inputs_size(count) + work_size(sensitivities, polynomials))
+    buffer = np.zeros(_buffer_size(count, sensitivities, polynomials))
     buffer[:CONSTANTS] = (
         *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
     )  # fmt: skip
@@ -63,9 +64,15 @@ def run(
     return found, state == STOPPED
 
 
+@cache
+def _buffer_size(count: int, sensitivities: int, polynomials: int) -> int:
+    """Return how many numbers a call works on."""
+    return inputs_size(count) + work_size(sensitivities, polynomials)
+
+
 def _address(array: FloatArray) -> int:
     """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
-    if array.size == 0:
+    if array is NO_SAMPLES or array is NONE or array.size == 0:
         return 0
     if not array.flags.writeable:
         return array.ctypes.data
