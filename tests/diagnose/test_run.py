@@ -6,9 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.model import OFFSET, OMEGA, B
+from pendpipe.diagnose.values import effect_parameters
+from pendpipe.effects.catalogue import by_identifier
 
 from .records import (
     FREQUENCY_HZ,
@@ -25,14 +28,17 @@ from .records import (
 NAMES = tuple(VALUES)
 
 
-@pytest.mark.parametrize("seed", range(1, 7))
-def test_eq_8_by_the_other_engine_is_consistent(seed: int) -> None:
+def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> None:
+    seeds = range(1, 9)
+    accusations = sum(diagnosed("null", seed).diagnosis.p_value < 0.01 for seed in seeds)
+    assert accusations <= binom.ppf(0.999, len(seeds), 0.01)
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: int) -> None:
     found = diagnosed("null", seed).diagnosis
-    assert found.verdict == "consistent"
-    assert found.effects == ()
-    assert found.p_value > 0.01
+    assert (found.verdict == "consistent") == (found.p_value > 0.01) == (found.effects == ())
     assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=4.0 / np.sqrt(2 * 1500))
-    assert found.improved.parameters == found.baseline.parameters
     for name, truth in (("frequency", FREQUENCY_HZ), ("offset", TRUTH[OFFSET])):
         estimate = found.baseline.parameters[name]
         assert abs(estimate.value - truth) < 4.0 * estimate.sd
@@ -49,14 +55,13 @@ def test_an_effect_is_named(name: str) -> None:
     assert outcome.diagnosis.p_value < 0.01
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if not by_identifier(name).switch])
 def test_its_parameters_are_those_that_were_put_in(name: str) -> None:
-    outcome = diagnosed(name)
-    effect = outcome.search.steps[0].winner.lead.effect
-    if effect.identifier != name or effect.switch:
-        pytest.skip(f"{effect.identifier} leads the class, or there is no free size")
-    found = outcome.diagnosis.effects[0].parameters
-    for parameter, truth in zip(effect.parameters, VALUES[name], strict=True):
+    """Even where another effect of its class leads."""
+    rivals = diagnosed(name).search.steps[0].rivals
+    rival = next(rival for rival in rivals if rival.identifier == name)
+    found = effect_parameters(rival.fit, rival.lead.effect)
+    for parameter, truth in zip(rival.lead.effect.parameters, VALUES[name], strict=True):
         estimate = found[parameter.name]
         assert estimate.sd > 0.0
         assert abs(estimate.value - truth) < 4.0 * estimate.sd
@@ -125,21 +130,19 @@ def test_a_viscous_pendulum_is_all_that_a_viscous_baseline_asks() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
-def test_a_wrong_prediction_is_a_parameter_and_no_missing_physics(factor: float) -> None:
-    """The true b comes out, where another was given (a and c are known too)."""
-    given = {"a": float(TRUTH[0]), "b": factor * float(TRUTH[B]), "c": float(TRUTH[2])}
-    outcome = diagnose_recording(recording(other_engine(TRUTH), 5), fixed=given)
-    effect = outcome.diagnosis.effects[0]
-    assert effect.identifier == "parameter-b"
-    assert effect.kind == "parameter"
-    assert len(outcome.diagnosis.effects) == 1
+def test_a_wrong_prediction_of_the_losses_is_mended_by_the_truth(factor: float) -> None:
+    """Where only b was given, and that wrong, b is let go and comes out right."""
+    given = {"b": factor * float(TRUTH[B])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["parameter-b"]
+    assert outcome.diagnosis.effects[0].kind == "parameter"
     found = outcome.diagnosis.improved.parameters["b"]
     assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
 def test_a_right_prediction_is_consistent() -> None:
     given = {"a": float(TRUTH[0]), "b": float(TRUTH[B]), "c": float(TRUTH[2])}
-    outcome = diagnose_recording(recording(other_engine(TRUTH), 5), fixed=given)
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert outcome.diagnosis.verdict == "consistent"
     assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
 
