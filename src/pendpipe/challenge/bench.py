@@ -187,7 +187,9 @@ class Bench:
         wanted = reading[self.kept]
 
         def left(at: Point) -> FloatArray:
-            return self.whiten(wanted - self.reading(at)[self.kept])
+            # A trial step may run away; it is then worse than what we have, and no fault.
+            found = np.clip(self.reading(at)[self.kept], -1e6, 1e6)
+            return self.whiten(wanted - found)
 
         residual = left(point)
         best = float(residual @ residual)
