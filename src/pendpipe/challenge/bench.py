@@ -164,6 +164,7 @@ class Bench:
         start: Point | None = None,
         rounds: int = 6,
         more: Mapping[str, float] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> tuple[Point, FloatArray, float]:
         """Fit the baseline to a reading by Gauss and Newton.
 
@@ -177,6 +178,8 @@ class Bench:
             Steps at most.
         more
             Torques beside the baseline's that are free too, with their steps.
+        limits
+            What some of them may not leave.
 
         Returns
         -------
@@ -206,6 +209,12 @@ class Bench:
                 trial = point
                 for name, unit, by in zip(names, units, share * change, strict=True):
                     trial = trial.moved(name, unit * by)
+                if any(
+                    not low <= trial.motion.value(name) <= high
+                    for name, (low, high) in (limits or {}).items()
+                ):
+                    share *= 0.3
+                    continue
                 found = left(trial)
                 square = float(found @ found)
                 if square < best:
