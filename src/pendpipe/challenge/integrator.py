@@ -183,7 +183,7 @@ def follow(
     region = 0
     if p.play != 0.0 and abs(s[0]) > p.play:
         region = 1 if s[0] > 0.0 else -1
-    budget = 12 * len(times) + 10000  # steps; a motion that needs more has run away
+    budget = 40 * len(times) + 20000  # steps; a motion that needs more has run away
     still = 1e-10 * (abs(s[0]) + abs(s[1]) / p.omega)
     at = 0
     while at < len(breaks) and breaks[at] <= t:
