@@ -164,6 +164,7 @@ class Bench:
         start: Point | None = None,
         rounds: int = 6,
         more: Mapping[str, float] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> tuple[Point, FloatArray, float]:
         """Fit the baseline to a reading by Gauss and Newton.
 
@@ -177,6 +178,8 @@ class Bench:
             Steps at most.
         more
             Torques beside the baseline's that are free too, with their steps.
+        limits
+            What some of them may not leave.
 
         Returns
         -------
@@ -187,7 +190,9 @@ class Bench:
         wanted = reading[self.kept]
 
         def left(at: Point) -> FloatArray:
-            return self.whiten(wanted - self.reading(at)[self.kept])
+            # A trial step may run away; it is then worse than what we have, and no fault.
+            found = np.clip(self.reading(at)[self.kept], -1e6, 1e6)
+            return self.whiten(wanted - found)
 
         residual = left(point)
         best = float(residual @ residual)
@@ -204,6 +209,12 @@ class Bench:
                 trial = point
                 for name, unit, by in zip(names, units, share * change, strict=True):
                     trial = trial.moved(name, unit * by)
+                if any(
+                    not low <= trial.motion.value(name) <= high
+                    for name, (low, high) in (limits or {}).items()
+                ):
+                    share *= 0.3
+                    continue
                 found = left(trial)
                 square = float(found @ found)
                 if square < best:

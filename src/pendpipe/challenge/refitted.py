@@ -15,6 +15,8 @@ from pendpipe.challenge.oracle import Oracle
 
 LARGE: Final = 40.0
 """Below this score the linear comparison is good enough."""
+HUGE: Final = 3000.0
+"""Above it the leader stands apart, and refits from so far away are long."""
 NEAR: Final = 0.12
 """Rivals whose linear score lacks at most this share of the leader's are refitted."""
 RIVALS: Final = 4
@@ -38,7 +40,7 @@ def refitted(oracle: Oracle, angle: FloatArray, residual: FloatArray) -> dict[st
     plain = float(left @ left)
     linear = [(float(np.sum((s.columns.T @ left) ** 2)), s) for s in oracle.shapes]
     leader = max(score for score, _ in linear)
-    if leader < LARGE:
+    if not LARGE < leader < HUGE:
         return {}
     best: dict[str, tuple[float, Shape]] = {}
     for score, shape in linear:
@@ -66,11 +68,14 @@ def _refit(oracle: Oracle, angle: FloatArray, residual: FloatArray, shape: Shape
     for name, by in zip((*bench.names, shape.parameter), change, strict=True):
         unit = bench.scenario.sd_rad if name == "offset" else bench.sizes.get(name, shape.step)
         start = start.moved(name, unit * by)
-    free = {name: 1e-3 * details.get(name, layout.PARAMETERS[name]) for name in shape.free}
+    shapes = {name: details.get(name, layout.PARAMETERS[name]) for name in shape.free}
+    free = {name: 1e-3 * value for name, value in shapes.items()}
+    # A neighbouring shape has its own signature in the bank; far ones need tiny steps.
+    limits = {name: (0.4 * value, 2.5 * value) for name, value in shapes.items()}
     own = {shape.parameter: shape.step}
     begun, _, square = bench.refit(angle, start, 3, own)
     if free:
-        _, _, more = bench.refit(angle, begun, 3, own | free)
+        _, _, more = bench.refit(angle, begun, 3, own | free, limits)
         square = float(np.nanmin([square, more]))
     return square
 
