@@ -33,7 +33,7 @@ _SLIP: Final = 0.1
 _MOST: Final = 6
 _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
-_DOUBT: Final = 9.0
+_DOUBT: Final = 12.0
 """By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
 _PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
