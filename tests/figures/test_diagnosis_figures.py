@@ -114,7 +114,8 @@ def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:
     upper = frequency > 1.0
     assert np.sqrt(np.mean(density[upper] ** 2)) == pytest.approx(expected, rel=0.06)
     level = diagnosis_spectrum.noise_level(content, frequency)
-    assert level == pytest.approx(expected, rel=0.06)
+    # Below, chance may pass for red noise.
+    assert level[upper] == pytest.approx(expected, rel=0.06)
 
 
 def test_the_spectrum_of_a_tone_stands_at_its_frequency(content: Shown) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -254,6 +254,8 @@ def test_a_recording_straight_to_windaq(tmp_path: Path) -> None:
 def test_any_recording_there_and_back(
     codes: list[int], gaps: dict[int, float], rate_hz: float, range_volts: float
 ) -> None:
+    # Where every second step is a gap nobody can say what the interval is.
+    assume(2 * sum(at < len(codes) for at in gaps) < len(codes) - 1 or not gaps)
     recording = volts(np.array(codes), rate_hz=rate_hz, range_volts=range_volts)
     time_s = recording.time_s.copy()
     for at, intervals in gaps.items():
