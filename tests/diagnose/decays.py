@@ -11,9 +11,10 @@ from pendpipe.analysis.noise import find_step, noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import OMEGA, Model
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.model import Model
 
 FREQUENCY_HZ = 0.9
 

@@ -8,15 +8,16 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.begin import Beginning, begin, read_samples
+from pendpipe.diagnose.begin import Beginning, begin
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.noise import Noise, white_noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.run import Outcome, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
 FREQUENCY_HZ = 0.9
@@ -69,7 +70,7 @@ def beginning_of(record: Recording) -> Beginning:
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
     points, part = measure_recording(record, "the test")
-    return begin(read_samples(part, "the test"), points, baseline="eq8", fixed={})
+    return begin(prepare(part, "the test"), points, baseline="eq8", fixed={})
 
 
 def prepared(

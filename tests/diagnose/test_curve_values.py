@@ -9,10 +9,10 @@ import pytest
 
 from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.effects.curves import DampingCurve, DriveCurve
+from pendpipe.effects.model import Model
 
 TIME_S = np.arange(3000) / 20.0
 NOISE_RAD = 1e-5

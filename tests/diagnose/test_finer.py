@@ -10,10 +10,10 @@ import pytest
 from pendpipe.diagnose.data import gather
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.finer import finer_shape
-from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 
 OMEGA = 2.0 * math.pi * 0.9
 BASE = np.array([7.2e-3, 9.6e-3, 1.3e-4, 0.5, OMEGA, 0.15, -0.3, 0.01])

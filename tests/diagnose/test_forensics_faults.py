@@ -11,10 +11,10 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import gather
 from pendpipe.diagnose.forensics import TESTS, Finding, examine, find_lost_samples
-from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.cubic_stiffness import CubicStiffness
+from pendpipe.effects.model import Model
 
 from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
 from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white

@@ -10,10 +10,11 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.growing import grown
-from pendpipe.diagnose.model import OMEGA, Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.circular_error import CircularError
+from pendpipe.effects.model import Model
 
 RATE_HZ, NOISE_RAD, LINEAR = 20.0, 1e-3, 0.012
 OMEGA_TRUE = 6.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.diagnose.location import Location
+from pendpipe.diagnose.place import Location
 
 from .records import FREQUENCY_HZ, INSTANT_S, TIME_S, TONE_HZ, diagnosed
 

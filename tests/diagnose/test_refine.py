@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from pendpipe.diagnose.model import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
+from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 
 from .records import (
     INTERVAL_S,

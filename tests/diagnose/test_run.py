@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import binom
 
 from pendpipe.diagnose import diagnose_recording
-from pendpipe.diagnose.model import OFFSET, OMEGA, B
 from pendpipe.diagnose.values import effect_parameters
+from pendpipe.effects.baseline import OFFSET, OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
 
 from .records import (

@@ -10,12 +10,12 @@ from scipy.stats import chi2, kstest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import Model
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values, tangent_basis
 from pendpipe.diagnose.search import applicable
 from pendpipe.effects.catalogue import CATALOGUE
+from pendpipe.effects.model import Model
 
 from .records import INTERVAL_S, TIME_S, TRUTH, other_engine, prepared
 

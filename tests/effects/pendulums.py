@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pendpipe.diagnose.model import Evaluated, Model
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Model
 
 Floats = NDArray[np.float64]
 OMEGA = 2.0 * math.pi * 0.9

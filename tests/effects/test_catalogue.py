@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pendpipe.diagnose.model import OFFSET, OMEGA, START, TIME, A, B, C, Model, response
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.derivatives import jacobian
 from pendpipe.effects.manual import page
+from pendpipe.effects.model import Model
+from pendpipe.effects.responses import response
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
@@ -165,11 +168,11 @@ BASELINE_STEPS = {A: 1e-5, B: 1e-5, C: 1e-6, OMEGA: 1e-5, START: 1e-5, TIME: 1e-
 
 @pytest.mark.parametrize("identifier", WITH_TEMPLATE)
 def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
-    """Model.jacobian against central differences, an instant's own neighbourhood apart."""
+    """Derivatives against central differences, an instant's own neighbourhood apart."""
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05).adding(effect)
     value = np.append(BASE, VALUES[identifier])
-    found = model.jacobian(value, model.evaluate(value))
+    found = jacobian(model, value, model.evaluate(value))
     for index in range(len(BASE), model.size):
         name = ["size", *(p.name for p in effect.parameters)][index - len(BASE) + 1 - effect.switch]
         step = 1e-2 * abs(value[index])
@@ -196,7 +199,7 @@ def test_derivatives_by_the_baselines_values(identifier: str) -> None:
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05).adding(effect)
     value = np.append(BASE, VALUES[identifier])
-    found = model.jacobian(value, model.evaluate(value))
+    found = jacobian(model, value, model.evaluate(value))
     for index, step in BASELINE_STEPS.items():
         expected = numerical(model, value, index, step)
         error = np.linalg.norm(found[:, index] - expected)
@@ -231,8 +234,8 @@ def test_a_scan_keeps_most_of_what_lies_between_its_rows(identifier: str) -> Non
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05)
     at = model.evaluate(BASE)
-    jacobian = model.jacobian(BASE, at)
-    basis = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)[0]
+    columns = jacobian(model, BASE, at)
+    basis = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)[0]
     rows = [tuple(row) for row in effect.shapes(at.span)]
     assert all(len(row) == len(effect.parameters) - effect.sizes for row in rows)
     bank = np.concatenate([projected(effect, row, model, basis) for row in rows], axis=1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -17,9 +16,10 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data, gather
-from pendpipe.diagnose.model import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Model
 from pendpipe.diagnose.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.effects.model import Model
 from pendpipe.physics.decay import time_at
 
 _FEWEST: Final = 24
@@ -130,12 +130,3 @@ def _held(
     if parts or baseline == "viscous" or held_rates.get("b") == 0.0:
         held.append(SHARE)
     return tuple(held)
-
-
-def read_samples(part: object, place: str | Path) -> Samples:
-    """Prepare the readings of a recording's free decay."""
-    from pendpipe.analysis.turning_points.samples import prepare
-    from pendpipe.recording import Recording
-
-    assert isinstance(part, Recording)
-    return prepare(part, place)

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.model import Evaluated
+from pendpipe.diagnose.lock_in import lock_in
+from pendpipe.effects.evaluated import Evaluated
 
-_FEWEST: Final = 5
 _WHOLE: Final = 0.85
 """Part of a cycle's readings that must be there."""
 _CERTAIN: Final = 0.03
@@ -75,10 +75,6 @@ class Spans:
 def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms: float) -> Cycles:
     """Lock in to readings, cycle by cycle, on a model's phase clock.
 
-    In each cycle ``level + r (p cos psi + q sin psi)`` is fitted, r and psi the model's
-    amplitude and phase. On that clock ``x = r cos psi`` is exact, so that a restoring
-    torque that is not linear makes no harmonics here.
-
     Parameters
     ----------
     reading, weight
@@ -88,31 +84,16 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
     noise_rms
         Standard deviation of one reading; 0 for a model's.
     """
-    sampled = clock.sampled
-    motion = sampled.motion
-    number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
-    origin = int(number.min())
-    number -= origin
-    carrier = motion.upwards * sampled.amplitude
-    parts = [np.ones_like(reading), carrier * sampled.cosine, carrier * sampled.sine]
-    count = int(number.max()) + 1
-
-    def total(values: FloatArray) -> FloatArray:
-        return np.bincount(number, weights=weight * values, minlength=count).astype(np.float64)
-
-    size = total(parts[0])
+    motion = clock.sampled.motion
+    found = lock_in(reading, weight, clock.sampled, _WHOLE)
     # The middle of a cycle is a turning point of the model, where all about it is known.
-    middle = 2 * (np.arange(count) + origin) + 1
-    whole = size >= max(_FEWEST, _WHOLE * float(np.median(size[size > 0.0])))
-    good = whole & (middle >= 0) & (middle < len(motion.time_s))
-    normal = np.array([[total(one * other) for one in parts] for other in parts])[..., good]
-    right = np.array([total(one * reading) for one in parts])[..., good]
-    solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
-    _, p, q = solved.T
-    turning = middle[good]
-    amplitude = motion.amplitude[turning, 0] * np.maximum(np.hypot(p, q), 1e-12)
-    sd = noise_rms * np.sqrt(2.0 / size[good]) / amplitude
-    phase = math.pi * turning + np.unwrap(np.arctan2(-q, p))
+    turning = 2 * found.number + 1
+    inside = (turning >= 0) & (turning < len(motion.time_s))
+    turning = turning[inside]
+    size = np.maximum(np.hypot(found.cosine, found.sine)[inside], 1e-12)
+    amplitude = motion.amplitude[turning, 0] * size
+    sd = noise_rms * np.sqrt(2.0 / found.readings[inside]) / amplitude
+    phase = math.pi * turning + found.phase[inside]
     return Cycles(motion.time_s[turning, 0], amplitude, phase, sd)
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials, draw_chance
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
 from pendpipe.diagnose.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.tones import plane_band_hz
 
 _DYING: Final = (0.06, 0.25)

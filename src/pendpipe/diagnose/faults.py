@@ -6,21 +6,20 @@ catalogue; what only fine residuals show, behind it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
-from pendpipe.diagnose.forensics.finding import Finding, Location
+from pendpipe.diagnose.forensics.finding import Finding
+from pendpipe.diagnose.naming import Rival, equivalent
+from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.state import Fault, State, is_gross
 from pendpipe.estimate import Estimate
-
-if TYPE_CHECKING:
-    from pendpipe.diagnose.naming import Rival
-    from pendpipe.diagnose.progress import Progress
-    from pendpipe.diagnose.search import _State
 
 CATALOGUE_SHARE: Final = 0.7
 """Part of the level that the catalogue's scan spends; the tests share the rest."""
@@ -32,14 +31,6 @@ _EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
 _BEFORE_CURVES: Final = 15.0
 """By how much random kicks are preferred to a curve in time, which follows any of them."""
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A finding that counts, and its global p-value."""
-
-    finding: Finding
-    p_value: float
 
 
 class Forensics:
@@ -57,11 +48,9 @@ class Forensics:
         self.samples, self.level = samples, level
         self.p_value = 1.0
 
-    def before(self, state: _State, progress: Progress) -> None:
+    def before(self, state: State, progress: Progress) -> None:
         """Mend what would corrupt the fit: lost samples, clipping, glitches."""
         self._mend_clock(state, progress)
-        from pendpipe.diagnose.search import is_gross
-
         if is_gross(state.fit, state.data):
             return
         for name in _BEFORE:
@@ -69,17 +58,15 @@ class Forensics:
                 if not self._examine(name, state, progress):
                     break
 
-    def after(self, state: _State, progress: Progress) -> None:
+    def after(self, state: State, progress: Progress) -> None:
         """Make the tests that need a clean residual."""
-        from pendpipe.diagnose.search import is_gross
-
         if is_gross(state.fit, state.data):
             return
         known = [fault.finding.identifier for fault in state.faults]
         for name in [name for name in _BEHIND if name not in known]:
             self._examine(name, state, progress)
 
-    def _examine(self, name: str, state: _State, progress: Progress) -> bool:
+    def _examine(self, name: str, state: State, progress: Progress) -> bool:
         """Make one test; keep what it finds; say whether to look again."""
         finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
         p_value = min(finding.p_value / _EACH, 1.0)
@@ -94,27 +81,24 @@ class Forensics:
         state.faults[:] = [*known, kept]
         if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
             return False
-        from pendpipe.diagnose.search import settled
-
         data = state.data.masked((state.data.weight == 0.0) | finding.mask)
         noise = replace(state.noise, weight=data.weight)
         fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
-        state.fit, state.data, state.noise = settled(fit, data, noise, state.holding)
+        state.settle(fit, data, noise)
         return True
 
-    def _mend_clock(self, state: _State, progress: Progress) -> None:
+    def _mend_clock(self, state: State, progress: Progress) -> None:
         """Put the readings behind lost samples where they belong."""
-        from pendpipe.diagnose.search import settled
-
-        lost = find_lost_samples(state.data, state.fit)
+        data = state.data
+        interval = data.interval_s / data.fold
+        lost = find_lost_samples(data, state.fit, interval)
         if not lost:
             return
-        data, interval = state.data, state.data.interval_s
         time = data.time_s.copy()
         for each in lost:
             time[data.time_s >= each.time_s - 1e-9] += each.number * interval
         mended = replace(data, time_s=time, uniform=False)
-        model = replace(state.fit.model, time_s=time, _last={})
+        model = state.fit.model.at_times(time)
         fit = refine(model, mended, state.noise, state.fit.value, held=state.holding)
         if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
             return
@@ -128,22 +112,19 @@ class Forensics:
         )  # fmt: skip
         state.faults.append(Fault(found, 0.0))
         self.p_value = 0.0
-        state.fit, state.data, state.noise = settled(fit, mended, state.noise, state.holding)
+        state.settle(fit, mended)
 
-
-def kicked_at_random(state: _State, rival: Rival, forensics: Forensics, progress: Progress) -> bool:
-    """Ask whether random kicks explain more than the best effect of the catalogue does."""
-    from pendpipe.diagnose.naming import equivalent
-
-    name = "broadband-drive"
-    finding = TESTS[name](state.data, state.fit, state.noise, forensics.samples)
-    p_value = min(finding.p_value / _EACH, 1.0)
-    lead = _BEFORE_CURVES if rival.lead.effect.kind == "unnamed" else 0.0
-    if p_value > forensics.level:
-        return False
-    if equivalent(p_value, finding.delta_chi2) + lead < rival.evidence:
-        return False
-    progress(f"{name}: {finding.summary}")
-    state.faults.append(Fault(finding, p_value))
-    forensics.p_value = min(forensics.p_value, p_value)
-    return True
+    def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
+        """Ask whether random kicks explain more than the best effect of the catalogue does."""
+        name = "broadband-drive"
+        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
+        p_value = min(finding.p_value / _EACH, 1.0)
+        lead = _BEFORE_CURVES if rival.lead.effect.kind == "unnamed" else 0.0
+        if p_value > self.level:
+            return False
+        if equivalent(p_value, finding.delta_chi2) + lead < rival.evidence:
+            return False
+        progress(f"{name}: {finding.summary}")
+        state.faults.append(Fault(finding, p_value))
+        self.p_value = min(self.p_value, p_value)
+        return True

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.model import responses
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import tangent_basis
+from pendpipe.effects.responses import responses
 
 
 def finer_shape(base: Fit, noise: Noise, lead: Lead) -> tuple[float, ...]:

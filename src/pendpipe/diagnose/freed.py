@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from pendpipe.diagnose.model import OFFSET, OMEGA, START, A, B, C
+from pendpipe.effects.baseline import OFFSET, OMEGA, START, A, B, C
 from pendpipe.effects.effect import Effect
 
 _INDEX: Final[Mapping[str, int]] = {

@@ -15,9 +15,10 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import OMEGA, Model
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
+from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.model import Model
 
 _FIRST: Final = 4
 """Cycles of the first window."""

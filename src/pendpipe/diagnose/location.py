@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any, Final
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
 
@@ -18,49 +19,6 @@ _MOST: Final = 0.9
 _BINS: Final = 24
 _HARMONICS: Final = 6
 _LOUD: Final = 0.1
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where an effect shows in the readings.
-
-    Parameters
-    ----------
-    time_s, amplitude_rad, phase_rad
-        Intervals that hold nine tenths of what it explains; the phase from a turning point
-        at the positive side; None where it is everywhere.
-    frequency_hz, harmonics
-        Where in the spectrum: frequencies, and multiples of the motion's.
-    adc_codes
-        The converter's codes that are concerned.
-    summary
-        One clause.
-    """
-
-    time_s: tuple[float, float] | None = None
-    amplitude_rad: tuple[float, float] | None = None
-    phase_rad: tuple[float, float] | None = None
-    frequency_hz: tuple[float, ...] = ()
-    harmonics: tuple[int, ...] = ()
-    adc_codes: tuple[int, ...] = ()
-    summary: str = ""
-    extra: dict[str, Any] = field(default_factory=dict)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the contract's form."""
-
-        def pair(interval: tuple[float, float] | None) -> list[float] | None:
-            return None if interval is None else [float(end) for end in interval]
-
-        return {
-            "summary": self.summary,
-            "time_s": pair(self.time_s),
-            "amplitude_rad": pair(self.amplitude_rad),
-            "phase_rad": pair(self.phase_rad),
-            "frequency_hz": list(self.frequency_hz),
-            "harmonics": list(self.harmonics),
-            "adc_codes": list(self.adc_codes),
-        }
 
 
 def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
@@ -87,9 +45,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     if tone is not None:
         lines, harmonics = (tone,), ()
     found = Location(time, amplitude, phase, lines, harmonics)
-    return Location(
-        time, amplitude, phase, lines, harmonics, summary=_summary(found, data, sampled.amplitude)
-    )
+    return replace(found, summary=_summary(found, data, sampled.amplitude))
 
 
 def _along(before: Fit, after: Fit) -> FloatArray:

@@ -10,10 +10,13 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import OMEGA, SHARE, Evaluated, Model
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.baseline import OMEGA, SHARE
+from pendpipe.effects.derivatives import jacobian
+from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Model
 
 _ROUNDS: Final = 14
 _SETTLED: Final = 0.02
@@ -109,9 +112,9 @@ def refine(
     residual, slip = _residual(data, noise, at, value)
     converged = False
     for _ in range(rounds):
-        jacobian = _jacobian(model, noise, value, at)
-        step = _step(jacobian, residual, free, value, low, high)
-        promised = float(residual @ residual - np.sum((residual - jacobian @ step) ** 2))
+        columns = _jacobian(model, noise, value, at)
+        step = _step(columns, residual, free, value, low, high)
+        promised = float(residual @ residual - np.sum((residual - columns @ step) ** 2))
         accepted = False
         for shrink in (1.0, 0.3, 0.1, 0.02):
             trial = np.clip(value + shrink * step, low, high)
@@ -131,9 +134,9 @@ def refine(
         if promised < _SETTLED or (gained < _SETTLED and promised < 1.0):
             converged = True
             break
-    jacobian = _jacobian(model, noise, value, at)
+    columns = _jacobian(model, noise, value, at)
     return Fit(
-        model, value, float(residual @ residual), residual, jacobian, at, tuple(free.tolist()),
+        model, value, float(residual @ residual), residual, columns, at, tuple(free.tolist()),
         converged, slip,
     )  # fmt: skip
 
@@ -149,7 +152,7 @@ def _residual(
 
 def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:
     columns = np.empty((len(at.reading) + 1, model.size))
-    columns[:-1] = noise.whiten(model.jacobian(value, at))
+    columns[:-1] = noise.whiten(jacobian(model, value, at))
     columns[-1] = 0.0
     columns[-1, SHARE] = 1.0 / _SHARE_SD
     return columns

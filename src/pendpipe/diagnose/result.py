@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from pendpipe.diagnose.held_out import HeldOut
-from pendpipe.diagnose.location import Location
+from pendpipe.diagnose.place import Location
 from pendpipe.estimate import Estimate
 
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]

@@ -16,11 +16,11 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.freed import FreedParameter
-from pendpipe.diagnose.model import responses
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
+from pendpipe.effects.responses import responses
 
 _SEEN = 1e-4
 """Part of a sensitivity that must be left by the projection for it to be told at all."""

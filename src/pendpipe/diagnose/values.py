@@ -11,9 +11,9 @@ from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.model import OFFSET, OMEGA, A, B, C
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import OFFSET, OMEGA, A, B, C
 from pendpipe.estimate import Estimate
 
 _STEP: Final = 1e-3

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.cycles import Spans
-from pendpipe.diagnose.model import OMEGA
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled
 from pendpipe.figures.units import axis_unit

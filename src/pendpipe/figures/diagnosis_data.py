@@ -11,11 +11,11 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.cycles import Cycles, Spans, between, cycles, span_ends
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.model import Evaluated
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Diagnosis
 from pendpipe.diagnose.run import Outcome
+from pendpipe.effects.evaluated import Evaluated
 from pendpipe.figures.data import NothingToDrawError
 
 NAMES = {"eq8": "Eq. 8", "viscous": "Eq. 3"}

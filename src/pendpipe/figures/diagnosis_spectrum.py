@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.model import OMEGA
 from pendpipe.diagnose.refine import Fit
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, WIDTH_IN, key_above, styled

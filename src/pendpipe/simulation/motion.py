@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.model import BASELINE, Model
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Motion, NoMotionError
 from pendpipe.dynamics.sampling import sample_pieces
+from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.effect import Pendulum
+from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
 from pendpipe.simulation.effects import Given
 

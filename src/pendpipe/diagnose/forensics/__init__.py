@@ -21,7 +21,7 @@ from pendpipe.diagnose.forensics import (
     missing_codes,
     time_stamps,
 )
-from pendpipe.diagnose.forensics.finding import Finding, Location
+from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.forensics.lost_samples import LostSamples, find_lost_samples
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -62,5 +62,5 @@ def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Findin
 
 
 __all__ = [
-    "TESTS", "Finding", "Location", "LostSamples", "Test", "examine", "find_lost_samples",
+    "TESTS", "Finding", "LostSamples", "Test", "examine", "find_lost_samples",
 ]  # fmt: skip

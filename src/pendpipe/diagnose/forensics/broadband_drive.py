@@ -10,10 +10,11 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import residual_of
 from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import tangent_basis
 from pendpipe.estimate import Estimate

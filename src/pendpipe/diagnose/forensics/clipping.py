@@ -11,7 +11,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
-from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import (
     Lattice,
     find_lattice,
@@ -20,6 +20,7 @@ from pendpipe.diagnose.forensics.lattice import (
 )
 from pendpipe.diagnose.forensics.local import Local, local_residual
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 

@@ -10,8 +10,9 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import read_codes
-from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 

@@ -7,30 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnose.place import Location
 from pendpipe.estimate import Estimate
-
-Range = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where in the record; None or empty where that says nothing.
-
-    Parameters
-    ----------
-    time_s, amplitude_rad, phase_rad
-        From and to; the phase is that of x = A cos(phase), in [0, 2 pi).
-    frequency_hz
-        Frequencies.
-    adc_codes
-        Whole multiples of the step, counted from the reading zero.
-    """
-
-    time_s: Range | None = None
-    amplitude_rad: Range | None = None
-    phase_rad: Range | None = None
-    frequency_hz: tuple[float, ...] = ()
-    adc_codes: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +45,7 @@ class Finding:
     p_value: float
     delta_chi2: float = 0.0
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
-    location: Location = Location()
+    location: Location = field(default_factory=Location)
     mask: BoolArray | None = None
     variance: FloatArray | None = None
     time_s: FloatArray | None = None

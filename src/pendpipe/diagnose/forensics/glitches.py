@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import (
     Local,
     local_residual,
@@ -20,6 +20,7 @@ from pendpipe.diagnose.forensics.local import (
 )
 from pendpipe.diagnose.forensics.tails import Tail, fit_tail
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 

@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.refine import Fit
-from pendpipe.diagnose.unwrapped import _alignment
+from pendpipe.diagnose.unwrapped import alignment
 
 _SURE: Final = 7.0
 """Standard deviations of a phase step."""
@@ -67,7 +67,7 @@ def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> 
     """
     if not data.uniform or data.time_noise:
         return []
-    _, phase, centre = _alignment(data, fit.at, data.values - fit.at.reading)
+    _, phase, centre = alignment(data, fit.at, data.residual(fit.at.reading))
     if len(phase) < 8:
         return []
     sampled = fit.at.sampled
@@ -129,7 +129,8 @@ def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle:
     sampled = fit.at.sampled
     inside = (sampled.phase > centre[cycle - 1]) & (sampled.phase < centre[cycle + 1])
     amplitude = sampled.motion.upwards * sampled.amplitude[inside]
-    readings = (residual_like(data, fit) + sampled.angle)[inside]
+    residual = data.residual(fit.at.reading) * data.weight
+    readings = (residual + sampled.angle)[inside]
     before = amplitude * np.cos(sampled.phase[inside] + phase[cycle - 1])
     behind = amplitude * np.cos(sampled.phase[inside] + phase[cycle + 1])
     gain = (readings - before) ** 2 - (readings - behind) ** 2
@@ -138,8 +139,3 @@ def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle:
     best = int(np.argmin(total))
     place = np.flatnonzero(inside)
     return float(data.time_s[place[min(best, len(place) - 1)]])
-
-
-def residual_like(data: Data, fit: Fit) -> FloatArray:
-    """Readings less the model's, however far apart."""
-    return np.asarray((data.values - fit.at.reading) * data.weight)

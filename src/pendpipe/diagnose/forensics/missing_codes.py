@@ -11,8 +11,9 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import Coded, read_codes
-from pendpipe.diagnose.forensics.finding import Finding, Location, nothing
+from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 

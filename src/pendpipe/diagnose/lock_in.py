@@ -1,0 +1,81 @@
+"""Amplitude and phase of the readings in each cycle, on a model's phase clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.sampling import Sampled
+
+_FEWEST: Final = 5
+"""Readings in a cycle that three numbers are fitted to."""
+
+
+@dataclass(frozen=True)
+class LockIn:
+    """Fits of ``level + r (cosine cos psi + sine sin psi)``; all of shape (k,), one a cycle.
+
+    Parameters
+    ----------
+    number
+        Which cycle of the model's clock: psi from 2 pi number on.
+    readings
+        How many count.
+    cosine, sine
+        1 and 0 where readings and model agree.
+    strength
+        Sum of (r cos psi)^2: the inverse variance of `cosine` for readings of unit variance.
+    middle
+        Mean psi of the readings.
+    """
+
+    number: IntArray
+    readings: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    strength: FloatArray
+    middle: FloatArray
+
+    @property
+    def phase(self) -> FloatArray:
+        """By how much the readings are ahead of the model, unwrapped from cycle to cycle."""
+        return np.unwrap(np.arctan2(-self.sine, self.cosine))
+
+
+def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: float) -> LockIn:
+    """Fit each cycle.
+
+    Parameters
+    ----------
+    readings, weight
+        About the equilibrium or not (a level is fitted), and whether each counts, shape (n,).
+    sampled
+        The model's motion at the readings. On its clock ``x = r cos psi`` is exact, so that
+        a restoring torque that is not linear makes no harmonics here.
+    part
+        Of the usual number of readings, which a cycle must have.
+    """
+    number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
+    first = int(number.min())
+    count = int(number.max()) - first + 1
+    carrier = sampled.motion.upwards * sampled.amplitude
+    columns = [np.ones_like(readings), carrier * sampled.cosine, carrier * sampled.sine]
+
+    def total(values: FloatArray) -> FloatArray:
+        sums = np.bincount(number - first, weights=weight * values, minlength=count)
+        return sums.astype(np.float64)
+
+    size = total(columns[0])
+    usual = float(np.median(size[size > 0.0])) if size.any() else 0.0
+    good = size >= max(float(_FEWEST), part * usual)
+    normal = np.array([[total(one * other) for one in columns] for other in columns])[..., good]
+    right = np.array([total(one * readings) for one in columns])[..., good]
+    solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
+    return LockIn(
+        np.flatnonzero(good) + first, size[good], solved[:, 1], solved[:, 2], normal[1, 1],
+        total(sampled.phase)[good] / size[good],
+    )  # fmt: skip

@@ -1,0 +1,57 @@
+"""Whether what passes for red noise is an effect: a step or a drift is red as well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from pendpipe.diagnose.chance import Trials
+from pendpipe.diagnose.detect import detect, prepare
+from pendpipe.diagnose.naming import refit_leads
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.progress import Progress
+from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.state import State, settled
+from pendpipe.effects import Effect
+
+_DOUBT: Final = 12.0
+"""By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
+
+
+def doubt_redness(
+    state: State, effects: Sequence[Effect], threshold: float, seed: int, progress: Progress
+) -> None:
+    """Ask whether what passes for red noise is an effect: a step or a drift is red as well.
+
+    The noise is judged again by what the best effect leaves, were the noise not red; that
+    judgement is taken where effect and noise together are clearly likelier.
+    """
+    progress("the noise is red: is it an effect?")
+    effects = [effect for effect in effects if effect.kind != "unnamed"]
+    assert state.now is not None
+    fit, data, noise = settled(state.fit, state.data, state.noise, state.holding, red=False)
+    other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    if other.p_value > threshold:
+        return
+    rivals = refit_leads(
+        fit, data, noise, other, held=state.holding, gross=False, most=3, origin=state.origin
+    )
+    if not rivals:
+        return
+    extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
+    own = state.now.chance.own.get(rivals[0].lead.effect.key, Trials(1.0, 0.0))
+    cost = _DOUBT + 2.0 * math.log(own.first) + 3.0 * (rivals[0].lead.effect.sizes - 1)
+    if _badness(extended, noise) + cost > _badness(state.fit, state.noise):
+        return
+    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
+    state.fit, state.data, state.noise = fit, data, noise
+    state.now = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    state.first = state.now if not state.steps else state.first
+
+
+def _badness(fit: Fit, noise: Noise) -> float:
+    """Minus twice the log-likelihood, the noise's part included."""
+    return fit.chi2 + float(np.sum(np.log(noise.variance)))

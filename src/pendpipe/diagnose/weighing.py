@@ -1,0 +1,113 @@
+"""What is said of each effect in the end: its rivals with all the others in the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.curve_values import curve_values
+from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.location import locate
+from pendpipe.diagnose.naming import CLASS, Rival, probabilities
+from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.result import Named
+from pendpipe.diagnose.search import Search
+from pendpipe.diagnose.state import Fault, Step, is_gross
+from pendpipe.diagnose.values import effect_parameters
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.curves import Curve
+from pendpipe.effects.model import Model
+
+_NONE: Final = 4.0
+"""Evidence (in chi^2) that it is none of the class's, where the model leaves nothing."""
+
+
+def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
+    """One effect, weighed against its rivals with all the others in the model."""
+    effect = step.winner.lead.effect
+    without, rivals = _rivalry(found, beginning, step)
+    gain = without.chi2 - found.improved.chi2
+    mates = [
+        rival for rival in rivals
+        if rival.lead.effect.kind != "unnamed" and rival.identifier != effect.identifier
+        and gain - rival.gain < CLASS
+    ]  # fmt: skip
+    own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
+    weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
+    return Named(
+        effect.identifier, effect.name, effect.kind, effect.equation,
+        effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
+        float(weights[0]),
+        tuple((mate.identifier, float(weight)) for mate, weight in
+              zip(mates, weights[1:], strict=False)),
+        effect.deciding, locate(without, found.improved, found.data, effect),
+        curve_values(found.improved, effect, found.data.unit)
+        if isinstance(effect, Curve) else None,
+    )  # fmt: skip
+
+
+def fault_named(found: Search, fault: Fault) -> Named:
+    """A fault of the measurement that a test of its own has found."""
+    from pendpipe.effects.catalogue import by_identifier
+
+    finding = fault.finding
+    effect = by_identifier(finding.identifier)
+    doubt = math.exp(-0.5 * (_NONE + _misfit(found)))
+    return Named(
+        effect.identifier, effect.name, effect.kind, effect.equation, finding.parameters,
+        finding.delta_chi2, fault.p_value, 1.0 / (1.0 + doubt), (), effect.deciding,
+        replace(finding.location, summary=finding.summary),
+    )  # fmt: skip
+
+
+def _misfit(found: Search) -> float:
+    """How much of the doubt a model that leaves nothing takes away."""
+    return 4.0 if found.unexplained > 0.01 else 0.0
+
+
+def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
+    """The model without one effect, and who else could take its place in it."""
+    effect = step.winner.lead.effect
+    held = list(found.held)
+    model, value = found.improved.model.dropping(effect, found.improved.value)
+    if isinstance(effect, FreedParameter):
+        held.append(effect.index)
+        value[effect.index] = beginning.value[effect.index]
+    without = _refined(model, found, value, held) or step.before
+    alone = len(found.steps) == 1 and not is_gross(without, found.data)
+    if alone:
+        return without, step.rivals
+    rivals = []
+    for rival in step.rivals:
+        own = rival.lead.effect.key == effect.key
+        fit = found.improved if own else _refitted(without, found, held, rival)
+        if fit is not None:
+            gain = without.chi2 - fit.chi2
+            rivals.append(Rival(rival.lead, fit, gain, rival.evidence + gain - rival.gain))
+    return without, rivals
+
+
+def _refined(model: Model, found: Search, value: FloatArray, held: Sequence[int]) -> Fit | None:
+    """The fit of a model, from values that may be far from its own; None if it can't move so."""
+    for start in (value, np.concatenate([found.baseline.value, value[8:]])):
+        try:
+            return refine(model, found.data, found.noise, start, held=held)
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+    return None
+
+
+def _refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> Fit | None:
+    """Refit a rival in the final model, from where it ended before."""
+    effect = rival.lead.effect
+    if isinstance(effect, FreedParameter):
+        held = [index for index in held if index != effect.index]
+    own = rival.fit.value[len(rival.fit.value) - effect.count :]
+    start = np.concatenate([without.value, own])
+    return _refined(without.model.adding(effect), found, start, held)

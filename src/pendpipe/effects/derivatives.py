@@ -1,0 +1,74 @@
+"""Derivatives of a model's readings by all of its values, along the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion, rates
+from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.effects.effect import Effect, Pendulum, Span
+from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Model
+from pendpipe.effects.responses import response
+
+
+def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
+    """Derivatives of the readings by all values, shape (n, size)."""
+    sampled, tangent = at.sampled, at.tangent
+    pendulum = model.pendulum(value)
+    columns = np.empty((len(model.time_s), model.size))
+    losses = [A, B, C, SHARE]
+    columns[:, losses] = sampled.change(
+        *tangent.of_force(np.stack([_by_loss(model, value, at, index) for index in losses]))
+    ).T
+    columns[:, OMEGA] = _by_omega(model, value, at)
+    columns[:, START] = at.by_start() / value[START]
+    columns[:, TIME] = -sampled.velocity
+    columns[:, OFFSET] = 1.0
+    for effect, place in model.places():
+        for index in range(effect.count):
+            columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
+    return columns
+
+
+def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> FloatArray:
+    """Derivative of the acceleration by one of the baseline's losses; it is linear in them."""
+    moved = value.copy()
+    moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
+    motion = at.tangent.motion
+    change = model.acceleration(motion, moved) - model.acceleration(motion, value)
+    return np.asarray(change / (moved[index] - value[index]))
+
+
+def _by_omega(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
+    motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
+    moved = value.copy()
+    moved[OMEGA] += step
+    other = Motion(
+        motion.clock, float(moved[OMEGA]), motion.log_amplitude, motion.time_s, motion.upwards
+    )
+    new = rates(lambda m: model.acceleration(m, moved), other)
+    old = at.tangent.rates
+    loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
+    return at.sampled.change(*at.tangent.of_rates(loss, pace))
+
+
+def _derivative(
+    effect: Effect, values: FloatArray, index: int, at: Evaluated, pendulum: Pendulum
+) -> FloatArray:
+    """Derivative of the readings by one value of one effect, along the motion."""
+    low, high = values.copy(), values.copy()
+    step = _step(effect, values, index, at.span)
+    low[index] -= step
+    high[index] += step
+    return np.asarray(response(effect, low, high, at, pendulum) / (2.0 * step))
+
+
+def _step(effect: Effect, values: FloatArray, index: int, span: Span) -> float:
+    if index < effect.sizes:
+        return max(effect.small(span), 1e-4 * abs(float(values[index])))
+    if effect.parameters[index - effect.switch].name == "time":
+        # Over several readings, or the one that is crossed decides.
+        return min(2.0 * span.interval_s, 0.0625 * span.period_s)
+    return max(1e-4 * abs(float(values[index])), 1e-9)

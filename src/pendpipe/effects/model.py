@@ -1,0 +1,226 @@
+"""The baseline and any effects of the catalogue, as one model of the readings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
+from pendpipe.effects.baseline import (
+    BASELINE,
+    HIGH,
+    LOW,
+    OFFSET,
+    OMEGA,
+    START,
+    TIME,
+    closed_form,
+    pendulum_of,
+)
+from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
+from pendpipe.effects.evaluated import Evaluated, kick_sizes
+
+_MORE: Final = (1.0, 1.02, 1.12, 1.28)
+"""Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Eq. 8 with effects.
+
+    Parameters
+    ----------
+    time_s
+        When the readings were taken, shape (n,).
+    interval_s
+        Between them, usually.
+    effects
+        What is added; their values follow the baseline's in the vector of parameters.
+    order
+        Intervals between the nodes of a half cycle.
+    half_cycles
+        How many are followed; None for as many as the readings may need, and some more.
+    fold
+        How many readings each is the mean of, `interval_s` apart.
+    """
+
+    time_s: FloatArray
+    interval_s: float
+    effects: tuple[Effect, ...] = ()
+    order: int = 14
+    half_cycles: int | None = None
+    fold: int = 1
+    _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
+
+    def adding(self, effect: Effect) -> Model:
+        """The same with one effect more."""
+        return replace(self, effects=(*self.effects, effect), _last=dict(self._last))
+
+    def dropping(self, effect: Effect, value: FloatArray) -> tuple[Model, FloatArray]:
+        """The same without one effect (if it is in it), and the values that are left."""
+        others = [(other, place) for other, place in self.places() if other is not effect]
+        kept = [value[: len(BASELINE)], *(value[place] for _, place in others)]
+        effects = tuple(other for other, _ in others)
+        return replace(self, effects=effects, _last=dict(self._last)), np.concatenate(kept)
+
+    def at_times(self, time_s: FloatArray) -> Model:
+        """The same for readings at other times."""
+        return replace(self, time_s=time_s, _last={})
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(BASELINE) + sum(effect.count for effect in self.effects)
+
+    def places(self) -> list[tuple[Effect, slice]]:
+        """Each effect with the place of its values."""
+        found, first = [], len(BASELINE)
+        for effect in self.effects:
+            found.append((effect, slice(first, first + effect.count)))
+            first += effect.count
+        return found
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest values."""
+        low, high = list(LOW), list(HIGH)
+        for effect in self.effects:
+            for lowest, highest in effect.bounds():
+                low.append(lowest)
+                high.append(highest)
+        return np.array(low), np.array(high)
+
+    def held(self) -> list[int]:
+        """Indices that are never fitted: the sizes of switches."""
+        return [place.start for effect, place in self.places() if effect.switch]
+
+    def pendulum(self, value: FloatArray) -> Pendulum:
+        """The baseline's constants."""
+        return pendulum_of(value)
+
+    def span(self, value: FloatArray, sampled: Sampled) -> Span:
+        """What the scans of effects must know."""
+        return Span(
+            float(self.time_s[0]), float(self.time_s[-1]), self.interval_s, self.pendulum(value),
+            float(sampled.amplitude[0]), float(sampled.amplitude[-1]), float(value[OFFSET]),
+        )  # fmt: skip
+
+    def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
+        """Return x'' + omega^2 x of the baseline and of all effects."""
+        pendulum = self.pendulum(value)
+        total = pendulum.acceleration(motion)
+        for effect, place in self.places():
+            extra = effect.acceleration(motion, pendulum, value[place])
+            if extra is not None:
+                total = total + extra
+        return total
+
+    def follow(self, value: FloatArray) -> list[tuple[float, Motion]]:
+        """Solve the motion: from the start, and anew from each kick on, on one clock.
+
+        Raises
+        ------
+        NoMotionError
+            If it stops, or runs away, before the last reading.
+        """
+        omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
+        law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+        motion = self._smooth(law, value)
+        self._last["motion"] = motion
+        pieces = [(-math.inf, motion)]
+        by_log, by_time = np.zeros_like(motion.time_s), np.zeros_like(motion.time_s)
+        for kick in self._kicks(value):
+            before = sample_motion(motion, np.array([kick.time_s]))
+            # It takes effect before the instant, so that what follows is smooth there.
+            whole = max(int(before.phase[0] // math.pi) - 1, 0)
+            for _ in range(2):
+                log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
+                by_log[whole:] += log[0]
+                by_time[whole:] += late[0]
+                motion = follow(law, omega, start, begin, motion, (by_log, by_time))
+            pieces.append((kick.time_s, motion))
+        return pieces
+
+    def _kicks(self, value: FloatArray) -> list[Kick]:
+        """The sudden changes within the record, as they come."""
+        kicks = [effect.kick(value[place]) for effect, place in self.places()]
+        inside = [k for k in kicks if k is not None and value[TIME] < k.time_s < self.time_s[-1]]
+        return sorted(inside, key=lambda kick: kick.time_s)
+
+    def _smooth(self, law: Law, value: FloatArray) -> Motion:
+        """The motion without kicks, on as many half cycles as it takes, and hardly more.
+
+        More would ask for motion beyond the stop.
+        """
+        if self.half_cycles is not None:
+            return self._from_guesses(law, value, Clock(self.half_cycles, self.order))
+        omega, begin = float(value[OMEGA]), float(value[TIME])
+        needed = (self.time_s[-1] - begin) * omega / math.pi
+        if not 1.0 <= needed < 2e5:
+            raise NoMotionError("the frequency is out of reach")
+        last = self._last.get("motion")
+        known = [] if last is None else [last.clock.count]
+        stops = math.inf
+        for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
+            if not needed - 1.0 < count < min(1.3 * needed + 4.0, stops):
+                continue
+            clock = Clock(count, self.order)
+            try:
+                motion = self._from_guesses(law, value, clock)
+            except NoMotionError:
+                # So many half cycles are too many; fewer may do.
+                stops = count
+                continue
+            if motion.time_s[-1, -1] >= self.time_s[-1]:
+                return motion
+        raise NoMotionError("it stops, or the frequency is out of reach")
+
+    def _from_guesses(self, law: Law, value: FloatArray, clock: Clock) -> Motion:
+        """Begin with the last motion, if it was on this clock; else with the closed form."""
+        start = (float(value[OMEGA]), float(value[START]), float(value[TIME]))
+        last = self._last.get("motion")
+        if last is not None and last.clock == clock:
+            try:
+                return follow(law, *start, last)
+            except NoMotionError:
+                pass
+        return follow(law, *start, closed_form(value, clock))
+
+    def evaluate(self, value: FloatArray) -> Evaluated:
+        """Return readings, and what the derivatives need."""
+        pieces = self.follow(value)
+        motion = pieces[-1][1]
+        times = self.time_s
+        for effect, place in self.places():
+            delay = effect.delay(self.time_s, value[place])
+            if delay is not None:
+                times = times + delay
+        sampled = sample_pieces(pieces, times)
+        turned = sampled.phase[[0, -1]]
+        if not np.all(np.isfinite(sampled.phase)) or np.ptp(turned) > 4.0 * np.pi * len(
+            motion.time_s
+        ):
+            raise NoMotionError("the readings' clock is out of reach")
+        pendulum = self.pendulum(value)
+        reading = value[OFFSET] + self._averaging(value) * sampled.angle
+        for effect, place in self.places():
+            extra = effect.reading(sampled, pendulum, value[place])
+            if extra is not None:
+                reading = reading + extra
+        tangent = Tangent(lambda m: self.acceleration(m, value), motion)
+        return Evaluated(reading, sampled, tangent, self.span(value, sampled))
+
+    def _averaging(self, value: FloatArray) -> float:
+        """What a mean over `fold` neighbouring readings leaves of the fundamental."""
+        if self.fold == 1:
+            return 1.0
+        half = 0.5 * float(value[OMEGA]) * self.interval_s / self.fold
+        return math.sin(self.fold * half) / (self.fold * math.sin(half))
+
+    def reading(self, value: FloatArray) -> FloatArray:
+        """Return the readings alone, shape (n,)."""
+        return self.evaluate(value).reading
