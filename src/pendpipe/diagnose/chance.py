@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,9 +10,11 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.scores import Bank, local_p_values
-from pendpipe.diagnose.spectrum import ToneScan
+from pendpipe.diagnose.spectrum import ToneScans
 
 _DRAWS: Final = 256
+_AT_ONCE: Final = 32
+"""Draws that are worked on together: few enough to stay in the processor's cache."""
 _TAIL: Final = 0.4
 """Part of the draws from whose smallest p-values the number of trials is read."""
 _GROWTH: Final = 0.05
@@ -56,28 +57,35 @@ class Chance:
     own: dict[str, Trials]
 
 
-def draw_chance(bank: Bank, scans: Sequence[ToneScan], seed: int, draws: int = _DRAWS) -> Chance:
+def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = _DRAWS) -> Chance:
     """Draw white residuals, project them as the fit does, and see what the scans make of them.
 
     The tail of the smallest p-value is extrapolated with a slowly growing number of trials,
     as Gross and Vitells do for continuous scans.
     """
     generator = np.random.default_rng(seed)
-    white = generator.standard_normal((len(bank.basis), draws))
-    white -= bank.basis @ (bank.basis.T @ white)
-    smallest = np.ones(draws)
-    own: dict[str, Trials] = {}
-    if bank.candidates:
-        scores = bank.scores(white)
-        for name, rows in bank.rows().items():
-            # All shapes of one effect have the same degrees of freedom.
-            freedom = bank.freedom[rows[:1]]
-            local = local_p_values(scores[rows].max(axis=0)[None], freedom)[0]
-            smallest = np.minimum(smallest, local)
-            own[name] = Trials(1.0, 0.0) if len(rows) == 1 else _trials(local, _GROWTH)
-    for scan in scans:
-        smallest = np.minimum(smallest, np.exp(-0.5 * scan.scores(white).max(axis=0)))
-    return Chance(_trials(smallest, _GROWTH), own)
+    rows = bank.rows()
+    # All shapes of one effect have the same degrees of freedom.
+    freedom = {name: bank.freedom[indices[:1]] for name, indices in rows.items()}
+    found: dict[str, list[FloatArray]] = {name: [] for name in rows}
+    smallest: list[FloatArray] = []
+    for _ in range(math.ceil(draws / _AT_ONCE)):
+        white = generator.standard_normal((_AT_ONCE, len(bank.basis))).T
+        white -= bank.basis @ (bank.basis.T @ white)
+        least = np.ones(_AT_ONCE)
+        scores = bank.scores(white) if rows else np.zeros((0, _AT_ONCE))
+        for name, indices in rows.items():
+            local = local_p_values(scores[indices].max(axis=0)[None], freedom[name])[0]
+            least = np.minimum(least, local)
+            found[name].append(local)
+        for scores in tones.scores(white) if tones else []:
+            least = np.minimum(least, np.exp(-0.5 * scores.max(axis=0)))
+        smallest.append(least)
+    own = {
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(np.concatenate(parts), _GROWTH)
+        for name, parts in found.items()
+    }
+    return Chance(_trials(np.concatenate(smallest), _GROWTH), own)
 
 
 def _trials(smallest: FloatArray, growth: float) -> Trials:

@@ -15,7 +15,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
-from pendpipe.diagnose.spectrum import Band, ToneScan, tone_scan
+from pendpipe.diagnose.spectrum import Band, ToneScan, ToneScans, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.tones import plane_band_hz
@@ -73,7 +73,7 @@ class Scanner:
     """The columns of a catalogue along one fit."""
 
     bank: Bank
-    scans: tuple[ToneScan, ...]
+    tones: ToneScans
     spectral: tuple[Effect, ...]
     duration_s: float
 
@@ -94,7 +94,9 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
             tone_scan(data, noise, bank.basis, np.exp(-since / dying), Band(_ABOVE * own))
             for dying in _DYING
         ]
-    return Scanner(bank, tuple(scans), spectral, float(data.time_s[-1] - data.time_s[0]))
+    return Scanner(
+        bank, ToneScans(noise, tuple(scans)), spectral, float(data.time_s[-1] - data.time_s[0])
+    )
 
 
 def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None) -> Detection:
@@ -109,17 +111,17 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     known
         An earlier detection on this record: its trials are used again.
     """
-    bank, scans = scanner.bank, list(scanner.scans)
+    bank = scanner.bank
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    chance = draw_chance(bank, scans, seed) if known is None else known.chance
+    chance = draw_chance(bank, scanner.tones, seed) if known is None else known.chance
     leads = _bank_leads(bank, residual, chance.own)
     smallest = 1.0
     if bank.candidates:
         smallest = float(local_p_values(bank.scores(residual), bank.freedom).min())
-    for scan in scans:
-        scores = scan.scores(residual)
+    tones = scanner.tones.scores(residual)
+    for scores in tones:
         smallest = min(smallest, math.exp(-0.5 * float(scores.max())))
-    leads += _tone_leads(scanner, residual)
+    leads += _tone_leads(scanner, tones)
     leads.sort(key=lambda lead: (lead.p_value, -lead.score))
     return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
 
@@ -139,13 +141,12 @@ def _bank_leads(bank: Bank, residual: FloatArray, own: dict[str, Trials]) -> lis
     return leads
 
 
-def _tone_leads(scanner: Scanner, residual: FloatArray) -> list[Lead]:
+def _tone_leads(scanner: Scanner, tones: Sequence[FloatArray]) -> list[Lead]:
     """The strongest tone, steady or dying, for each effect that is one."""
     leads = []
     for effect in scanner.spectral:
         found = []
-        for scan, dying in zip(scanner.scans, (None, *_DYING), strict=False):
-            scores = scan.scores(residual)
+        for scan, dying, scores in zip(scanner.tones.scans, (None, *_DYING), tones, strict=False):
             index = int(np.argmax(scores))
             score = float(scores[index])
             decay = math.inf if dying is None else dying * scanner.duration_s

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnose.colour import fit_colour
 from pendpipe.diagnose.data import Data
 
 _HARMONICS: Final = 7
@@ -16,12 +17,6 @@ _WIDTH: Final = 0.08
 """Of the frequency: the band about each harmonic that a misfit may fill."""
 _FIRST: Final = 1
 """The lowest cosine that may be noise: the level itself is fitted."""
-_WORTH: Final = (2.5, 12.0)
-"""Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
-is missed accuses drifts and slow tones of the noise; a needless one costs little."""
-_STEEPEST: Final = 1.6
-_OUTLIER: Final = 12.0
-"""Power over the spectrum beyond which a cosine holds no noise but a line."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +51,23 @@ class Noise:
     def whiten(self, columns: FloatArray) -> FloatArray:
         """Turn readings (or columns of them) into numbers of unit variance, shape kept."""
         scale = 1.0 / np.sqrt(self.variance)
-        tall = columns.ndim == 2
-        weight = self.weight[:, None] if tall else self.weight
         if not self.uniform:
-            return np.asarray(columns * weight * (scale[:, None] if tall else scale))
+            return np.asarray((columns.T * (self.weight * scale)).T)
         from scipy.fft import dct
 
-        spectrum = dct(columns * weight, axis=0, norm="ortho")
-        return np.asarray(spectrum * (scale[:, None] if tall else scale))
+        # A column at a time stands together in memory: the transform is far quicker so.
+        rows = np.multiply(columns.T, self.weight, order="C")
+        return np.asarray((dct(rows, norm="ortho", overwrite_x=True) * scale).T)
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
         """The transpose of `whiten`: from white numbers back to weights of readings."""
         scale = 1.0 / np.sqrt(self.variance)
-        tall = columns.ndim == 2
-        weight = self.weight[:, None] if tall else self.weight
-        scaled = columns * (scale[:, None] if tall else scale)
         if not self.uniform:
-            return np.asarray(scaled * weight)
+            return np.asarray((columns.T * (self.weight * scale)).T)
         from scipy.fft import idct
 
-        return np.asarray(idct(scaled, axis=0, norm="ortho") * weight)
+        rows = np.multiply(columns.T, scale, order="C")
+        return np.asarray((idct(rows, norm="ortho", overwrite_x=True) * self.weight).T)
 
     @property
     def rms(self) -> float:
@@ -134,14 +126,13 @@ def estimate_noise(
     quiet = _quiet(frequency, frequency_hz)
     if np.count_nonzero(quiet) < 40:
         quiet = np.arange(count) >= _FIRST
-    shape = _best_shape(power[quiet], frequency[quiet], data.interval_s, red=red)
-    variance = _spectrum(shape, frequency, data.interval_s)
-    white = math.exp(0.5 * shape[0])
+    colour = fit_colour(power[quiet], frequency[quiet], data.interval_s, red=red)
+    variance = colour.spectrum(frequency, data.interval_s)
+    white = math.sqrt(colour.white)
     low = floor * floor / variance.mean()
     if low > 1.0:
         variance, white = variance * low, white * math.sqrt(low)
-    share = math.exp(shape[1]) if shape[1] > -50.0 else 0.0
-    return Noise(variance, True, white, data.weight, share, float(shape[2]), float(shape[3]))
+    return Noise(variance, True, white, data.weight, colour.red, colour.slope, colour.memory)
 
 
 def _robust_rms(values: FloatArray) -> float:
@@ -154,52 +145,3 @@ def _quiet(frequency: FloatArray, motion_hz: float) -> BoolArray:
     for harmonic in range(1, _HARMONICS):
         quiet &= np.abs(frequency - harmonic * motion_hz) > _WIDTH * motion_hz
     return np.asarray(quiet)
-
-
-def _spectrum(shape: FloatArray, frequency: FloatArray, interval: float) -> FloatArray:
-    """Variance of each cosine from ln of the white level, red part, slope, and memory."""
-    white, red, slope, memory = shape
-    safe = np.maximum(frequency, frequency[frequency > 0.0].min() if frequency.any() else 1.0)
-    coloured = 1.0 + np.exp(red) * (0.05 / safe) ** slope
-    if memory:
-        turn = 2.0 * math.pi * frequency * interval
-        coloured = coloured / (1.0 - 2.0 * memory * np.cos(turn) + memory * memory)
-    return np.asarray(np.exp(white) * coloured)
-
-
-def _best_shape(
-    power: FloatArray, frequency: FloatArray, interval: float, *, red: bool
-) -> FloatArray:
-    """Maximise Whittle's likelihood, from white to coloured."""
-    from scipy.optimize import minimize
-
-    # Glitches and tones are no noise: what is far above its neighbours is clipped.
-    level = max(float(np.median(power)) / 0.4549, 1e-300)
-
-    def cost(shape: FloatArray) -> float:
-        spectrum = _spectrum(shape, frequency, interval)
-        ratio = power / spectrum
-        return float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER)))
-
-    white = np.array([math.log(level), -60.0, 1.0, 0.0])
-    white[0] = math.log(_clipped_mean(power, level))
-    best, least = white, cost(white)
-    # Far below the powers all of them are clipped, and the cost would fall without end.
-    bounds = [(white[0] - 8.0, white[0] + 4.0), (-12.0, 8.0), (0.3, _STEEPEST), (-0.95, 0.95)]
-    for start, frozen, worth in (
-        (np.array([white[0], 0.0, 1.0, 0.0]), (3,), _WORTH[0]),
-        (np.array([white[0], -60.0, 1.0, 0.3]), (1, 2), _WORTH[1]),
-    ):
-        limits = [(start[k], start[k]) if k in frozen else bounds[k] for k in range(4)]
-        found = minimize(cost, start, method="L-BFGS-B", bounds=limits)
-        if found.fun < least - worth and (red or 1 in frozen):
-            best, least = found.x, float(found.fun)
-    return np.asarray(best)
-
-
-def _clipped_mean(power: FloatArray, level: float) -> float:
-    """Mean of chi^2_1 numbers, the far tail left out and made up for."""
-    for _ in range(3):
-        inside = power < 12.0 * level
-        level = float(np.mean(power[inside])) / 0.9958
-    return level

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.freed import FreedParameter
@@ -27,6 +28,11 @@ _SEEN = 1e-4
 
 _STANDS_OUT = 4.0
 """Standard deviations by which a mixture of a curve's hats must be seen to be kept."""
+
+
+Piece = tuple[Effect, tuple[float, ...], FloatArray]
+"""An effect, a shape of it, and what its sizes do to the readings, shape (sizes, n)."""
+_AT_ONCE = 32
 
 
 class Candidate(NamedTuple):
@@ -56,7 +62,7 @@ class Bank:
     """
 
     basis: FloatArray
-    columns: FloatArray
+    columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
     lengths: FloatArray
 
@@ -102,7 +108,7 @@ def tangent_basis(fit: Fit) -> FloatArray:
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     """Work out the columns of all effects along a fitted motion."""
     basis = tangent_basis(fit)
-    pieces: list[tuple[Effect, tuple[float, ...], list[FloatArray]]] = []
+    pieces: list[Piece] = []
     pendulum = fit.model.pendulum(fit.value)
     for effect in effects:
         if isinstance(effect, FreedParameter):
@@ -111,23 +117,30 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
         shapes = effect.shapes(fit.at.span)
         changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
         columns = responses(effect, changes, fit.at, pendulum) / small
+        columns[~np.all(np.isfinite(columns), axis=1)] = 0.0
         for row, shape in enumerate(shapes):
             own = columns[row * effect.sizes : (row + 1) * effect.sizes]
-            pieces.append((effect, tuple(float(number) for number in shape), list(own)))
-    raw = np.stack([column for _, _, columns in pieces for column in columns], axis=1)
-    usable = np.all(np.isfinite(raw), axis=0)
-    raw[:, ~usable] = 0.0
-    tall = np.zeros((len(raw) + 1, raw.shape[1]))
-    tall[:-1] = noise.whiten(raw)
-    before = np.linalg.norm(tall, axis=0)
-    tall -= basis @ (basis.T @ tall)
-    tall -= basis @ (basis.T @ tall)
+            pieces.append((effect, tuple(float(number) for number in shape), own))
+    count = sum(len(columns) for _, _, columns in pieces)
     known = [effect for effect in effects if isinstance(effect, FreedParameter)]
+    # Columns that stand together in memory: transforms and products are far quicker so.
+    tall = np.zeros((len(fit.jacobian), count + len(known)), order="F")
+    before = np.zeros(tall.shape[1])
+    place = 0
+    for _, _, columns in pieces:
+        part = slice(place, place + len(columns))
+        tall[:-1, part] = noise.whiten(columns.T)
+        before[part] = np.linalg.norm(tall[:, part], axis=0)
+        place = part.stop
     for effect in known:
-        column = fit.jacobian[:, [effect.index]]
-        pieces.append((effect, (), [column[:-1, 0]]))
-        before = np.append(before, np.linalg.norm(column))
-        tall = np.concatenate([tall, column - basis @ (basis.T @ column)], axis=1)
+        tall[:, place] = fit.jacobian[:, effect.index]
+        before[place] = np.linalg.norm(tall[:, place])
+        pieces.append((effect, (), tall[:, [place]].T))
+        place += 1
+    for first in range(0, place, _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        for _ in range(2):
+            tall[:, part] -= basis @ (basis.T @ tall[:, part])
     return _gathered(pieces, tall, before, basis)
 
 
@@ -141,11 +154,11 @@ def _sizes(
 
 
 def _gathered(
-    pieces: list[tuple[Effect, tuple[float, ...], list[FloatArray]]], tall: FloatArray,
-    before: FloatArray, basis: FloatArray,
+    pieces: list[Piece], tall: FloatArray, before: FloatArray, basis: FloatArray,
 ) -> Bank:  # fmt: skip
     """Keep what can be told, at unit length."""
-    kept, candidates, lengths, place, found = [], [], [], 0, 0
+    stacked = np.zeros(tall.shape, dtype=np.float32, order="F")
+    candidates, lengths, place, found = [], [], 0, 0
     for effect, shape, columns in pieces:
         part = tall[:, place : place + len(columns)]
         whole = before[place : place + len(columns)]
@@ -159,12 +172,11 @@ def _gathered(
         if not np.all(length > _SEEN * np.maximum(whole, 1e-300)) or not np.all(length > 0.0):
             continue
         unit = np.linalg.qr(part)[0] if part.shape[1] > 1 else part / length
-        kept.append(unit)
+        stacked[:, found : found + unit.shape[1]] = unit
         candidates.append(Candidate(effect, shape, found, unit.shape[1]))
         lengths.append(float(length[0]))
         found += unit.shape[1]
-    stacked = np.concatenate(kept, axis=1) if kept else np.zeros((len(tall), 0))
-    return Bank(basis, stacked.astype(np.float32), tuple(candidates), np.array(lengths))
+    return Bank(basis, stacked[:, :found], tuple(candidates), np.array(lengths))
 
 
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:

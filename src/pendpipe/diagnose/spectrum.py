@@ -41,24 +41,36 @@ class ToneScan:
     """
 
     envelope: FloatArray
-    noise: Noise
     frequency_hz: FloatArray
     inverse: FloatArray
     size: int
 
-    def scores(self, residual: FloatArray) -> FloatArray:
+    def scores(self, weights: FloatArray) -> FloatArray:
         """chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
 
-        `residual` is whitened and projected, with the prior's entry, shape (n + 1, ...).
+        `weights` is `Noise.adjoint` of the whitened and projected residual, shape (n, ...).
         """
+        rows = np.multiply(weights.T, self.envelope, order="C")
+        lines = np.fft.rfft(rows, n=self.size)[..., 1 : len(self.inverse) + 1]
+        real, imaginary = lines.real, lines.imag
+        first, mixed, second = self.inverse.T
+        found = first * real**2 - 2.0 * mixed * real * imaginary + second * imaginary**2
+        return np.asarray(found.T)
+
+
+@dataclass(frozen=True)
+class ToneScans:
+    """Scans of several envelopes on the same noise."""
+
+    noise: Noise
+    scans: tuple[ToneScan, ...] = ()
+
+    def scores(self, residual: FloatArray) -> list[FloatArray]:
+        """Each scan's chi^2; `residual` is whitened and projected, with the prior's entry."""
+        if not self.scans:
+            return []
         weights = self.noise.adjoint(residual[:-1])
-        envelope = self.envelope if weights.ndim == 1 else self.envelope[:, None]
-        lines = np.fft.rfft(weights * envelope, n=self.size, axis=0)[1 : len(self.inverse) + 1]
-        real, imaginary = lines.real, -lines.imag
-        first, mixed, second = (
-            column.reshape(-1, *([1] * (real.ndim - 1))) for column in self.inverse.T
-        )
-        return np.asarray(first * real**2 + 2.0 * mixed * real * imaginary + second * imaginary**2)
+        return [scan.scores(weights) for scan in self.scans]
 
 
 def tone_scan(
@@ -80,8 +92,8 @@ def tone_scan(
     g11 = 0.5 * (total + lines.real) / variance
     g22 = 0.5 * (total - lines.real) / variance
     g12 = -0.5 * lines.imag / variance
-    weights = noise.adjoint(basis[:-1]) * envelope[:, None]
-    known = np.fft.rfft(weights, n=size, axis=0)[keep]
+    rows = np.multiply(noise.adjoint(basis[:-1]).T, envelope, order="C")
+    known = np.fft.rfft(rows, n=size).T[keep]
     real, imaginary = known.real, -known.imag
     h11 = g11 - np.sum(real**2, axis=1)
     h22 = g22 - np.sum(imaginary**2, axis=1)
@@ -95,7 +107,7 @@ def tone_scan(
     )
     safe = np.where(seen, determinant, 1.0)
     inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
-    return ToneScan(envelope, noise, frequency, inverse, size)
+    return ToneScan(envelope, frequency, inverse, size)
 
 
 def _variance_at(noise: Noise, frequency: FloatArray, data: Data) -> FloatArray:
