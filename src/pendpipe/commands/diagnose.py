@@ -82,7 +82,6 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
     from pendpipe.errors import InputError
     from pendpipe.stages.diagnose import diagnose_motion, write_diagnosis
 
-    _start_compiled()
     provenance: dict[str, Any] = {"seed": question.seed, "fixed": list(arguments.fix)}
     try:
         recording, made = read_motion(arguments)
@@ -112,12 +111,6 @@ def _not_analysable(
     write_not_analysable(arguments.out, question, reason, provenance)
     print(f"pendpipe: {reason}", file=sys.stderr)
     return 2 if arguments.refused is None else 0
-
-
-def _start_compiled() -> None:
-    from pendpipe.commands._compiled import start_numba
-
-    start_numba()
 
 
 def _say(line: str) -> None:

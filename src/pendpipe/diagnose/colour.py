@@ -73,7 +73,7 @@ def fit_colour(
     """
     # Glitches and tones are no noise: what is far above its neighbours is clipped.
     level = _clipped_mean(power, max(float(np.median(power)) / 0.4549, 1e-300))
-    best, least = Colour(level), _cost(Colour(level), power, frequency_hz, interval_s)
+    best, least = Colour(level), _whittle(power, np.full(len(power), level))[0]
     for ends in (math.inf, REFERENCE_HZ) if red else ():
         found, cost = _red(power, frequency_hz, level, ends)
         if cost < least - (_WORTH[0] if not best.red else 0.0):
@@ -84,10 +84,11 @@ def fit_colour(
     return best
 
 
-def _cost(colour: Colour, power: FloatArray, frequency: FloatArray, interval: float) -> float:
-    """-2 ln L, what is far above the spectrum clipped."""
-    spectrum = colour.spectrum(frequency, interval)
-    return float(np.sum(np.log(spectrum) + np.minimum(power / spectrum, _OUTLIER)))
+def _whittle(power: FloatArray, spectrum: FloatArray) -> tuple[float, FloatArray]:
+    """-2 ln L, what is far above clipped; and its derivatives by ln S."""
+    ratio = power / spectrum
+    total = float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER)))
+    return total, np.where(ratio < _OUTLIER, 1.0 - ratio, 1.0)
 
 
 def _red(
@@ -99,16 +100,18 @@ def _red(
     inside = frequency <= ends
     if np.count_nonzero(inside) < 3:
         return Colour(level), math.inf
-    # Above its end there is white noise alone, whose part of the sum is known.
-    beyond = power[~inside]
+    # Above its end there is white noise alone.
+    near, beyond = power[inside], power[~inside]
     logs = np.log(REFERENCE_HZ / np.maximum(frequency[inside], 1e-12))
 
-    def cost(values: FloatArray) -> float:
+    def cost(values: FloatArray) -> tuple[float, FloatArray]:
         white = math.exp(values[0])
-        spectrum = white * (1.0 + np.exp(values[1] + values[2] * logs))
-        near = np.log(spectrum) + np.minimum(power[inside] / spectrum, _OUTLIER)
-        far = len(beyond) * values[0] + np.sum(np.minimum(beyond / white, _OUTLIER))
-        return float(np.sum(near) + far)
+        rise = np.exp(values[1] + values[2] * logs)
+        total, by_log = _whittle(near, white * (1.0 + rise))
+        far, by_far = _whittle(beyond, np.full(len(beyond), white))
+        by_rise = by_log * rise / (1.0 + rise)
+        slopes = [by_log.sum() + by_far.sum(), by_rise.sum(), by_rise @ logs]
+        return total + far, np.array(slopes)
 
     # Far below the powers all of them are clipped, and the cost would fall without end.
     middle = math.log(level)
@@ -117,7 +120,7 @@ def _red(
         (-12.0, 8.0),
         (0.0 if ends < math.inf else 0.3, _STEEPEST),
     ]
-    found = minimize(cost, np.array([middle, 0.0, 1.0]), method="L-BFGS-B", bounds=bounds)
+    found = minimize(cost, np.array([middle, 0.0, 1.0]), jac=True, bounds=bounds)
     white, red, slope = found.x
     return Colour(math.exp(white), math.exp(red), float(slope), 0.0, ends), float(found.fun)
 
@@ -130,15 +133,15 @@ def _low_pass(
 
     cosine = np.cos(2.0 * math.pi * frequency * interval)
 
-    def cost(values: FloatArray) -> float:
+    def cost(values: FloatArray) -> tuple[float, FloatArray]:
         gain = 1.0 - 2.0 * values[1] * cosine + values[1] ** 2
-        logs = values[0] - np.log(gain)
-        ratio = power * gain * math.exp(-values[0])
-        return float(np.sum(logs + np.minimum(ratio, _OUTLIER)))
+        total, by_log = _whittle(power, math.exp(values[0]) / gain)
+        by_memory = by_log @ (2.0 * (cosine - values[1]) / gain)
+        return total, np.array([by_log.sum(), by_memory])
 
     middle = math.log(level)
     bounds = [(middle - 8.0, middle + 4.0), (-0.95, 0.95)]
-    found = minimize(cost, np.array([middle, 0.3]), method="L-BFGS-B", bounds=bounds)
+    found = minimize(cost, np.array([middle, 0.3]), jac=True, bounds=bounds)
     return Colour(math.exp(found.x[0]), memory=float(found.x[1])), float(found.fun)
 
 
