@@ -10,14 +10,14 @@ import numpy as np
 
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import detect, prepare
-from pendpipe.diagnose.naming import refit_leads
+from pendpipe.diagnose.naming import Rival, refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, settled
 from pendpipe.effects import Effect
 
-_DOUBT: Final = 12.0
+_DOUBT: Final = 14.0
 """By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
 
 
@@ -42,14 +42,23 @@ def doubt_redness(
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
-    own = state.now.chance.own.get(rivals[0].lead.effect.key, Trials(1.0, 0.0))
-    cost = _DOUBT + 2.0 * math.log(own.first) + 3.0 * (rivals[0].lead.effect.sizes - 1)
-    if _badness(extended, noise) + cost > _badness(state.fit, state.noise):
+    if _badness(extended, noise) + _cost(state, rivals[0]) > _badness(state.fit, state.noise):
         return
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
     state.fit, state.data, state.noise = fit, data, noise
     state.now = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
     state.first = state.now if not state.steps else state.first
+
+
+def _cost(state: State, rival: Rival) -> float:
+    """What must be gained: the doubt, the shapes tried, and how finely its size is told.
+
+    A size that is known to one part in gain^(1/2) was one among as many (Laplace).
+    """
+    assert state.now is not None
+    effect = rival.lead.effect
+    tried = state.now.chance.own.get(effect.key, Trials(1.0, 0.0)).first
+    return _DOUBT + 2.0 * math.log(tried) + effect.sizes * math.log(max(rival.gain, 1.0))
 
 
 def _badness(fit: Fit, noise: Noise) -> float:
