@@ -151,6 +151,18 @@ def test_a_driven_front_is_cut_and_a_steady_drive_refused() -> None:
         find_free_decay(recording([driven], noise=1e-3))
 
 
+def test_the_scatter_of_the_last_half_cycles_is_no_drive() -> None:
+    """250 cycles of high Q, 12.05 readings in each, so that the largest come and go: all stay."""
+    time = np.arange(3000) / 7.4
+    amplitude = 0.064 * np.exp(-8e-4 * time) / (1.0 + 0.05 * (1.0 - np.exp(-8e-4 * time)))
+    for seed in range(40):
+        noise = 4e-4 * np.random.default_rng(seed).standard_normal(len(time))
+        values = amplitude * np.cos(3.857 * time + 0.157 * seed) + noise
+        found = find_free_decay(Recording(time, values, "angle_rad"))
+        assert found.start_s < 3.3
+        assert "driven: the amplitude is held up" not in reasons(found)
+
+
 def test_a_beat_is_physics_and_stays() -> None:
     # Two modes that exchange energy: the amplitude is flat at first, and rises again.
     time = np.arange(int(80 * RATE)) / RATE

@@ -33,7 +33,7 @@ VALUES: dict[str, tuple[float, ...]] = {
     "plane-coupling": (1e-3, 5e-4, 0.02),
     "periodic-drive": (5e-4, 3e-4, 1.2),
     "frequency-drift": (1e-5,),
-    "damping-drift": (1e-2,),
+    "damping-drift": (1e-4, 25.0),
     "equilibrium-creep": (1e-3, 10.0, 0.5),
     "equilibrium-step": (1e-3, 21.03),
     "amplitude-step": (0.01, 21.03),

@@ -159,11 +159,19 @@ def test_the_release_transient_takes_its_share_and_is_gone() -> None:
 
 
 def test_damping_that_drifts_and_damping_that_jumps() -> None:
-    """The logarithm of y is -b (t + eps t^2/2), and -b (t + eps (t - t_k))."""
-    b = 0.01
-    drifting = evaluated("damping-drift", (0.01,), baseline(b=b), TIME)
-    logs = np.log(drifting.sampled.amplitude / 0.15)
-    np.testing.assert_allclose(logs, -b * (TIME + 0.005 * TIME**2), 0.0, 5e-3)
+    """The logarithm of y is -b t less the drift's integral, and -b (t + eps (t - t_k)).
+
+    The integral of rate tau (1 - e^(-t/tau)) is rate t^2/2 where tau is long.
+    """
+    b, rate = 0.01, 1e-4
+    straight = evaluated("damping-drift", (rate, 1e5), baseline(b=b), TIME)
+    logs = np.log(straight.sampled.amplitude / 0.15)
+    np.testing.assert_allclose(logs, -b * TIME - 0.5 * rate * TIME**2, 0.0, 5e-3)
+    tau = 20.0
+    relaxing = evaluated("damping-drift", (rate, tau), baseline(b=b), TIME)
+    logs = np.log(relaxing.sampled.amplitude / 0.15)
+    lost = rate * tau * (TIME + tau * np.expm1(-TIME / tau))
+    np.testing.assert_allclose(logs, -b * TIME - lost, 0.0, 5e-3)
     stepped = evaluated("damping-step", (1.5, 40.0), baseline(b=b), TIME)
     logs = np.log(stepped.sampled.amplitude / 0.15)
     late = np.maximum(TIME - 40.0, 0.0)

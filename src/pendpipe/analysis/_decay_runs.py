@@ -159,13 +159,13 @@ def _undriven(cycles: HalfCycles, run: Run) -> Run:
     # Medians of seven: a disturbed half cycle inside the run is no drive.
     padded = np.pad(swing, 3, mode="reflect", reflect_type="odd")
     smooth: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1)
-    expected = k * (smooth[k] - smooth[k + ahead]) / ahead
+    falls = smooth[k] - smooth[k + ahead]
+    expected = k * falls / ahead
     lost = smooth[0] - smooth[k]
-    gain = np.where(
-        (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * cycles.step)),
-        expected - lost,
-        0.0,
-    )
+    held = (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * cycles.step))
+    # Near the end a small scatter of few half cycles would stand for the loss of hundreds.
+    held &= falls > np.maximum(lost, 3.0 * cycles.step)
+    gain = np.where(held, expected - lost, 0.0)
     best = int(np.argmax(gain))
     if gain[best] <= 0:
         return run

@@ -131,6 +131,8 @@ class Chain:
 
     def codes(self, volts: FloatArray) -> IntArray:
         """Rounding, limits of the range, and codes that never come."""
+        if not np.all(np.isfinite(volts)):
+            raise ValueError("the motion has no reading at some time (a drive after the stop)")
         if self.clip_high_volts > 0.0 and self.soft_clip == 0.0:
             volts = np.minimum(volts, self.clip_high_volts)
         if self.clip_low_volts < 0.0 and self.soft_clip == 0.0:

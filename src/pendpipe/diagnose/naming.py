@@ -85,7 +85,27 @@ def refit_leads(
         for lead, fit in fits
     ]  # fmt: skip
     rivals.sort(key=lambda rival: -rival.evidence)
-    return _named_first(rivals) if gross else rivals
+    return _named_first(rivals) if gross else _names_before_curves(rivals)
+
+
+def _names_before_curves(rivals: list[Rival]) -> list[Rival]:
+    """Prefer a name to a curve that the record cannot tell from it: curves follow any law."""
+    best = rivals[0].evidence
+    near = [
+        rival for rival in rivals
+        if rival.lead.effect.kind != "unnamed" and best - rival.evidence < CLASS
+    ]  # fmt: skip
+    return [*near, *(rival for rival in rivals if rival not in near)]
+
+
+def of_one_class(best: Rival, rival: Rival) -> bool:
+    """Whether the record cannot tell two effects apart, or only what is known beforehand can.
+
+    A value that one has more takes 2 off its gain (Akaike).
+    """
+    more = max(best.lead.effect.count - rival.lead.effect.count, 0)
+    by_record = best.gain - rival.gain - _SHAPE * more < CLASS
+    return by_record or best.evidence - rival.evidence < CLASS
 
 
 def _named_first(rivals: list[Rival]) -> list[Rival]:

@@ -14,7 +14,7 @@ from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import locate
-from pendpipe.diagnose.naming import CLASS, Rival, probabilities
+from pendpipe.diagnose.naming import Rival, of_one_class, probabilities
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.search import Search
@@ -26,6 +26,8 @@ from pendpipe.effects.model import Model
 
 _NONE: Final = 4.0
 """Evidence (in chi^2) that it is none of the class's, where the model leaves nothing."""
+_SAME: Final = 0.02
+"""Part by which a gain may change in the end for its rivals not to be refitted."""
 
 
 def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
@@ -33,12 +35,12 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
     effect = step.winner.lead.effect
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
+    own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
     mates = [
         rival for rival in rivals
         if rival.lead.effect.kind != "unnamed" and rival.identifier != effect.identifier
-        and gain - rival.gain < CLASS
+        and of_one_class(own, rival)
     ]  # fmt: skip
-    own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
@@ -80,8 +82,9 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
     without = _refined(model, found, value, held) or step.before
-    alone = len(found.steps) == 1 and not is_gross(without, found.data)
-    if alone:
+    gain = without.chi2 - found.improved.chi2
+    same = abs(gain - step.winner.gain) < _SAME * gain
+    if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
     rivals = []
     for rival in step.rivals:

@@ -60,7 +60,7 @@ class Curve(Effect):
         """Identifier and flavour."""
         return f"{self.identifier}:{self.flavour}"
 
-    def bounds(self) -> list[tuple[float, float]]:
+    def bounds(self, duration_s: float = math.inf) -> list[tuple[float, float]]:
         """Any mixtures."""
         return [(-np.inf, np.inf)] * self.sizes
 

@@ -31,18 +31,30 @@ class FrequencyDrift(Effect):
 
 
 class DampingDrift(Effect):
-    """All losses of the baseline times (1 + eps t): bearing or fluid that warms."""
+    """A viscous damping that changes by rate tau (1 - e^(-t/tau)): what warms, or creeps.
+
+    It is straight where tau is long. Any loss changes so to first order, since
+    -dy/dt = a y^2 + b y + c has room for one that is linear in y.
+    """
 
     identifier = "damping-drift"
     name = "drifting damping"
     kind = "dynamics"
-    equation = r"F(x, \dot x) \to (1 + \epsilon t)\, F(x, \dot x)"
-    parameters = (Parameter("rate", "1/s", -10.0, 10.0),)
+    equation = r"\ddot x \mathrel{+}= -2 \dot\gamma\, \tau (1 - e^{-t/\tau})\, \dot x"
+    parameters = (
+        Parameter("rate", "1/s^2", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e5, 1e5),
+    )  # fmt: skip
     deciding = "release it again with the same amplitude: the damping must have moved on"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return eps t times the baseline's friction, t from the motion's start."""
-        return np.asarray(values[0] * since_start(motion) * pendulum.acceleration(motion))
+        """Return -2 gamma(t) v, t from the motion's start."""
+        rate, tau = values
+        gamma = -rate * tau * np.expm1(-since_start(motion) / tau)
+        return np.asarray(-2.0 * gamma * motion.velocity)
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """Straight, and over two fifths and a sixth of the record."""
+        return rows((1e5, 0.4 * span.duration_s, span.duration_s / 6.0))
 
 
 class EquilibriumCreep(Effect):

@@ -175,8 +175,8 @@ class Effect:
         """How many values describe it, a switch's size included."""
         return len(self.parameters) + (1 if self.switch else 0)
 
-    def bounds(self) -> list[tuple[float, float]]:
-        """Return lowest and highest values, a pair each."""
+    def bounds(self, duration_s: float = math.inf) -> list[tuple[float, float]]:
+        """Return lowest and highest values in a record of some length, a pair each."""
         limits = [(parameter.low, parameter.high) for parameter in self.parameters]
         return [(0.0, 1.0), *limits] if self.switch else limits
 

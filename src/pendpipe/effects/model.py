@@ -88,8 +88,9 @@ class Model:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest values."""
         low, high = list(LOW), list(HIGH)
+        duration = float(self.time_s[-1] - self.time_s[0])
         for effect in self.effects:
-            for lowest, highest in effect.bounds():
+            for lowest, highest in effect.bounds(duration):
                 low.append(lowest)
                 high.append(highest)
         return np.array(low), np.array(high)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -26,7 +27,14 @@ class ReleaseTransient(Effect):
         Parameter("tau", "s", 1e-2, 1e5),
     )
     local = True
+    lasts: ClassVar[float] = 0.12
+    """Part of the record within which it has to fade."""
     deciding = "leave the first swings out: the rest must agree without it"
+
+    def bounds(self, duration_s: float = math.inf) -> list[tuple[float, float]]:
+        """Release means the first swings: what takes longer is a drift of the damping."""
+        size, (shortest, longest) = super().bounds(duration_s)
+        return [size, (shortest, max(min(longest, self.lasts * duration_s), 10.0 * shortest))]
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 gamma e^(-t/tau) v."""
@@ -34,6 +42,6 @@ class ReleaseTransient(Effect):
         return np.asarray(-2.0 * values[0] * fading * motion.velocity)
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
-        """From two periods to a sixth of the record."""
+        """From two periods to an eighth of the record."""
         short = 2.0 * span.period_s
-        return rows(np.geomspace(short, max(span.duration_s / 6.0, 2.0 * short), 4))
+        return rows(np.geomspace(short, max(self.lasts * span.duration_s, 2.0 * short), 4))
