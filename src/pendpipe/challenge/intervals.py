@@ -35,12 +35,12 @@ def power_curve(sizes: FloatArray, found: FloatArray) -> tuple[float, float]:
         The sizes at which a half and nine tenths are found.
     """
     from scipy.optimize import minimize
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     root = np.sqrt(sizes)
 
     def cost(p: FloatArray) -> float:
-        chance = np.clip(norm.cdf((root - p[0]) / np.exp(p[1])), 1e-4, 1 - 1e-4)
+        chance = np.clip(ndtr((root - p[0]) / np.exp(p[1])), 1e-4, 1 - 1e-4)
         # A weak rein on the width, so that perfectly separated data have an answer.
         rein = 0.5 * (p[1] / 1.5) ** 2
         return float(rein - np.sum(np.where(found > 0, np.log(chance), np.log1p(-chance))))

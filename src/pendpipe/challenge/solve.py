@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.challenge import sealing
+from pendpipe.challenge.workers import ONE_THREAD
 from pendpipe.errors import InputError
 from pendpipe.files import read_json, write_json
 
@@ -82,7 +83,7 @@ def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) ->
         shutil.copyfile(folder / "recordings" / f"{name}.csv", room / "recording.csv")
         words = [*solver, "recording.csv", "--out", "answer", "--baseline", baseline]
         environment = {key: os.environ[key] for key in PASSED_ON if key in os.environ}
-        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        environment |= ONE_THREAD
         try:
             run = subprocess.run(
                 words, cwd=room, env=environment, capture_output=True, text=True,
