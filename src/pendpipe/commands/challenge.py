@@ -99,7 +99,7 @@ def _score(arguments: argparse.Namespace) -> int:
     scores = score(opened)
     write_json(arguments.out / "scores.json", scores)
     figures = draw(opened, scores, arguments.out / "figures")
-    text = page(opened, scores, figures, "proof")
+    text = page(scores, figures, "proof")
     target = arguments.page or arguments.out / "proof.md"
     with replaced(target) as stream:
         stream.write(text)
