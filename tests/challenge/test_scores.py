@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from scipy.stats import norm
 
 from pendpipe.challenge import intervals
+from pendpipe.challenge.cases import draw_cases
 from pendpipe.challenge.draw import draw
 from pendpipe.challenge.page import page
 from pendpipe.challenge.score import score
@@ -181,5 +183,27 @@ def test_six_cases_are_chosen_by_rule_and_all_figures_drawn(tmp_path: Path) -> N
     )
     cases = six_cases(read_items(content))
     assert [item.name for item in cases] == ["item-1", "item-3"]
-    for name in draw(content, score(content), tmp_path):
+    for name in draw(score(content), tmp_path):
         assert (tmp_path / name).read_text(encoding="utf-8").startswith("<?xml")
+
+
+DRAWER = """
+import json, sys
+import sys
+from pathlib import Path
+answer = Path(sys.argv[sys.argv.index("--out") + 1])
+answer.mkdir()
+(answer / "residual_map.svg").write_text("<svg/>")
+(answer / "diagnosis.json").write_text(json.dumps({"statement": Path(sys.argv[1]).read_text()}))
+"""
+
+
+def test_a_case_s_figure_says_whether_it_is_of_the_answer_that_was_scored(tmp_path: Path) -> None:
+    content = opened(*[(truth("single", name), answer(name)) for name in (K3, "impulse", "jitter")])
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "recordings" / "item-0.csv").write_text("It differs.")
+    (tmp_path / "recordings" / "item-1.csv").write_text("It differs now.")
+    cases = draw_cases(content, tmp_path, tmp_path / "to", solver=[sys.executable, "-c", DRAWER])
+    assert [case["same_answer"] for case in cases] == [True, False, None]
+    assert [case["figure"] for case in cases] == ["case-1.svg", "case-2.svg", None]
+    assert (tmp_path / "to" / "case-2.svg").read_text() == "<svg/>"

@@ -27,11 +27,13 @@ def scored(tmp_path: Path) -> Path:
         "promises": [{"promise": f"promise {n}", "measured": f"{n} %", "kept": kept}
                      for n, kept in enumerate([True, False, None])],
         "families": {"null": 204, "single": 198}, "unsolved": [], "missed": [row],
-        "six_cases": [{**row, "item": "item-0007", "law": "<b>"}],
+        "six_cases": [{**row, "item": "item-0007", "law": "<b>", "figure": "case-1.svg",
+                       "same_answer": True}],
     }  # fmt: skip
     (tmp_path / "scores.json").write_text(json.dumps(scores))
     (tmp_path / "figures").mkdir()
-    (tmp_path / "figures" / "power.svg").write_text(SVG)
+    for name in ("power", "case-1"):
+        (tmp_path / "figures" / f"{name}.svg").write_text(SVG)
     return tmp_path
 
 
@@ -47,7 +49,7 @@ def test_a_scored_set_is_told_with_hashes_and_misses(example: Any, scored: Path)
                  "item-0003: jitter (gaussian), Δχ² = 51; the oracle detected it",
                  "&lt;b&gt;", "kept", "not kept", "not judged"):  # fmt: skip
         assert word in section
-    assert section.count("<svg") == 1
+    assert section.count("<svg") == 2
     assert '<a href="#proof">' in text
 
 
@@ -62,4 +64,7 @@ def test_a_figure_beyond_the_budget_is_left_out(scored: Path) -> None:
     assert whole is not None
     assert poor is not None
     assert [type(figure.svg) for figure in whole.figures] == [Markup]
+    assert [type(svg) for svg in whole.cases] == [Markup]
+    assert whole.bytes > 100
     assert poor.figures == []
+    assert poor.cases == [None]

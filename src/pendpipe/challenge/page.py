@@ -20,7 +20,7 @@ def page(scores: Score, figures: list[str], folder: str) -> str:
         Names of the drawn figures, and where they lie beside the page.
     """
     parts = [_head(scores), _promises(scores), _rules(), _detection(scores), _naming(scores)]
-    parts += [_families(scores), _rest(scores), _missed(scores), _cases(scores)]
+    parts += [_families(scores), _rest(scores), _missed(scores), _cases(scores, folder)]
     lines = [line for part in parts for line in part]
     lines += ["## Figures", ""]
     lines += [f"![{name.removesuffix('.svg')}]({folder}/{name})" for name in figures]
@@ -216,13 +216,21 @@ def _missed(scores: Score) -> Iterator[str]:
     yield ""
 
 
-def _cases(scores: Score) -> Iterator[str]:
+def _cases(scores: Score, folder: str) -> Iterator[str]:
     yield "## Six cases"
     yield ""
-    yield "By rule: of each of six kinds of effect, the first single in the set above Δχ² = 70."
+    yield "By rule: of each of six kinds of effect, the first single in the set above Δχ² = 70. The"
+    yield "figure is what the same command draws: data minus model against time and phase of the"
+    yield "cycle, in standard errors of a cell, before and after."
     yield ""
     for row in scores["six_cases"]:
         yield f"**{row['item']}**, hidden: {row['hidden']} ({row['law']},"
         yield f"Δχ² = {row['delta_chi2']:.0f}), answer: {row['answer'] or 'nothing'}."
         yield row["statement"]
         yield ""
+        if row.get("figure"):
+            yield f"![residual before and after]({folder}/{row['figure']})"
+            yield ""
+            if not row["same_answer"]:
+                yield "(The program was changed since: this figure is of another answer.)"
+                yield ""

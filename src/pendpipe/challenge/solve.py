@@ -12,8 +12,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,9 +79,33 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) -> None:
     """One recording: copied into an empty folder, solved there, the answer taken home."""
+    with alone(folder / "recordings" / f"{name}.csv", baseline, solver) as (status, said, answer):
+        found, diagnosis = answer / "diagnosis.json", None
+        if found.exists():
+            try:
+                diagnosis = json.loads(found.read_text(encoding="utf-8"))
+            except ValueError as fault:
+                said = f"diagnosis.json is no JSON: {fault}"
+    write_json(
+        answer_path(folder, name),
+        {"item": name, "status": status, "stderr": said if status else "", "diagnosis": diagnosis,
+         "solved_at": sealing.now()},
+    )  # fmt: skip
+
+
+@contextmanager
+def alone(recording: Path, baseline: str, solver: Sequence[str]) -> Iterator[tuple[int, str, Path]]:
+    """Run the solver in an empty folder with a copy of one recording.
+
+    Yields
+    ------
+    tuple
+        Its exit status (-1: it ran out of its time), what it said on stderr, and the folder
+        of its answer, which is gone afterwards.
+    """
     with tempfile.TemporaryDirectory(prefix="pendulum-") as place:
         room = Path(place)
-        shutil.copyfile(folder / "recordings" / f"{name}.csv", room / "recording.csv")
+        shutil.copyfile(recording, room / "recording.csv")
         words = [*solver, "recording.csv", "--out", "answer", "--baseline", baseline]
         environment = {key: os.environ[key] for key in PASSED_ON if key in os.environ}
         environment |= ONE_THREAD
@@ -92,18 +117,7 @@ def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) ->
             status, said = run.returncode, run.stderr.strip()[-2000:]
         except subprocess.TimeoutExpired:
             status, said = -1, f"no answer within {PATIENCE_S:g} s"
-        found = room / "answer" / "diagnosis.json"
-        diagnosis = None
-        if found.exists():
-            try:
-                diagnosis = json.loads(found.read_text(encoding="utf-8"))
-            except ValueError as fault:
-                said = f"diagnosis.json is no JSON: {fault}"
-    write_json(
-        answer_path(folder, name),
-        {"item": name, "status": status, "stderr": said if status else "", "diagnosis": diagnosis,
-         "solved_at": sealing.now()},
-    )  # fmt: skip
+        yield status, said, room / "answer"
 
 
 def _hash_answers(folder: Path, names: list[str]) -> None:

@@ -117,10 +117,5 @@ PROOF_CAPTIONS: Final = {
         "How often the first name was right, against the probability that the answer stated.",
         "On the grey line probabilities mean what they say; below it the answers boast.",
     ),
-    "cases": Caption(
-        "Before and after",
-        "Residuals of six cases, chosen by rule: without and with what was named.",
-        "After, the residual should look like noise.",
-    ),
 }
 """Words for the figures of a scored challenge."""

@@ -62,7 +62,7 @@ def render(
     decays, outside = _decays(folder, table.lines, spent=sum(map(len, drawn.values())))
     spent = sum(map(len, [*drawn.values(), *decays.values()]))
     proven = proof(challenge, spent=spent, budget=BUDGET_BYTES - _RESERVE_BYTES)
-    spent += sum(len(figure.svg) for figure in proven.figures) if proven else 0
+    spent += proven.bytes if proven else 0
     asked = configuration.get("diagnose") or {}
     diagnosed = _diagnoses(asked, folder, entries, spent)
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()

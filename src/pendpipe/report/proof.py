@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 from markupsafe import Markup
 
 from pendpipe.files import read_json
-from pendpipe.report.captions import PROOF_CAPTIONS, Caption
+from pendpipe.report.captions import CAPTIONS, PROOF_CAPTIONS, Caption
 from pendpipe.report.health import Health
 from pendpipe.report.vector import inline_svg
 
@@ -33,6 +33,13 @@ class Proof(NamedTuple):
     scores: dict[str, Any]
     promises: list[tuple[str, str, Health]]
     figures: list[Drawn]
+    cases: list[Markup | None]
+
+    @property
+    def bytes(self) -> int:
+        """What its figures take of the page."""
+        drawings = [*(figure.svg for figure in self.figures), *filter(None, self.cases)]
+        return sum(len(svg.encode()) for svg in drawings)
 
 
 def proof(folder: Path | None, *, spent: int, budget: int) -> Proof | None:
@@ -50,14 +57,27 @@ def proof(folder: Path | None, *, spent: int, budget: int) -> Proof | None:
         return None
     scores = read_json(folder / "scores.json")
     promises = [(row["promise"], row["measured"], KEPT[row["kept"]]) for row in scores["promises"]]
-    figures = []
-    for name, caption in PROOF_CAPTIONS.items():
+    left = budget - spent
+
+    def drawn(name: str, title: str, shows: str) -> Markup | None:
+        nonlocal left
         path = folder / "figures" / f"{name}.svg"
         if not path.is_file():
-            continue
-        text = path.read_text(encoding="utf-8")
-        svg = inline_svg(text, f"proof-{name}", caption.title, caption.shows)
-        spent += len(svg.encode())
-        if spent < budget:
-            figures.append(Drawn(svg, caption))
-    return Proof(scores, promises, figures)
+            return None
+        svg = inline_svg(path.read_text(encoding="utf-8"), f"proof-{name}", title, shows)
+        left -= len(svg.encode())
+        return svg if left > 0 else None
+
+    figures = [
+        Drawn(svg, caption)
+        for name, caption in PROOF_CAPTIONS.items()
+        if (svg := drawn(name, caption.title, caption.shows)) is not None
+    ]
+    words = CAPTIONS["residual_map"]
+    cases = [
+        drawn(str(row["figure"]).removesuffix(".svg"), f"{words.title}: {row['item']}", words.shows)
+        if row.get("figure") and row["same_answer"]
+        else None
+        for row in scores["six_cases"]
+    ]
+    return Proof(scores, promises, figures, cases)
