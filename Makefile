@@ -1,10 +1,12 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test report bench evidence check clean
+.PHONY: campaign test report bench evidence proof check clean
 
 PYTHON ?= python3
 CORES ?= 2
+SET ?= proof
+ITEMS ?= 600
 BIN := .venv/bin
 RUN := PATH="$(CURDIR)/$(BIN):$$PATH" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -25,6 +27,12 @@ evidence: .venv/installed
 	$(RUN) python -m benchmarks.acquisition
 	$(RUN) python -m benchmarks.evidence
 	$(RUN) python -m benchmarks.diagnosis
+
+# Conceal, solve, open, score, and write docs/proof.md; goes on where it was interrupted.
+# A set is made once: SET=another makes another, with a seed of its own.
+proof: .venv/installed
+	$(RUN) PENDPIPE_CHALLENGE_SET=$(SET) PENDPIPE_CHALLENGE_ITEMS=$(ITEMS) \
+		PENDPIPE_CHALLENGE_PAGE=docs/proof.md snakemake --cores $(CORES) challenge
 
 # What CI asks besides the tests.
 check: .venv/installed

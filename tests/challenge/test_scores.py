@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,11 @@ import pytest
 from scipy.stats import norm
 
 from pendpipe.challenge import intervals
-from pendpipe.challenge.draw import draw, six_cases
+from pendpipe.challenge.cases import draw_cases
+from pendpipe.challenge.draw import draw
 from pendpipe.challenge.page import page
 from pendpipe.challenge.score import score
-from pendpipe.challenge.solved import read_items
+from pendpipe.challenge.solved import read_items, six_cases
 
 
 def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:
@@ -98,7 +100,7 @@ def test_names_are_judged_first_among_three_and_in_class() -> None:
     assert found["class"]["of"] == 3
     assert found["class_size"] == pytest.approx(4 / 3)
     assert found["oracle_class_size"] == 2
-    assert found["share_of_the_oracle"] == pytest.approx(0.5)
+    assert found["share_of_the_oracle"]["ratio"] == pytest.approx(0.5)
 
 
 def test_outside_the_catalogue_a_confident_name_is_wrong() -> None:
@@ -129,7 +131,7 @@ def test_a_tie_is_credited_for_its_class_only() -> None:
 
 def test_pulls_compare_estimates_with_the_truth() -> None:
     found = score(opened(*[(truth("single", K3), answer(K3))] * 2))["pulls"]
-    assert found["mean"] == pytest.approx(1.0)
+    assert found["mean"]["value"] == pytest.approx(1.0)
     assert found["coverage95"]["hits"] == 2
 
 
@@ -164,7 +166,7 @@ def test_the_page_says_yes_and_no() -> None:
         *[(truth("null"), answer())] * 3, (truth("single", K3), answer(K3)),
         (truth("single", K3, 60.0), answer()), (truth("outside", "unnamed-damping"), answer(K3)),
     )  # fmt: skip
-    text = page(content, score(content), ["power.svg"], "proof")
+    text = page(score(content), ["power.svg"], "proof")
     assert "**no**" in text
     assert "| yes |" in text
     assert "item-4 | cubic-stiffness" in text
@@ -181,5 +183,27 @@ def test_six_cases_are_chosen_by_rule_and_all_figures_drawn(tmp_path: Path) -> N
     )
     cases = six_cases(read_items(content))
     assert [item.name for item in cases] == ["item-1", "item-3"]
-    for name in draw(content, score(content), tmp_path):
+    for name in draw(score(content), tmp_path):
         assert (tmp_path / name).read_text(encoding="utf-8").startswith("<?xml")
+
+
+DRAWER = """
+import json, sys
+import sys
+from pathlib import Path
+answer = Path(sys.argv[sys.argv.index("--out") + 1])
+answer.mkdir()
+(answer / "residual_map.svg").write_text("<svg/>")
+(answer / "diagnosis.json").write_text(json.dumps({"statement": Path(sys.argv[1]).read_text()}))
+"""
+
+
+def test_a_case_s_figure_says_whether_it_is_of_the_answer_that_was_scored(tmp_path: Path) -> None:
+    content = opened(*[(truth("single", name), answer(name)) for name in (K3, "impulse", "jitter")])
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "recordings" / "item-0.csv").write_text("It differs.")
+    (tmp_path / "recordings" / "item-1.csv").write_text("It differs now.")
+    cases = draw_cases(content, tmp_path, tmp_path / "to", solver=[sys.executable, "-c", DRAWER])
+    assert [case["same_answer"] for case in cases] == [True, False, None]
+    assert [case["figure"] for case in cases] == ["case-1.svg", "case-2.svg", None]
+    assert (tmp_path / "to" / "case-2.svg").read_text() == "<svg/>"

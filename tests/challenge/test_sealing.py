@@ -19,6 +19,8 @@ from pendpipe.challenge.solve import answer_path, solve_set
 from pendpipe.commands import challenge as command
 from pendpipe.errors import InputError
 
+ENTER = sealing.enter
+
 STUB = """
 import json, os, pathlib, sys
 from pathlib import Path
@@ -66,7 +68,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Places:
     patch = pytest.MonkeyPatch()
     patch.setattr(make, "make_item", lambda recipe, random: make_null(random))
     patch.setattr(make, "plan", lambda count, random, real: [{"family": "null"}] * count)
-    patch.setattr(make, "ProcessPoolExecutor", Alone)
+    patch.setattr(make, "processes", Alone)
     make_set(places, 3, seed=7)
     patch.undo()
     stub = root / "elsewhere" / "solver.py"
@@ -168,6 +170,31 @@ def test_the_ledger_holds_every_item_and_no_line_can_go(solved: Places, tmp_path
     copy.write_text("".join([lines[0], lines[2]]))
     with pytest.raises(InputError, match="chain of hashes"):
         sealing.check_ledger(copy)
+
+
+def interrupted(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path) -> None:
+    places = Places(tmp_path / "set", tmp_path / "truth")
+    ledger = tmp_path / "ledger.jsonl"
+    recipes = [{"family": "null"}] * 3
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(make, "make_item", lambda recipe, random: make_null(random))
+        patch.setattr(make, "plan", lambda count, random, real: recipes[:count])
+        patch.setattr(make, "processes", Alone)
+        # As if it had stopped between two items: made, and not entered.
+        patch.setattr(sealing, "enter", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            make_set(places, 3, seed=7)
+        made = places.recording("item-0001").read_bytes()
+        patch.setattr(sealing, "enter", ENTER)
+        make_set(places, 3, seed=7)
+    assert places.recording("item-0001").read_bytes() == made
+    assert sealing.check_ledger(ledger) == 3
+    assert sealing.entered(ledger, "set") == {"item-0001", "item-0002", "item-0003"}
+    assert sealing.entered(ledger, "another") == set()
 
 
 def test_the_same_seed_makes_the_same_recording() -> None:

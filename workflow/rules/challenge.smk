@@ -8,7 +8,9 @@ with open("config/challenge.yaml", encoding="utf-8") as stream:
     CHALLENGE = yaml.safe_load(stream)
 CHALLENGE_SET = os.environ.get("PENDPIPE_CHALLENGE_SET", CHALLENGE["set"])
 CHALLENGE_ITEMS = os.environ.get("PENDPIPE_CHALLENGE_ITEMS", CHALLENGE["items"])
-# The solver's folder and the sealed truth lie apart.
+CHALLENGE_PAGE = os.environ.get("PENDPIPE_CHALLENGE_PAGE", CHALLENGE["page"])
+# The solver's folder and the sealed truth lie apart. Seals and answers are protected: no
+# changed option makes Snakemake make or solve a set anew.
 OPEN = f"results/challenge/{CHALLENGE_SET}"
 SEALED = f"results/challenge-sealed/{CHALLENGE_SET}"
 
@@ -20,7 +22,7 @@ rule challenge:
 
 rule challenge_make:
     output:
-        f"{OPEN}/manifest.json",
+        protected(f"{OPEN}/manifest.json"),
     log:
         f"{OPEN}/logs/make.log",
     conda:
@@ -43,7 +45,7 @@ rule challenge_solve:
     input:
         f"{OPEN}/manifest.json",
     output:
-        f"{OPEN}/answers.json",
+        protected(f"{OPEN}/answers.json"),
     log:
         f"{OPEN}/logs/solve.log",
     conda:
@@ -87,7 +89,7 @@ rule challenge_score:
     params:
         folder=subpath(input[0], parent=True),
         out=subpath(output[0], parent=True),
-        page=option("page", CHALLENGE["page"]),
+        page=option("page", CHALLENGE_PAGE),
     message:
         "score the set"
     shell:

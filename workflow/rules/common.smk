@@ -1,5 +1,6 @@
 # What the rules share: the checked configuration, and names. No rule, no physics.
 import re
+from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
@@ -74,3 +75,9 @@ def figure_files():
 def option(name, value):
     """An option of the command line, or nothing."""
     return "" if value is None else f"--{name} {value}"
+
+
+def proof_option(wildcards):
+    """For the report: a scored challenge, if there is one; it depends on none."""
+    scores = Path(OPEN, "scores")
+    return option("proof", scores if (scores / "scores.json").exists() else None)

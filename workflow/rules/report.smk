@@ -18,8 +18,9 @@ rule report:
         configuration=CONFIGURATION,
     params:
         code=code_version("pendpipe.commands.report"),
+        proof=proof_option,
     message:
         "the page about the campaign"
     shell:
         "pendpipe report --campaign {resources.configuration} --comparison {input.comparison}"
-        " --summary {input.campaign} --out {output} 2> {log}"
+        " --summary {input.campaign} {params.proof} --out {output} 2> {log}"

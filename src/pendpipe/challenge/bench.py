@@ -146,9 +146,25 @@ class Bench:
         return np.asarray(0.5 * (_state(up) - _state(down)))
 
     @cached_property
+    def jacobian(self) -> FloatArray:
+        """Whitened sensitivities at the truth, a column a parameter."""
+        return self.whiten(self.tangent(self.truth))
+
+    @cached_property
     def basis(self) -> FloatArray:
         """Orthonormal basis of the whitened tangent space at the truth."""
-        return orthonormal(self.whiten(self.tangent(self.truth)))
+        return orthonormal(self.jacobian)
+
+    @cached_property
+    def true_reading(self) -> FloatArray:
+        """The baseline's reading at the truth, whole record."""
+        return np.asarray(self.gain * self.track.angle_rad + self.truth.level_rad)
+
+    def _linear(self, point: Point, more: Mapping[str, float] | None) -> FloatArray:
+        """Whitened sensitivities at a point; those at the truth are kept."""
+        if point is self.truth and not more:
+            return self.jacobian
+        return self.whiten(self.tangent(point, more))
 
     def off(self, columns: FloatArray) -> FloatArray:
         """Take the tangent space at the truth out of whitened columns."""
@@ -156,7 +172,7 @@ class Bench:
 
     def residual(self, reading: FloatArray) -> FloatArray:
         """Whitened difference of a whole record's reading and the truth's, kept part."""
-        return self.whiten((reading - self.reading(self.truth))[self.kept])
+        return self.whiten((reading - self.true_reading)[self.kept])
 
     def refit(
         self,
@@ -199,7 +215,7 @@ class Bench:
         sizes = self.sizes | {"offset": self.scenario.sd_rad} | dict(more or {})
         names = (*self.names, *(more or ()))
         units = [sizes[name] for name in names]
-        jacobian, fresh = self.whiten(self.tangent(point, more)), True
+        jacobian, fresh = self._linear(point, more), True
         for _ in range(rounds):
             if not (np.isfinite(best) and np.isfinite(jacobian).all()):
                 return point, residual, float("nan")
@@ -224,12 +240,12 @@ class Bench:
             if gained < 1e-3 * best + 1e-3:
                 if fresh:
                     break
-                jacobian, fresh = self.whiten(self.tangent(point, more)), True
+                jacobian, fresh = self._linear(point, more), True
                 continue
             fresh = False
             if share < 1.0 or gained > 0.3 * (best + gained):
                 # Far from straight: the old sensitivities no longer lead down.
-                jacobian, fresh = self.whiten(self.tangent(point, more)), True
+                jacobian, fresh = self._linear(point, more), True
         return point, residual, best
 
 

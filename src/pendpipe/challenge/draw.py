@@ -3,49 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.challenge.solved import Solved, read_items
+from pendpipe.challenge.solved import GROUPS
 
-GROUPS = {
-    "restoring torque": ("circular-error", "cubic-stiffness", "quadratic-stiffness", "backlash"),
-    "losses": (
-        "drag-form", "power-law-damping", "cubic-damping", "stribeck-friction",
-        "presliding-friction", "coulomb-friction", "quadratic-drag", "history-force",
-        "vortex-shedding", "release-transient",
-    ),
-    "changes in time": (
-        "frequency-drift", "damping-drift", "equilibrium-creep", "equilibrium-step",
-        "amplitude-step", "frequency-step", "damping-step", "impulse",
-    ),
-    "drive and other modes": ("second-mode", "plane-coupling", "periodic-drive",
-                              "broadband-drive"),
-    "sensor": ("sensor-quadratic", "sensor-cubic", "sensor-backlash", "offset-drift",
-               "gain-drift", "ac-coupling", "tone-pickup"),
-    "clock and converter": ("clock-drift", "jitter", "dropped-samples", "glitches", "clipping",
-                            "missing-codes", "coarse-quantisation"),
-}  # fmt: skip
-"""Six kinds of effect; a case of each is shown."""
+BLUE, GREEN, GREY = "#0072B2", "#007A5A", "#5F6670"
 
 
-def six_cases(items: list[Solved]) -> list[Solved]:
-    """The rule: of each of six kinds, the first single in the set's order above 70."""
-    found = []
-    for effects in GROUPS.values():
-        for item in items:
-            if (
-                item.truth["family"] == "single"
-                and item.effect["effect"] in effects
-                and item.size > 70.0
-            ):
-                found.append(item)
-                break
-    return found
-
-
-def draw(opened: dict[str, Any], scores: dict[str, Any], folder: Path) -> list[str]:
+def draw(scores: dict[str, Any], folder: Path) -> list[str]:
     """Draw all figures as SVG and return their names."""
     import matplotlib as mpl
 
@@ -53,20 +20,11 @@ def draw(opened: dict[str, Any], scores: dict[str, Any], folder: Path) -> list[s
     import matplotlib.pyplot as plt
 
     folder.mkdir(parents=True, exist_ok=True)
-    items = read_items(opened)
     drawn = []
     with mpl.rc_context({"svg.hashsalt": "pendpipe", "font.size": 9}):
-        for name in ("power", "confusion", "reliability", "cases"):
-            wide = name == "confusion"
-            figure, axes = plt.subplots(figsize=(9, 8) if wide else (6, 4), layout="constrained")
-            if name == "power":
-                _power(axes, scores)
-            elif name == "confusion":
-                _confusion(axes, scores)
-            elif name == "reliability":
-                _reliability(axes, scores)
-            else:
-                _cases(axes, items)
+        for name, (draws, size) in FIGURES.items():
+            figure, axes = plt.subplots(figsize=size, layout="constrained")
+            draws(axes, scores)
             figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
             plt.close(figure)
             drawn.append(f"{name}.svg")
@@ -75,33 +33,48 @@ def draw(opened: dict[str, Any], scores: dict[str, Any], folder: Path) -> list[s
 
 def _power(axes: Any, scores: dict[str, Any]) -> None:
     levels = scores["detection"]["levels"]
-    size = [max(level["delta_chi2"], 1.0) for level in levels]
-    for key, label, style in (
-        ("solver", "pendpipe diagnose", "o-"),
-        ("oracle", "oracle, largest score", "s--"),
-        ("oracle_by_effect", "oracle, effect by effect", "^:"),
+    size = np.array([max(level["delta_chi2"], 1.0) for level in levels])
+    # Side by side, so that no interval hides another.
+    for key, label, style, colour, beside in (
+        ("solver", "pendpipe diagnose", "o-", BLUE, 1.0),
+        ("oracle", "oracle, largest score", "s--", GREY, 0.96),
+        ("oracle_by_effect", "oracle, effect by effect", "^:", GREEN, 1.04),
     ):
         rate = np.array([level[key]["rate"] for level in levels])
-        low, high = np.array([level[key]["interval95"] for level in levels]).T
-        axes.errorbar(size, rate, [rate - low, high - rate], fmt=style, label=label, capsize=2)
+        low, high = np.array([level[key]["interval95"] for level in levels]).reshape(-1, 2).T
+        axes.errorbar(
+            size * beside, rate, [rate - low, high - rate], fmt=style, label=label, capsize=2,
+            color=colour, markersize=5, elinewidth=0.8,
+        )  # fmt: skip
     axes.set_xscale("log")
     axes.set_xlabel("oracle's Δχ² of the hidden effect")
     axes.set_ylabel("share detected (1 % level)")
     axes.set_ylim(-0.03, 1.03)
-    axes.legend()
+    axes.legend(loc="lower right", frameon=False)
 
 
 def _confusion(axes: Any, scores: dict[str, Any]) -> None:
+    """Shares by colour and counts in figures; the same order on both sides."""
     table = scores["confusion"]
-    rows = sorted(table)
-    columns = sorted({name for row in table.values() for name in row})
-    grid = np.array([[table[r].get(c, 0) for c in columns] for r in rows], dtype=float)
-    share = grid / np.maximum(grid.sum(axis=1, keepdims=True), 1.0) if rows else np.zeros((1, 1))
-    axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-    axes.set_xticks(range(len(columns)), columns, rotation=90)
+    order = [name for effects in GROUPS.values() for name in effects]
+    named = {name for row in table.values() for name in row}
+    names = [name for name in order if name in table or name in named]
+    names += sorted((named | set(table)) - set(order))
+    rows = [name for name in names if name in table]
+    grid = np.array([[table[r].get(c, 0) for c in names] for r in rows], dtype=float)
+    grid = grid.reshape(len(rows), len(names))
+    share = grid / np.maximum(grid.sum(axis=1, keepdims=True), 1.0)
+    if rows:
+        axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for row, column in np.argwhere(grid > 0):
+        axes.text(
+            column, row, f"{grid[row, column]:.0f}", ha="center", va="center", fontsize=7,
+            color="white" if share[row, column] > 0.5 else "black",
+        )  # fmt: skip
+    axes.set_xticks(range(len(names)), names, rotation=90)
     axes.set_yticks(range(len(rows)), rows)
     axes.set_xlabel("first name in the answer")
-    axes.set_ylabel("what was hidden")
+    axes.set_ylabel("what was hidden (single effects and ties that were detected)")
 
 
 def _reliability(axes: Any, scores: dict[str, Any]) -> None:
@@ -111,25 +84,20 @@ def _reliability(axes: Any, scores: dict[str, Any]) -> None:
         stated = np.array([row["stated"] for row in bins])
         met = np.array([row["met"] for row in bins])
         low, high = np.array([row["interval95"] for row in bins]).T
-        axes.errorbar(stated, met, [met - low, high - met], fmt="o", capsize=2)
-    axes.set_xlabel("stated probability of the first name")
+        axes.errorbar(stated, met, [met - low, high - met], fmt="o", capsize=2, color=BLUE)
+        for row in bins:
+            axes.annotate(
+                str(row["of"]), (row["stated"], row["met"]), (6, -3), color=GREY, fontsize=8,
+                textcoords="offset points",
+            )  # fmt: skip
+    axes.set_xlim(-0.02, 1.06)
+    axes.set_xlabel("stated probability of the first name (beside each point: answers)")
     axes.set_ylabel("share that is right")
 
 
-def _cases(axes: Any, items: list[Solved]) -> None:
-    cases = six_cases(items)
-    for row, item in enumerate(cases):
-        content = item.answer.content
-        before = (content.get("baseline") or {}).get("residual_rms_rad")
-        after = (content.get("improved") or {}).get("residual_rms_rad")
-        noise = content.get("noise_rms_rad")
-        if before and noise:
-            axes.plot(before / noise, row, "o", color="C3", label="before" if row == 0 else None)
-        if after and noise:
-            axes.plot(after / noise, row, "o", color="C0", label="after" if row == 0 else None)
-    labels = [f"{i.effect['effect']} → {i.answer.lead or 'nothing'}" for i in cases]
-    axes.set_yticks(range(len(cases)), labels)
-    axes.axvline(1.0, color="0.7")
-    axes.set_xscale("log")
-    axes.set_xlabel("rms residual over noise")
-    axes.legend()
+FIGURES: Final = {
+    "power": (_power, (6.0, 4.0)),
+    "confusion": (_confusion, (9.0, 8.0)),
+    "reliability": (_reliability, (6.0, 4.0)),
+}
+"""Each figure with what draws it and its size, inches."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 
 
 def rate(hits: int, count: int) -> dict[str, Any]:
@@ -26,6 +26,66 @@ def of(truths: Sequence[bool]) -> dict[str, Any]:
     return rate(int(sum(truths)), len(truths))
 
 
+def ratio(
+    above: Sequence[float], below: Sequence[float], *, paired: bool = False, draws: int = 500
+) -> dict[str, Any]:
+    """The ratio of two means with its 95 % interval, items drawn anew.
+
+    Parameters
+    ----------
+    above, below
+        A number for each item.
+    paired
+        Whether they are of the same items, which are then drawn together.
+    draws
+        Bootstrap samples.
+    """
+    own, best = np.asarray(above, np.float64), np.asarray(below, np.float64)
+    if not len(own) or not len(best) or best.mean() == 0.0:
+        return {"ratio": None, "interval95": [None, None]}
+    random = np.random.default_rng(1)
+    first = random.integers(0, len(own), (draws, len(own)))
+    second = first if paired else random.integers(0, len(best), (draws, len(best)))
+    bottom = best[second].mean(axis=1)
+    drawn = own[first].mean(axis=1)[bottom > 0.0] / bottom[bottom > 0.0]
+    return {"ratio": float(own.mean() / best.mean()), "interval95": _middle(drawn)}
+
+
+def median(values: Sequence[float], *, draws: int = 500) -> dict[str, Any]:
+    """The median with its 95 % interval, items drawn anew."""
+    return _drawn_anew(values, np.median, draws)
+
+
+def mean(values: Sequence[float], *, draws: int = 500) -> dict[str, Any]:
+    """The mean with its 95 % interval, items drawn anew."""
+    return _drawn_anew(values, np.mean, draws)
+
+
+def spread(values: Sequence[float], *, draws: int = 500) -> dict[str, Any]:
+    """The standard deviation with its 95 % interval, items drawn anew."""
+    return _drawn_anew(values, np.std, draws, ddof=1)
+
+
+def _drawn_anew(
+    values: Sequence[float], what: Callable[..., Any], draws: int, **options: Any
+) -> dict[str, Any]:
+    known = np.asarray(values, np.float64)
+    if len(known) < 2:
+        return {"value": None, "interval95": [None, None], "of": len(known)}
+    pick = np.random.default_rng(1).integers(0, len(known), (draws, len(known)))
+    drawn = what(known[pick], axis=1, **options)
+    return {
+        "value": float(what(known, **options)),
+        "interval95": _middle(drawn),
+        "of": len(known),
+    }
+
+
+def _middle(drawn: FloatArray) -> list[float]:
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return [float(low), float(high)]
+
+
 def power_curve(sizes: FloatArray, found: FloatArray) -> tuple[float, float]:
     """Fit P(found) = Phi((sqrt(size) - m)/s) by maximum likelihood.
 
@@ -35,12 +95,12 @@ def power_curve(sizes: FloatArray, found: FloatArray) -> tuple[float, float]:
         The sizes at which a half and nine tenths are found.
     """
     from scipy.optimize import minimize
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     root = np.sqrt(sizes)
 
     def cost(p: FloatArray) -> float:
-        chance = np.clip(norm.cdf((root - p[0]) / np.exp(p[1])), 1e-4, 1 - 1e-4)
+        chance = np.clip(ndtr((root - p[0]) / np.exp(p[1])), 1e-4, 1 - 1e-4)
         # A weak rein on the width, so that perfectly separated data have an answer.
         rein = 0.5 * (p[1] / 1.5) ** 2
         return float(rein - np.sum(np.where(found > 0, np.log(chance), np.log1p(-chance))))
@@ -72,15 +132,39 @@ def power_ratio(
     }  # fmt: skip
 
 
-def calibration(probability: FloatArray, correct: FloatArray, bins: int = 10) -> dict[str, Any]:
-    """Reliability of stated probabilities and their expected calibration error."""
+def calibration(
+    probability: FloatArray, correct: FloatArray, bins: int = 10, draws: int = 500
+) -> dict[str, Any]:
+    """Reliability of stated probabilities and their expected calibration error.
+
+    ``by_chance`` is the error that perfect probabilities would show on as many items: few
+    items scatter about what was stated, and every scatter counts.
+    """
+    random = np.random.default_rng(1)
     edges = np.linspace(0.0, 1.0, bins + 1)
     place = np.clip(np.digitize(probability, edges) - 1, 0, bins - 1)
-    rows, error = [], 0.0
-    for number in range(bins):
+    rows = []
+    for number in np.unique(place):
         here = place == number
-        if here.any():
-            stated, met = float(probability[here].mean()), float(correct[here].mean())
-            error += here.mean() * abs(stated - met)
-            rows.append({"stated": stated, "met": met, **of(correct[here] > 0)})
-    return {"expected_calibration_error": float(error), "bins": rows, "items": len(probability)}
+        stated, met = float(probability[here].mean()), float(correct[here].mean())
+        rows.append({"stated": stated, "met": met, **of((correct[here] > 0).tolist())})
+    count = len(probability)
+    again = [random.integers(0, count, count) for _ in range(draws)] if count else []
+    errors = [_error(probability[pick], correct[pick], place[pick], bins) for pick in again]
+    perfect = [
+        _error(probability, (random.random(count) < probability).astype(float), place, bins)
+        for _ in again
+    ]
+    return {
+        "expected_calibration_error": _error(probability, correct, place, bins) if count else None,
+        "interval95": _middle(np.array(errors)) if count else [None, None],
+        "by_chance": float(np.median(perfect)) if count else None,
+        "bins": rows,
+        "items": count,
+    }
+
+
+def _error(probability: FloatArray, correct: FloatArray, place: IntArray, bins: int) -> float:
+    """Mean distance of what was stated from what came true, over bins."""
+    gap = np.bincount(place, weights=probability - correct, minlength=bins)
+    return float(np.abs(gap).sum() / len(probability))

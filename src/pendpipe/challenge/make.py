@@ -5,7 +5,6 @@ from __future__ import annotations
 import secrets
 import sys
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from pendpipe.challenge import sealing
 from pendpipe.challenge.families import make_item, plan
 from pendpipe.challenge.real import available, make_real
 from pendpipe.challenge.recordings import recording_text
+from pendpipe.challenge.workers import workers as processes
 from pendpipe.errors import InputError
 from pendpipe.files import read_json, replaced, write_json
 
@@ -78,17 +78,18 @@ def make_set(
         write_json(places.secret, secret)
     there = len(available(real)) if real is not None else 0
     if real is not None and not there:
-        print(f"{real}: no real recordings here: that family is left out", file=sys.stderr)
+        print(f"{real}: no real recordings here: that family is left out", flush=True)
     root = np.random.default_rng([secret["seed"], 0])
     recipes = plan(secret["count"], root, real=1000 if there else 0)
+    ledger = ledger or places.folder.parent / "ledger.jsonl"
+    entered = sealing.entered(ledger, places.folder.name)
     names = [f"item-{number:04d}" for number in range(1, len(recipes) + 1)]
     todo = [
         (places, name, recipe, [secret["seed"], number], real)
         for number, (name, recipe) in enumerate(zip(names, recipes, strict=True), 1)
-        if not places.truth(name).exists()
+        if not (places.truth(name).exists() and name in entered)
     ]
-    ledger = ledger or places.folder.parent / "ledger.jsonl"
-    with ProcessPoolExecutor(workers) as pool:
+    with processes(workers) as pool:
         for done, entry in enumerate(pool.map(_make_one, todo), 1):
             sealing.enter(
                 ledger,
@@ -112,6 +113,8 @@ def _make_one(
 ) -> dict[str, str]:
     """Make one item; its truth is written last, so that it says the item is whole."""
     places, name, recipe, seed, real = task
+    if places.truth(name).exists():  # made before an interruption, and not entered yet
+        return {"item": name, "recording": _hash_of(places.recording(name))}
     random = np.random.default_rng(seed)
     if recipe["family"] == "real" and real is not None:
         found = make_real(real, recipe["number"], random)

@@ -3,50 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
-from pendpipe.challenge.draw import six_cases
-from pendpipe.challenge.solved import read_items
+from pendpipe.challenge.wording import Score, number, percent, with_interval
 
-Score = dict[str, Any]
+FAMILIES = ("combinations", "ties", "outside", "withheld", "real")
 
 
-def percent(score: Score | None) -> str:
-    """A rate as hits of count, with its 95 % interval."""
-    if not score or score.get("rate") is None:
-        return "none to judge"
-    low, high = score["interval95"]
-    return (
-        f"{100 * score['rate']:.1f} % ({score['hits']} of {score['of']};"
-        f" {100 * low:.1f} to {100 * high:.1f} %)"
-    )
-
-
-def number(value: float | None, form: str = ".2f") -> str:
-    """A number or a dash."""
-    return "-" if value is None else format(value, form)
-
-
-def page(opened: Score, scores: Score, figures: list[str], folder: str) -> str:
+def page(scores: Score, figures: list[str], folder: str) -> str:
     """Write the page as Markdown.
 
     Parameters
     ----------
-    opened, scores
-        The opened set and its scores.
+    scores
+        Of `score.score`.
     figures, folder
         Names of the drawn figures, and where they lie beside the page.
     """
-    parts = [_head(opened, scores), _promises(scores), _rules(), _detection(scores)]
-    parts += [_naming(scores)]
-    parts += [_families(scores), _rest(scores), _missed(opened), _cases(opened)]
+    parts = [_head(scores), _promises(scores), _rules(), _detection(scores), _naming(scores)]
+    parts += [_families(scores), _rest(scores), _missed(scores), _cases(scores, folder)]
     lines = [line for part in parts for line in part]
     lines += ["## Figures", ""]
     lines += [f"![{name.removesuffix('.svg')}]({folder}/{name})" for name in figures]
     return "\n".join(lines) + "\n"
 
 
-def _head(opened: Score, scores: Score) -> Iterator[str]:
+def _head(scores: Score) -> Iterator[str]:
     yield "# Proof: concealed effects"
     yield ""
     yield "Written by `pendpipe challenge score`; nothing here is edited by hand. A generator that"
@@ -56,16 +37,15 @@ def _head(opened: Score, scores: Score) -> Iterator[str]:
     yield ""
     yield "A fresh set from a seed drawn at run time:"
     yield ""
-    yield "    PENDPIPE_CHALLENGE_SET=fresh snakemake --cores 2 challenge"
+    yield "    make proof SET=fresh"
     yield ""
     yield "| | |"
     yield "|---|---|"
-    for key in ("set", "count", "sealed_at", "answered_at", "opened_at", "seed", "truth_sha256",
-                "answers_sha256"):  # fmt: skip
-        yield f"| {key.replace('_', ' ')} | {opened[key]} |"
+    for key, value in scores["set"].items():
+        yield f"| {key.replace('_', ' ')} | {value} |"
     families = ", ".join(f"{count} {name}" for name, count in sorted(scores["families"].items()))
     yield f"| families | {families} |"
-    yield f"| without a diagnosis | {len(scores['unsolved'])} |"
+    yield f"| without a diagnosis | {', '.join(scores['unsolved']) or 'none'} |"
     yield ""
 
 
@@ -91,40 +71,13 @@ def _rules() -> Iterator[str]:
 
 def _promises(scores: Score) -> Iterator[str]:
     """What was promised beside what came out; a miss is called a miss."""
-    at50, at100 = scores["naming"]["50"], scores["naming"]["100"]
-    largest = scores["detection"]["against_largest_score"]
-    alarm = scores["false_alarms"]
-    rows: list[tuple[str, str, bool | None]] = []
-    low = alarm["interval95"][0]
-    rows.append(("false alarms: interval contains 1 % or lies below", percent(alarm),
-                 None if low is None else low <= 0.01))  # fmt: skip
-    for key, label in (("half", "a half"), ("nine_tenths", "nine tenths")):
-        found = largest.get(key)
-        text = "too few items"
-        if found:
-            text = f"{found['ratio']:.2f} ({found['interval95'][0]:.2f} to"
-            text += f" {found['interval95'][1]:.2f})"
-        rows.append((f"Δχ² at which {label} is detected, over the oracle's: at most 1.3", text,
-                     found["ratio"] <= 1.3 if found else None))  # fmt: skip
-    for name, band in (("50", at50), ("100", at100)):
-        share = band["share_of_the_oracle"]
-        rows.append((f"class accuracy at {name} over the oracle's: at least 0.9", number(share),
-                     None if share is None else share >= 0.9))  # fmt: skip
-        own, best = band["class_size"], band["oracle_class_size"]
-        ratio = own / best if own and best else None
-        rows.append((f"mean class size at {name} over the oracle's: at most 1.3", number(ratio),
-                     None if ratio is None else ratio <= 1.3))  # fmt: skip
-    wrong = scores["outside"]["confident_wrong_names"]
-    rows.append(("confident wrong names outside the catalogue: at most 5 %", percent(wrong),
-                 None if wrong["rate"] is None else wrong["rate"] <= 0.05))  # fmt: skip
-    error = scores["calibration"]["expected_calibration_error"]
-    rows.append(("expected calibration error: at most 0.05", number(error, ".3f"), error <= 0.05))
     yield "## What was promised"
     yield ""
     yield "| promise | measured | kept |"
     yield "|---|---|---|"
-    for promise, measured, kept in rows:
-        yield f"| {promise} | {measured} | {'-' if kept is None else 'yes' if kept else '**no**'} |"
+    words = {None: "-", True: "yes", False: "**no**"}
+    for row in scores["promises"]:
+        yield f"| {row['promise']} | {row['measured']} | {words[row['kept']]} |"
     yield ""
 
 
@@ -144,23 +97,36 @@ def _detection(scores: Score) -> Iterator[str]:
     for key, label in (("against_largest_score", "largest score"),
                        ("against_by_effect", "effect by effect")):  # fmt: skip
         found = scores["detection"][key]
-        if "half" in found:
-            half, most = found["half"], found["nine_tenths"]
-            yield (
-                f"Half are found at {half['found']:.1f} (oracle, {label}: {half['oracle']:.1f}),"
-                f" nine tenths at {most['found']:.1f} ({most['oracle']:.1f})."
-            )
-            yield ""
+        for share, words in (("half", "Half"), ("nine_tenths", "Nine tenths")):
+            if share in found:
+                yield _sizes(words, label, found[share])
+                yield ""
     alarm = scores["false_alarms"]
     yield f"False alarms on nulls: {percent(alarm)}; the oracle's own: {percent(alarm['oracle'])}."
-    yield f"On heavy-tailed noise {percent(alarm['heavy_tailed'])}; with a stop"
-    yield f"{percent(alarm['stopped'])}. Names given: {alarm['named'] or 'none'}. Red noise rightly"
+    yield f"A p-value below 5 %: {percent(alarm['at_five_percent'])}. False alarms on heavy-tailed"
+    yield f"noise: {percent(alarm['heavy_tailed'])}; where the pendulum stops:"
+    yield f"{percent(alarm['stopped'])}. Names given: {_counts(alarm['named'])}. Red noise rightly"
     yield f"called coloured (no false alarm): {alarm['rightly_called_coloured']}."
     yield ""
 
 
+def _sizes(words: str, label: str, found: Score) -> str:
+    """At which size a share is found, beside the oracle."""
+    return (
+        f"{words} are found at {found['found']:.1f}, by the oracle ({label}) at"
+        f" {found['oracle']:.1f}: {with_interval(found['ratio'], found)} times."
+    )
+
+
+def _counts(named: dict[str, int]) -> str:
+    """Names with how often each was given."""
+    return ", ".join(f"{name} {count}" for name, count in sorted(named.items())) or "none"
+
+
 def _naming(scores: Score) -> Iterator[str]:
     yield "## Naming"
+    yield ""
+    yield "Of what was detected by each; the class's mean size beside it."
     yield ""
     yield "| Δχ² | | first | among three | in class | class size |"
     yield "|---|---|---|---|---|---|"
@@ -170,22 +136,29 @@ def _naming(scores: Score) -> Iterator[str]:
             size = number(found[f"{prefix}class_size"])
             yield f"| {band} | {who} | {' | '.join(cells)} | {size} |"
     yield ""
-    yield f"Dynamics or measurement, rightly told: {percent(scores['dynamics_or_measurement'])}."
+    told = scores["dynamics_or_measurement"]
+    yield f"Dynamics or measurement, rightly told: {percent(told)}; the oracle:"
+    yield f"{percent(told['oracle'])}."
     yield ""
 
 
 def _families(scores: Score) -> Iterator[str]:
     yield "## The other families"
     yield ""
-    for family in ("combinations", "ties", "outside", "withheld", "real"):
-        yield f"**{family}**"
+    for family in FAMILIES:
+        count = scores["families"].get(family.removesuffix("s"), 0)
+        yield f"**{family}**, {count} items"
         yield ""
+        if not count:
+            yield "- none: there was nothing to make them of"
+            yield ""
+            continue
         for key, value in scores[family].items():
             label = key.replace("_", " ")
             if isinstance(value, dict) and "rate" in value:
                 yield f"- {label}: {percent(value)}"
             elif key == "named":
-                yield f"- first names: {value}"
+                yield f"- first names: {_counts(value)}"
         yield ""
     if scores["real"]["by_change"]:
         yield "| real recording | concealed | named | named without it |"
@@ -197,26 +170,22 @@ def _families(scores: Score) -> Iterator[str]:
 
 
 def _rest(scores: Score) -> Iterator[str]:
-    pulls, held = scores["pulls"], scores["held_out"]
+    pulls, held, known = scores["pulls"], scores["held_out"], scores["calibration"]
     yield "## Parameters, prediction, probabilities, peers"
     yield ""
-    yield (
-        f"Pulls of {pulls['parameters']} parameters of rightly named effects: mean"
-        f" {number(pulls['mean'])}, sd {number(pulls['sd'])} (robust"
-        f" {number(pulls['robust_sd'])}); nominal 95 % intervals cover"
-        f" {percent(pulls['coverage95'])}."
-    )
+    yield f"Pulls of {pulls['parameters']} parameters of rightly named effects that act by the"
+    yield f"catalogue's own law: mean {_of(pulls['mean'])}, standard deviation {_of(pulls['sd'])}"
+    yield f"(robust {_of(pulls['robust_sd'])}); within one error {percent(pulls['coverage68'])},"
+    yield f"within the 95 % interval {percent(pulls['coverage95'])}."
     yield ""
-    yield (
-        f"Held-out blocks are predicted better in {percent(held['improved'])}, worse by two"
-        f" standard errors in {percent(held['worse_by_two_errors'])}; median gain"
-        f" {number(held['median_gain'], '.1f')}."
-    )
+    yield f"Held-out blocks are predicted better in {percent(held['improved'])}, worse by two"
+    yield f"standard errors in {percent(held['worse_by_two_errors'])}; median gain"
+    yield f"{number(held['median_gain'], '.1f')} in log density. Above Δχ² = 50 the median gain is"
+    yield f"{_of(held['share_of_the_expected'])} of Δχ²/2 - 1, which knowing the effect would gain."
     yield ""
-    yield (
-        f"Expected calibration error {scores['calibration']['expected_calibration_error']:.3f}"
-        f" over {scores['calibration']['items']} items."
-    )
+    error = with_interval(known["expected_calibration_error"], known, ".3f")
+    yield f"Expected calibration error {error} over {known['items']} items; perfect probabilities"
+    yield f"would show {number(known['by_chance'], '.3f')} on as many."
     yield ""
     yield "Peers, flattered by the oracle's own residuals and scores:"
     yield ""
@@ -228,33 +197,40 @@ def _rest(scores: Score) -> Iterator[str]:
     yield ""
 
 
-def _missed(opened: Score) -> Iterator[str]:
-    items = read_items(opened)
-    missed = [
-        i for i in items
-        if i.truth["family"] in ("single", "withheld") and not i.answer.detected
-        and i.size > 30.0
-    ]  # fmt: skip
+def _of(score: Score) -> str:
+    return with_interval(score["value"], score)
+
+
+def _missed(scores: Score) -> Iterator[str]:
     yield "## What was missed"
     yield ""
-    yield "Singles above Δχ² = 30 that were not detected:"
+    yield "Single effects and withheld physics above Δχ² = 30 that were not detected:"
     yield ""
     yield "| item | hidden | law | Δχ² | oracle detected |"
     yield "|---|---|---|---|---|"
-    for i in missed:
-        seen = "yes" if i.oracle.get("detected") else "no"
-        yield f"| {i.name} | {i.effect['effect']} | {i.effect['law']} | {i.size:.0f} | {seen} |"
+    for row in scores["missed"]:
+        seen = "yes" if row["oracle_detected"] else "no"
+        yield (
+            f"| {row['item']} | {row['hidden']} | {row['law']} | {row['delta_chi2']:.0f} | {seen} |"
+        )
     yield ""
 
 
-def _cases(opened: Score) -> Iterator[str]:
+def _cases(scores: Score, folder: str) -> Iterator[str]:
     yield "## Six cases"
     yield ""
-    yield "By rule: of each of six kinds of effect, the first single in the set above Δχ² = 70."
+    yield "By rule: of each of six kinds of effect, the first single in the set above Δχ² = 70. The"
+    yield "figure is what the same command draws: data minus model against time and phase of the"
+    yield "cycle, in standard errors of a cell, before and after."
     yield ""
-    for item in six_cases(read_items(opened)):
-        content = item.answer.content
-        statement = " ".join(str(content.get("statement") or "(no statement)").split())
-        yield f"**{item.name}**, hidden: {item.effect['effect']} ({item.effect['law']},"
-        yield f"Δχ² = {item.size:.0f}), answer: {item.answer.lead or 'nothing'}. {statement}"
+    for row in scores["six_cases"]:
+        yield f"**{row['item']}**, hidden: {row['hidden']} ({row['law']},"
+        yield f"Δχ² = {row['delta_chi2']:.0f}), answer: {row['answer'] or 'nothing'}."
+        yield row["statement"]
         yield ""
+        if row.get("figure"):
+            yield f"![residual before and after]({folder}/{row['figure']})"
+            yield ""
+            if not row["same_answer"]:
+                yield "(The program was changed since: this figure is of another answer.)"
+                yield ""

@@ -73,16 +73,14 @@ def pulls_of(items: list[tuple[dict[str, Any], Answer]]) -> dict[str, Any]:
             by_effect.setdefault(f"{effect['effect']} {name}", []).append(pulls[-1])
             low, high = estimate.get("interval95") or [value - 1.96 * sd, value + 1.96 * sd]
             covered.append(bool(low <= true <= high))
-    spread = np.array(pulls)
-    centre = float(np.median(spread)) if len(pulls) else None
+    middle = float(np.median(pulls)) if pulls else 0.0
     return {
         "parameters": len(pulls),
-        "mean": float(spread.mean()) if len(pulls) else None,
-        "median": centre,
-        "sd": float(spread.std(ddof=1)) if len(pulls) > 1 else None,
-        "robust_sd": float(1.4826 * np.median(np.abs(spread - np.median(spread))))
-        if len(pulls) > 1
-        else None,
+        "mean": intervals.mean(pulls),
+        "median": intervals.median(pulls),
+        "sd": intervals.spread(pulls),
+        "robust_sd": intervals.median([1.4826 * abs(pull - middle) for pull in pulls]),
+        "coverage68": intervals.of([abs(pull) < 1.0 for pull in pulls]),
         "coverage95": intervals.of(covered),
         "by_parameter": by_effect,
     }

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.challenge import intervals
 from pendpipe.challenge.answers import right
 from pendpipe.challenge.families import WITHOUT_STRENGTH
-from pendpipe.challenge.oracle import FREEDOM
+from pendpipe.challenge.promises import promises
 from pendpipe.challenge.pulls import pulls_of
 from pendpipe.challenge.score_families import combinations, outside, real, ties, withheld
-from pendpipe.challenge.solved import Solved, read_items
+from pendpipe.challenge.score_naming import confusion, dynamics_or_measurement, naming
+from pendpipe.challenge.score_peers import peers
+from pendpipe.challenge.solved import Solved, read_items, six_cases
+
+SEALS: Final = (
+    "set", "count", "sealed_at", "answered_at", "opened_at", "seed", "truth_sha256",
+    "answers_sha256",
+)  # fmt: skip
+"""What of an opened set says which it was, and when what was known."""
+OBVIOUS: Final = 30.0
+"""Delta chi^2 above which an effect that was not detected is listed."""
 
 
 def score(opened: dict[str, Any]) -> dict[str, Any]:
@@ -25,26 +35,47 @@ def score(opened: dict[str, Any]) -> dict[str, Any]:
 
     nulls, singles = family("null"), family("single")
     named = [item for item in family("single", "tie") if item.answer.detected]
-    return {
+    found = {
+        "set": {key: opened[key] for key in SEALS},
         "items": len(items),
         "families": dict(Counter(item.truth["family"] for item in items)),
         "unsolved": [item.name for item in items if not item.answer.solved],
         "false_alarms": false_alarms(nulls),
         "detection": detection(singles),
         "naming": naming(family("single", "tie")),
-        "dynamics_or_measurement": intervals.of(
-            [item.answer.kind == item.effect["kind"] for item in named]
-        ),
+        "dynamics_or_measurement": dynamics_or_measurement(family("single", "tie")),
         "combinations": combinations(family("combination")),
         "outside": outside(family("outside")),
         "ties": ties(family("tie")),
         "withheld": withheld(family("withheld")),
         "real": real(family("real")),
         "pulls": pulls_of([(item.truth, item.answer) for item in singles]),
-        "held_out": held_out(named),
+        "held_out": held_out([item for item in singles if item.answer.detected]),
         "calibration": calibration(family("single", "tie", "outside")),
         "peers": peers(nulls, singles),
         "confusion": confusion(named),
+        "missed": [told(item) for item in family("single", "withheld") if missed(item)],
+        "six_cases": [told(item) for item in six_cases(items)],
+    }
+    return {**found, "promises": promises(found)}
+
+
+def missed(item: Solved) -> bool:
+    """An effect that anybody would have seen, and that was not."""
+    return item.size > OBVIOUS and not item.answer.detected
+
+
+def told(item: Solved) -> dict[str, Any]:
+    """One item in words, for pages."""
+    statement = " ".join(str(item.answer.content.get("statement") or "").split())
+    return {
+        "item": item.name,
+        "hidden": item.effect["effect"],
+        "law": item.effect["law"],
+        "delta_chi2": item.size,
+        "oracle_detected": bool(item.oracle.get("detected")),
+        "answer": item.answer.lead,
+        "statement": statement or "(no statement)",
     }
 
 
@@ -59,17 +90,28 @@ def alarmed(item: Solved) -> bool:
 def false_alarms(nulls: list[Solved]) -> dict[str, Any]:
     """How often nothing was called something, at the nominal 1 %."""
     solved = [item for item in nulls if item.answer.solved]
-    colour = [item for item in solved if item.answer.detected and not alarmed(item)]
     hard = [item for item in solved if item.truth["nuisances"]["freedom"] > 0.0]
     return {
         **intervals.of([alarmed(item) for item in solved]),
         "nominal": 0.01,
+        "at_five_percent": intervals.of([_doubted(i) for i in solved if not _coloured(i)]),
         "named": dict(Counter(item.answer.lead for item in solved if alarmed(item))),
-        "rightly_called_coloured": len(colour),
+        "rightly_called_coloured": sum(map(_coloured, solved)),
         "heavy_tailed": intervals.of([alarmed(item) for item in hard]),
         "stopped": intervals.of([alarmed(i) for i in solved if i.truth["nuisances"]["stops"]]),
         "oracle": intervals.of([bool(item.oracle["detected"]) for item in nulls if item.oracle]),
     }
+
+
+def _coloured(item: Solved) -> bool:
+    """Red noise rightly called coloured."""
+    return item.answer.detected and not alarmed(item)
+
+
+def _doubted(item: Solved) -> bool:
+    """Whether the answer's own p-value lies below 5 %."""
+    p_value = item.answer.content.get("p_value")
+    return p_value is not None and float(p_value) < 0.05
 
 
 def detection(singles: list[Solved]) -> dict[str, Any]:
@@ -99,54 +141,23 @@ def detection(singles: list[Solved]) -> dict[str, Any]:
     }
 
 
-def naming(items: list[Solved]) -> dict[str, Any]:
-    """Top-1, top-3 and class among the detected, by size, beside the oracle's."""
-    bands = {"all": (0.0, np.inf), "50": (35.0, 70.0), "100": (70.0, 200.0), "400": (200.0, 1e3)}
-    found = {}
-    for band, (low, high) in bands.items():
-        here = [item for item in items if low <= item.size < high]
-        solver = [item for item in here if item.answer.detected]
-        oracle = [item for item in here if item.oracle.get("detected")]
-        hit = [any(right(n, i.effect) for n in i.answer.members) for i in here]
-        best = [
-            bool(i.oracle.get("detected")) and any(right(n, i.effect) for n in i.oracle["class"])
-            for i in here
-        ]
-        accuracy, ceiling = intervals.of(hit), intervals.of(best)
-        found[band] = {
-            "top1": intervals.of([right(i.answer.lead, i.effect) for i in solver]),
-            "top3": intervals.of(
-                [any(right(n, i.effect) for n in i.answer.names[:3]) for i in solver]
-            ),
-            "class": intervals.of(
-                [any(right(n, i.effect) for n in i.answer.members) for i in solver]
-            ),
-            "class_size": _mean([len(i.answer.members) for i in solver]),
-            "oracle_top1": intervals.of([right(i.oracle["named"], i.effect) for i in oracle]),
-            "oracle_top3": intervals.of(
-                [any(right(n, i.effect) for n in i.oracle["top3"]) for i in oracle]
-            ),
-            "oracle_class": intervals.of(
-                [any(right(n, i.effect) for n in i.oracle["class"]) for i in oracle]
-            ),
-            "oracle_class_size": _mean([len(i.oracle["class"]) for i in oracle]),
-            "class_and_detected": accuracy,
-            "oracle_class_and_detected": ceiling,
-            "share_of_the_oracle": (
-                accuracy["rate"] / ceiling["rate"] if ceiling["rate"] else None
-            ),
-        }
-    return found
-
-
 def held_out(items: list[Solved]) -> dict[str, Any]:
-    """Prediction of blocks that were not fitted."""
-    gains = [i.answer.content.get("held_out") or {} for i in items]
-    known = [g for g in gains if g.get("gain") is not None and g.get("gain_sd") is not None]
+    """Prediction of blocks that were not fitted, beside what knowing the effect would gain.
+
+    Of the two halves each is predicted from the other: an effect of Delta chi^2 lambda,
+    estimated from half of the record, gains half of lambda less 1 in log density.
+    """
+    known = []
+    for item in items:
+        told = item.answer.content.get("held_out") or {}
+        if told.get("gain") is not None and told.get("gain_sd") is not None:
+            known.append((item, float(told["gain"]), float(told["gain_sd"])))
+    shares = [gain / (0.5 * item.size - 1.0) for item, gain, _ in known if item.size >= 50.0]
     return {
-        "improved": intervals.of([g["gain"] > 0.0 for g in known]),
-        "worse_by_two_errors": intervals.of([g["gain"] < -2.0 * g["gain_sd"] for g in known]),
-        "median_gain": _median([g["gain"] for g in known]),
+        "improved": intervals.of([gain > 0.0 for _, gain, _ in known]),
+        "worse_by_two_errors": intervals.of([gain < -2.0 * sd for _, gain, sd in known]),
+        "median_gain": _median([gain for _, gain, _ in known]),
+        "share_of_the_expected": intervals.median(shares),
     }
 
 
@@ -157,52 +168,6 @@ def calibration(items: list[Solved]) -> dict[str, Any]:
     return intervals.calibration(
         np.array([i.answer.probability for i in told]), np.array(correct, dtype=float)
     )
-
-
-def peers(nulls: list[Solved], singles: list[Solved]) -> dict[str, Any]:
-    """AIC, BIC and a whiteness test on the same items, with the oracle's own residuals.
-
-    They are given the true noise spectrum and the oracle's linear scores, which flatters
-    them.
-    """
-
-    def chosen(item: Solved, cost: float) -> str:
-        scores = item.oracle["scores"]
-        worth = {n: u - cost * FREEDOM.get(n, 1) for n, u in scores.items()}
-        best = max(worth, key=lambda name: worth[name])
-        return best if worth[best] > 0.0 else ""
-
-    found = {}
-    for name in ("aic", "bic", "whiteness"):
-
-        def says(item: Solved, name: str = name) -> str:
-            if name == "whiteness":
-                return "?" if item.oracle["whiteness_p"] < 0.01 else ""
-            cost = 2.0 if name == "aic" else float(np.log(item.truth["nuisances"]["samples"]))
-            return chosen(item, cost)
-
-        seen = [item for item in singles if item.oracle and says(item)]
-        found[name] = {
-            "false_alarms": intervals.of([bool(says(i)) for i in nulls if i.oracle]),
-            "detected": intervals.of([bool(says(i)) for i in singles if i.oracle]),
-            "top1": None if name == "whiteness" else intervals.of(
-                [right(says(i), i.effect) for i in seen]
-            ),
-        }  # fmt: skip
-    return found
-
-
-def confusion(items: list[Solved]) -> dict[str, dict[str, int]]:
-    """Effect hidden against first name."""
-    table: dict[str, dict[str, int]] = {}
-    for item in items:
-        row = table.setdefault(item.effect["effect"], {})
-        row[item.answer.lead] = row.get(item.answer.lead, 0) + 1
-    return table
-
-
-def _mean(values: list[int]) -> float | None:
-    return float(np.mean(values)) if values else None
 
 
 def _median(values: list[float]) -> float | None:

@@ -45,6 +45,7 @@ def outside(items: list[Solved]) -> dict[str, Any]:
 
     return {
         "detected": intervals.of([item.answer.detected for item in items]),
+        "oracle_detected": _oracle_detected(items),
         "unnamed_of_the_right_kind": intervals.of([unnamed(i) for i in large]),
         "unnamed_of_any_kind": intervals.of(
             [any(n.startswith("unnamed-") for n in i.answer.names) for i in large]
@@ -69,6 +70,10 @@ def ties(items: list[Solved]) -> dict[str, Any]:
         "lone_confident_names": intervals.of(
             [len(i.answer.members) == 1 and i.answer.probability > CONFIDENT for i in found]
         ),
+        "in_class": intervals.of(
+            [any(right(n, i.effect) for n in i.answer.members) for i in found]
+        ),
+        "oracle_in_class": _oracle_in_class(items),
     }
 
 
@@ -76,10 +81,22 @@ def withheld(items: list[Solved]) -> dict[str, Any]:
     """Known physics that the baseline lacks, at full size."""
     return {
         "detected": intervals.of([item.answer.detected for item in items]),
+        "oracle_detected": _oracle_detected(items),
         "in_class": intervals.of(
             [any(right(n, i.effect) for n in i.answer.members) for i in items]
         ),
+        "oracle_in_class": _oracle_in_class(items),
     }
+
+
+def _oracle_detected(items: list[Solved]) -> dict[str, Any]:
+    return intervals.of([bool(item.oracle["detected"]) for item in items if item.oracle])
+
+
+def _oracle_in_class(items: list[Solved]) -> dict[str, Any]:
+    """Of those that the oracle detects: its class holds what was hidden."""
+    seen = [item for item in items if item.oracle.get("detected")]
+    return intervals.of([any(right(n, i.effect) for n in i.oracle["class"]) for i in seen])
 
 
 def real(items: list[Solved]) -> dict[str, Any]:

@@ -47,6 +47,14 @@ def enter(ledger: Path, entry: dict[str, Any]) -> None:
         stream.write(canonical({**entry, "at": now(), "before": before}) + "\n")
 
 
+def entered(ledger: Path, of_set: str) -> set[str]:
+    """The items of one set that the ledger holds already."""
+    if not ledger.exists():
+        return set()
+    entries = map(json.loads, ledger.read_text(encoding="utf-8").splitlines())
+    return {entry["item"] for entry in entries if entry["set"] == of_set}
+
+
 def check_ledger(ledger: Path) -> int:
     """Check the chain of hashes; returns the number of entries."""
     lines = ledger.read_text(encoding="utf-8").splitlines()

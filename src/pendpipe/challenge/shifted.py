@@ -23,7 +23,7 @@ def shift_score(bench: Bench, angle: FloatArray, residual: FloatArray) -> float:
         Whitened residual of the unshifted baseline at its best.
     """
     scenario = bench.scenario
-    before = bench.whiten((angle - bench.reading(bench.truth))[bench.kept])
+    before = bench.whiten((angle - bench.true_reading)[bench.kept])
     time = np.concatenate(
         [scenario.time_s, scenario.time_s[-1] + scenario.interval_s * np.arange(1.0, 5.0)]
     )

@@ -12,12 +12,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.challenge import sealing
+from pendpipe.challenge.workers import ONE_THREAD
 from pendpipe.errors import InputError
 from pendpipe.files import read_json, write_json
 
@@ -77,22 +79,8 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) -> None:
     """One recording: copied into an empty folder, solved there, the answer taken home."""
-    with tempfile.TemporaryDirectory(prefix="pendulum-") as place:
-        room = Path(place)
-        shutil.copyfile(folder / "recordings" / f"{name}.csv", room / "recording.csv")
-        words = [*solver, "recording.csv", "--out", "answer", "--baseline", baseline]
-        environment = {key: os.environ[key] for key in PASSED_ON if key in os.environ}
-        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        try:
-            run = subprocess.run(
-                words, cwd=room, env=environment, capture_output=True, text=True,
-                timeout=PATIENCE_S, check=False, stdin=subprocess.DEVNULL,
-            )  # fmt: skip
-            status, said = run.returncode, run.stderr.strip()[-2000:]
-        except subprocess.TimeoutExpired:
-            status, said = -1, f"no answer within {PATIENCE_S:g} s"
-        found = room / "answer" / "diagnosis.json"
-        diagnosis = None
+    with alone(folder / "recordings" / f"{name}.csv", baseline, solver) as (status, said, answer):
+        found, diagnosis = answer / "diagnosis.json", None
         if found.exists():
             try:
                 diagnosis = json.loads(found.read_text(encoding="utf-8"))
@@ -103,6 +91,33 @@ def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) ->
         {"item": name, "status": status, "stderr": said if status else "", "diagnosis": diagnosis,
          "solved_at": sealing.now()},
     )  # fmt: skip
+
+
+@contextmanager
+def alone(recording: Path, baseline: str, solver: Sequence[str]) -> Iterator[tuple[int, str, Path]]:
+    """Run the solver in an empty folder with a copy of one recording.
+
+    Yields
+    ------
+    tuple
+        Its exit status (-1: it ran out of its time), what it said on stderr, and the folder
+        of its answer, which is gone afterwards.
+    """
+    with tempfile.TemporaryDirectory(prefix="pendulum-") as place:
+        room = Path(place)
+        shutil.copyfile(recording, room / "recording.csv")
+        words = [*solver, "recording.csv", "--out", "answer", "--baseline", baseline]
+        environment = {key: os.environ[key] for key in PASSED_ON if key in os.environ}
+        environment |= ONE_THREAD
+        try:
+            run = subprocess.run(
+                words, cwd=room, env=environment, capture_output=True, text=True,
+                timeout=PATIENCE_S, check=False, stdin=subprocess.DEVNULL,
+            )  # fmt: skip
+            status, said = run.returncode, run.stderr.strip()[-2000:]
+        except subprocess.TimeoutExpired:
+            status, said = -1, f"no answer within {PATIENCE_S:g} s"
+        yield status, said, room / "answer"
 
 
 def _hash_answers(folder: Path, names: list[str]) -> None:

@@ -86,6 +86,7 @@ def _open(arguments: argparse.Namespace) -> int:
 
 
 def _score(arguments: argparse.Namespace) -> int:
+    from pendpipe.challenge.cases import draw_cases
     from pendpipe.challenge.draw import draw
     from pendpipe.challenge.page import page
     from pendpipe.challenge.score import score
@@ -97,14 +98,18 @@ def _score(arguments: argparse.Namespace) -> int:
         raise InputError(path, "this set is not opened", "run pendpipe challenge open first")
     opened = read_json(path)
     scores = score(opened)
+    place = arguments.out / "figures"
+    cases = draw_cases(opened, arguments.set, place)
+    for row, drawn in zip(scores["six_cases"], cases, strict=True):
+        row.update(drawn)
+    figures = draw(scores, place)
     write_json(arguments.out / "scores.json", scores)
-    figures = draw(opened, scores, arguments.out / "figures")
-    text = page(opened, scores, figures, "proof")
+    text = page(scores, figures, "proof")
     target = arguments.page or arguments.out / "proof.md"
     with replaced(target) as stream:
         stream.write(text)
-    for name in figures:
+    for name in [*figures, *(row["figure"] for row in cases if row["figure"])]:
         with replaced(target.parent / "proof" / name, "wb") as stream:
-            stream.write((arguments.out / "figures" / name).read_bytes())
+            stream.write((place / name).read_bytes())
     print(text)
     return 0

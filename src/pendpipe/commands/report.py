@@ -30,6 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--figures", type=Path, metavar="FOLDER",
         help="where figures 3 to 10 are; the folder figures beside the page by default",
     )  # fmt: skip
+    parser.add_argument(
+        "--proof", type=Path, metavar="FOLDER",
+        help="scores of a challenge, if there is one, from pendpipe challenge score",
+    )  # fmt: skip
     parser.add_argument("--out", required=True, type=Path, metavar="PAGE.html", help="the page")
 
 
@@ -48,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         read_content(arguments.summary, "run pendpipe compare first"),
         results_folder(configuration),
         arguments.figures or arguments.out.parent / "figures",
+        arguments.proof,
     )
     with replaced(arguments.out) as stream:
         stream.write(page)

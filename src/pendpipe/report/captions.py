@@ -97,3 +97,25 @@ CAPTIONS: Final = {
         " of about 20 a waveform fit may differ from it by a few parts in ten thousand.",
     ),
 }
+
+PROOF_CAPTIONS: Final = {
+    "power": Caption(
+        "Power",
+        "Share of the hidden single effects that were detected at the 1 % level, against the"
+        " effect's size, beside the oracle's.",
+        "Bars are 95 % intervals. The closer the blue curve to the oracle's, the less is lost; to"
+        " its left nobody could detect more without more false alarms.",
+    ),
+    "confusion": Caption(
+        "What was hidden, and what was named",
+        "Of each hidden effect that was detected, the share of every first name.",
+        "The dark diagonal is right. Off it stand effects that one recording can hardly tell"
+        " apart, and mistakes.",
+    ),
+    "reliability": Caption(
+        "Reliability",
+        "How often the first name was right, against the probability that the answer stated.",
+        "On the grey line probabilities mean what they say; below it the answers boast.",
+    ),
+}
+"""Words for the figures of a scored challenge."""

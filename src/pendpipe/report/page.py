@@ -21,6 +21,7 @@ from pendpipe.report.findings import findings
 from pendpipe.report.glossary import GLOSSARY
 from pendpipe.report.headline import headline
 from pendpipe.report.health import CHI2_RANGE
+from pendpipe.report.proof import proof
 from pendpipe.report.records import Line, Table, table_of_records
 from pendpipe.report.vector import inline_svg
 
@@ -33,8 +34,9 @@ Content = Mapping[str, Any]
 
 
 def render(
-    configuration: Content, comparison: Content, summary: Content, folder: Path, figures: Path
-) -> str:
+    configuration: Content, comparison: Content, summary: Content, folder: Path, figures: Path,
+    challenge: Path | None = None,
+) -> str:  # fmt: skip
     """Make the page.
 
     Parameters
@@ -45,6 +47,8 @@ def render(
         The campaign's results, with a folder for each record.
     figures
         Where figures 3 to 10 are.
+    challenge
+        Scores of a challenge, if there is one.
 
     Returns
     -------
@@ -57,6 +61,8 @@ def render(
     table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
     decays, outside = _decays(folder, table.lines, spent=sum(map(len, drawn.values())))
     spent = sum(map(len, [*drawn.values(), *decays.values()]))
+    proven = proof(challenge, spent=spent, budget=BUDGET_BYTES - _RESERVE_BYTES)
+    spent += proven.bytes if proven else 0
     asked = configuration.get("diagnose") or {}
     diagnosed = _diagnoses(asked, folder, entries, spent)
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
@@ -79,6 +85,7 @@ def render(
         diagnosed=diagnosed,
         diagnosis_baseline="Eq. 3" if asked.get("baseline") == "viscous" else "Eq. 8",
         diagnosis_level=asked.get("level", 0.01),
+        proof=proven,
         records=table.lines,
         counts=_counts(table.lines),
         chi2_range=CHI2_RANGE,

@@ -1,0 +1,70 @@
+"""The report tells of a scored challenge where there is one, the bad with the good."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from markupsafe import Markup
+
+from pendpipe.report.page import render
+from pendpipe.report.proof import proof
+
+SVG = '<?xml version="1.0"?><svg viewBox="0 0 9 9"><path id="p" d="M 0 0 L 9 9"/></svg>'
+
+
+@pytest.fixture
+def scored(tmp_path: Path) -> Path:
+    """A scored set: one promise kept, one not, one that could not be judged."""
+    row = {"item": "item-0003", "hidden": "jitter", "law": "gaussian", "delta_chi2": 51.2,
+           "oracle_detected": True, "answer": "", "statement": "Eq. 8 is enough."}  # fmt: skip
+    scores = {
+        "set": {"set": "proof", "count": 600, "seed": 12345, "sealed_at": "T1",
+                "answered_at": "T2", "opened_at": "T3", "truth_sha256": "ab12",
+                "answers_sha256": "cd34"},
+        "promises": [{"promise": f"promise {n}", "measured": f"{n} %", "kept": kept}
+                     for n, kept in enumerate([True, False, None])],
+        "families": {"null": 204, "single": 198}, "unsolved": [], "missed": [row],
+        "six_cases": [{**row, "item": "item-0007", "law": "<b>", "figure": "case-1.svg",
+                       "same_answer": True}],
+    }  # fmt: skip
+    (tmp_path / "scores.json").write_text(json.dumps(scores))
+    (tmp_path / "figures").mkdir()
+    for name in ("power", "case-1"):
+        (tmp_path / "figures" / f"{name}.svg").write_text(SVG)
+    return tmp_path
+
+
+def shown(example: Any, folder: Path | None) -> str:
+    return render({}, example.content, {}, example.folder, example.folder / "figures", folder)
+
+
+def test_a_scored_set_is_told_with_hashes_and_misses(example: Any, scored: Path) -> None:
+    text = shown(example, scored)
+    section = text[text.index('<section id="proof"') :]
+    section = section[: section.index("</section>")]
+    for word in ("600 recordings", "ab12", "cd34", "12345", "204 null, 198 single", "make proof",
+                 "item-0003: jitter (gaussian), Δχ² = 51; the oracle detected it",
+                 "&lt;b&gt;", "kept", "not kept", "not judged"):  # fmt: skip
+        assert word in section
+    assert section.count("<svg") == 2
+    assert '<a href="#proof">' in text
+
+
+def test_without_a_scored_set_nothing_is_said(example: Any, tmp_path: Path) -> None:
+    for folder in (None, tmp_path / "nothing"):
+        assert 'href="#proof"' not in shown(example, folder)
+        assert 'id="proof"' not in shown(example, folder)
+
+
+def test_a_figure_beyond_the_budget_is_left_out(scored: Path) -> None:
+    whole, poor = (proof(scored, spent=0, budget=budget) for budget in (10_000, 100))
+    assert whole is not None
+    assert poor is not None
+    assert [type(figure.svg) for figure in whole.figures] == [Markup]
+    assert [type(svg) for svg in whole.cases] == [Markup]
+    assert whole.bytes > 100
+    assert poor.figures == []
+    assert poor.cases == [None]
