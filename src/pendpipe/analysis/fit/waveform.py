@@ -25,7 +25,7 @@ PRIOR_INVERSE: Final = 12.0
 """Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
 _SLIGHT: Final = 0.1
 """Of chi^2 in a half cycle: a smaller misfit is not seen in the noise."""
-_STEPS: Final = 24
+_STEPS: Final = 12
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class Waveform:
 
 
 def _amplitude_at(value: FloatArray, time_s: float) -> float:
-    """Amplitude by Eq. 13 in a few steps: to a per cent, and its changes likewise."""
+    """Amplitude by Eq. 13 in a few steps: to some per cent, and its changes likewise."""
     a, b, c, y = (float(value[index]) for index in (A, B, C, ANGLE))
     y, step = abs(y), (time_s - float(value[TIME])) / _STEPS
     for _ in range(_STEPS):
