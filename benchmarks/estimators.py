@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
+import statistics
 import sys
 import time
 from typing import TYPE_CHECKING, Final
@@ -76,17 +78,21 @@ def precision(method: Method, realisations: int) -> list[Row]:
         inside.append([off < sd, (ends[:, 0] <= truth) & (truth <= ends[:, 1])])
     error = np.array(values) - truth
     cover = 100.0 * np.mean(inside, axis=0)
-    limits = ("1.05", "0.1") if method == "waveform" else ("1.15", "0.5")
-    ratio, bias = error.std(axis=0) / bound(), error.mean(axis=0) / bound()
     limits = (1.05, 0.1) if method == "waveform" else (1.15, 0.5)
     ratio, bias = error.std(axis=0) / bound(), error.mean(axis=0) / bound()
     head = f"{method}, {realisations} realisations"
     # What the bound's own linear estimate makes of the very same noise: the draw's own scatter.
     own = linear_estimates(realisations).std(axis=0) / bound()
+    known = 100.0 / math.sqrt(2.0 * realisations)
     return [
         Row(
-            f"{head}: the linear estimate at the truth, on the same noise: sd over the bound",
-            ", ".join(f"{value:.3g}" for value in own),
+            f"{head} (which tell an sd to {known:.1f} %): the linear estimate at the truth, on the"
+            " same noise: sd over the bound",
+            ", ".join(f"{value:.4g}" for value in own),
+        ),
+        Row(
+            f"{head}: sd over that of the linear estimate",
+            ", ".join(f"{value:.4g}" for value in ratio / own),
         ),
         at_most(f"{head}: sd over the bound of a, b, c, Q", ratio.tolist(), limits[0]),
         at_most(f"{head}: bias in sd", bias.tolist(), limits[1]),
@@ -95,32 +101,45 @@ def precision(method: Method, realisations: int) -> list[Row]:
     ]
 
 
-def speed(rounds: int = 60) -> list[Row]:
+def speed(rounds: int = 100) -> list[Row]:
     """Time of the fits against find_peaks and curve_fit, and lmfit over solve_ivp."""
-    one = recording(0)
+    records = [recording(seed) for seed in range(10)]
     half_period = len(TIME_S) / 309.6
 
-    def peer(*, quartic: bool) -> Callable[[], object]:
-        return lambda: peers_estimators.peaks_and_curve_fit(
-            TIME_S, one.values, half_period, quartic=quartic
+    def by_turns(fit: Callable[[Recording], object]) -> tuple[Callable[[], object], int]:
+        """Fit the same records in the same order, one a call."""
+        turn = itertools.cycle(records)
+        return lambda: fit(next(turn)), 1
+
+    def spaced(one: Recording, *, quartic: bool) -> object:
+        return peers_estimators.spaced_peaks(
+            TIME_S, one.values, NOISE, half_period, quartic=quartic
         )
 
     t = cpu_seconds(
         {
-            "raw": (peer(quartic=False), 1),
-            "quartic": (peer(quartic=True), 1),
-            "points": (lambda: fit_recording(one, method="turning-points"), 1),
-            "waveform": (lambda: fit_recording(one), 1),
+            "prominent": by_turns(
+                lambda one: peers_estimators.prominent_peaks(TIME_S, one.values, NOISE)
+            ),
+            "spaced": by_turns(lambda one: spaced(one, quartic=False)),
+            "quartic": by_turns(lambda one: spaced(one, quartic=True)),
+            "points": by_turns(lambda one: fit_recording(one, method="turning-points")),
+            "waveform": by_turns(fit_recording),
         },
         rounds,
+        statistic=statistics.median,
     )
+    shown = ", ".join(f"{1e3 * t[name]:.2f} ms" for name in t)
+    ours = t["waveform"]
     found = [
-        Row("time of the waveform fit, and of the turning-point route",
-            f"{1e3 * t['waveform']:.2f} ms, {1e3 * t['points']:.2f} ms"),
-        at_most("waveform fit over `find_peaks`, quartic, `curve_fit`",
-                t["waveform"] / t["quartic"], 1.0),
-        at_most("waveform fit over `find_peaks`, `curve_fit` (c biased by -180 %)",
-                t["waveform"] / t["raw"], 1.0),
+        Row("time from array to a, b, c with errors: `find_peaks` by prominence; by distance;"
+            " by distance, with quartics; turning-point route; waveform fit", shown),
+        at_most("waveform fit over `find_peaks(prominence)`, `curve_fit`",
+                ours / t["prominent"], 1.0),
+        at_most("waveform fit over `find_peaks(distance)`, quartics, `curve_fit` (told the period)",
+                ours / t["quartic"], 1.0),
+        at_most("waveform fit over `find_peaks(distance)`, `curve_fit` (told the period; c biased"
+                " by -180 %)", ours / t["spaced"], 1.0),
     ]  # fmt: skip
     if importlib.util.find_spec("lmfit"):
         found += against_lmfit(t["waveform"])
@@ -149,7 +168,7 @@ def main() -> None:
     numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
     found = speed()
     for method in METHODS:
-        found += precision(method, numbers[0] if numbers else 1000)
+        found += precision(method, numbers[0] if numbers else 4000)
     write("estimators", "The estimates: 32768 readings over 300 s, noise 0.1 mrad", found)
 
 

@@ -19,33 +19,50 @@ def eq_14(t: FloatArray, y0: float, a: float, b: float, c: float) -> FloatArray:
     return np.real((b * (p - 1.0) + r * (p + 1.0)) / (2.0 * a * (1.0 - p)))
 
 
-def peaks(values: FloatArray, half_period: float) -> tuple[FloatArray, FloatArray]:
-    """Indices of the peaks of |x| about the median, and |x|."""
+def law_through(
+    time_s: FloatArray, amplitude: FloatArray, sd: float
+) -> tuple[FloatArray, FloatArray]:
+    """y0, a, b, c of Eq. 14 and their standard deviations, from good starting values."""
+    from scipy.optimize import curve_fit
+
+    start, sigma = [amplitude[0], 0.4, 0.01, 1e-6], np.full(len(amplitude), sd)
+    value, covariance = curve_fit(
+        eq_14, time_s - time_s[0], amplitude, start, sigma=sigma, absolute_sigma=True
+    )
+    return np.asarray(value), np.sqrt(np.diag(covariance))
+
+
+def prominent_peaks(
+    time_s: FloatArray, values: FloatArray, noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """find_peaks told of the noise (a prominence of five of it), and curve_fit."""
     from scipy.signal import find_peaks
 
     size = np.abs(values - np.median(values))
-    found, _ = find_peaks(size, distance=int(0.8 * half_period))
-    return found, size
+    index, _ = find_peaks(size, prominence=5.0 * noise)
+    return law_through(time_s[index], size[index], noise)
 
 
-def peaks_and_curve_fit(
-    time_s: FloatArray, values: FloatArray, half_period: float, *, quartic: bool = True
-) -> FloatArray:
-    """y0, a, b, c by find_peaks, a quartic through each peak, and curve_fit of Eq. 14."""
-    from scipy.optimize import curve_fit
+def spaced_peaks(
+    time_s: FloatArray, values: FloatArray, noise: float, half_period: float, *, quartic: bool
+) -> tuple[FloatArray, FloatArray]:
+    """find_peaks told of the half period (in readings) and the noise, and curve_fit.
 
-    index, size = peaks(values, half_period)
-    amplitude = size[index]
-    if quartic:
-        reach = int(0.25 * half_period)
-        u = np.arange(-reach, reach + 1) / reach
-        polynomial = np.linalg.pinv(np.vander(u, 5, increasing=True))
-        index = index[(index > reach) & (index < len(size) - reach)]
-        fitted = size[index[:, None] + np.arange(-reach, reach + 1)] @ polynomial.T
-        amplitude = fitted[:, 0] - fitted[:, 1] ** 2 / (4.0 * fitted[:, 2])
-    t = time_s[index] - time_s[index[0]]
-    start = [amplitude[0], 0.4, 0.01, 1e-6]
-    return np.asarray(curve_fit(eq_14, t, amplitude, start)[0])
+    With `quartic` the amplitude is that of a quartic through each peak.
+    """
+    from scipy.signal import find_peaks
+
+    size = np.abs(values - np.median(values))
+    index, _ = find_peaks(size, distance=int(0.8 * half_period))
+    if not quartic:
+        return law_through(time_s[index], size[index], noise)
+    reach = int(0.25 * half_period)
+    u = np.arange(-reach, reach + 1) / reach
+    polynomial = np.linalg.pinv(np.vander(u, 5, increasing=True))
+    index = index[(index > reach) & (index < len(size) - reach)]
+    fitted = size[index[:, None] + np.arange(-reach, reach + 1)] @ polynomial.T
+    amplitude = fitted[:, 0] - fitted[:, 1] ** 2 / (4.0 * fitted[:, 2])
+    return law_through(time_s[index], amplitude, noise * float(np.linalg.norm(polynomial[0])))
 
 
 def lmfit_waveform(

@@ -54,15 +54,21 @@ def within(what: str, values: Sequence[float], about: float, slack: float) -> Ro
     return Row(what, shown, f"{about:g} +- {slack:g}", met)
 
 
+def lower_quartile(values: list[float]) -> float:
+    """The value that a quarter of them fall below."""
+    return sorted(values)[len(values) // 4]
+
+
 def cpu_seconds(
     contenders: dict[str, tuple[Callable[[], object], int]],
     rounds: int,
     clock: Callable[[], float] = time.process_time,
+    statistic: Callable[[list[float]], float] = lower_quartile,
 ) -> dict[str, float]:
     """Time of each contender, which take turns; beside each its calls in a round.
 
-    CPU time, and its lower quartile, since the machine may be shared, which only adds; each
-    is called once before.
+    CPU time, and by default its lower quartile, since the machine may be shared, which only
+    adds; each is called once before.
     """
     times: dict[str, list[float]] = {name: [] for name in contenders}
     for run, _ in contenders.values():
@@ -73,7 +79,7 @@ def cpu_seconds(
                 begin = clock()
                 run()
                 times[name].append(clock() - begin)
-    return {name: sorted(values)[len(values) // 4] for name, values in times.items()}
+    return {name: statistic(values) for name, values in times.items()}
 
 
 def machine() -> str:

@@ -13,7 +13,10 @@ from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
 from pendpipe.analysis.fit.by_waveform import fit_plain_waveform, fit_waveform
 from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.fit.minimise import minimise
+from pendpipe.analysis.fit.quick import quick_start
 from pendpipe.analysis.fit.rounding import rounded
+from pendpipe.analysis.fit.waveform import BOUNDS, Waveform
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
@@ -278,6 +281,31 @@ def test_a_quick_start_ends_where_a_careful_one_does(name: str, begin_s: float) 
     for parameter, estimate in careful.parameters.items():
         assert abs(quick.value(parameter) - estimate.value) < 0.1 * estimate.sd
         assert quick.parameters[parameter].sd == pytest.approx(estimate.sd, rel=0.03)
+
+
+def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
+    """Against the search gone on with until chi^2 can't be lowered by 1e-10."""
+    fine = np.arange(32768) * (300.0 / 32768)
+    trusted, off = 0, []
+    for seed in range(60):
+        values = noisy(sample(FIG_8, START, fine), 10.0 ** (-4.5 + 0.01 * seed), seed)
+        begun = quick_start(prepare(Recording(fine, values, "angle_rad"), "record"))
+        assert begun is not None
+        problem = Waveform(fine, values, begun.points.noise_rms_rad, {})
+        first, foresee = begun.start.value, problem.foresee
+        soon = minimise(problem.evaluate, first, BOUNDS, foresee=foresee, most=2)
+        if not soon.converged:
+            continue
+        late = minimise(problem.evaluate, soon.value, BOUNDS, tolerance=1e-10)
+        sd = np.sqrt(np.diag(np.linalg.inv(late.quadratic.normal)))
+        off.append(np.abs(soon.value - late.value) / sd)
+        assert problem.chi2(soon.at) - soon.gained == pytest.approx(
+            problem.chi2(late.value), abs=0.03
+        )
+        trusted += 1
+    assert trusted > 20
+    assert np.max(np.array(off)[:, :3]) < 0.01
+    assert np.max(off) < 0.1
 
 
 def test_a_quick_start_is_refused_where_the_record_is_not_plain() -> None:

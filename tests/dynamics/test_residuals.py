@@ -38,6 +38,7 @@ def test_gradient_and_residual_are_those_of_the_jacobian(name: str, count: int) 
     found = compare(model, RELEASE, time_s, values)
     residual = residuals(model, RELEASE, time_s, values)
     np.testing.assert_allclose(residual, values - angle, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found.residual, residual, rtol=0, atol=1e-14)
     assert found.square == pytest.approx(residual @ residual, rel=1e-12)
     size = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(values - angle) + 1e-300
     np.testing.assert_allclose(found.gradient / size, jacobian.T @ (values - angle) / size,

@@ -3,7 +3,8 @@
 A fit needs the Jacobian J only in J'r and J'J. Every column of J is a polynomial in the place
 within the panel, so that J'r follows from the residuals' moments there, and J itself is never
 written. J'J is the number of readings times the mean over the part of the panel that they
-cover, by Gauss's rule: as exact as the readings are evenly spread within it.
+cover, by Gauss's rule: as exact as the readings are evenly spread within it. The places of some
+panels are collected first, and multiplied in one go.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from pendpipe.dynamics.layout import MOMENTS, NODE_COUNT, PLACES
 from pendpipe.dynamics.panel import adder, part
+from pendpipe.dynamics.polynomials import horner_few
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -43,15 +45,16 @@ def take_moments(
         m0, m1, m2, m3, m4, m5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(residual.size):
             z, value = theta[i], power[i]
-            second = value * z * z
-            fourth = second * z * z
+            both = z * z
+            second = value * both
+            fourth = second * both
             m0 += value
             m1 += value * z
             m2 += second
             m3 += second * z
             m4 += fourth
             m5 += fourth * z
-            power[i] = fourth * z * z
+            power[i] = fourth * both
         moments[k], moments[k + 1], moments[k + 2] = m0, m1, m2
         moments[k + 3], moments[k + 4], moments[k + 5] = m3, m4, m5
     return square
@@ -93,60 +96,59 @@ def compare(work: Work, residual: FloatArray, start: float, duration: float) -> 
     gradient[directions + 1] += product(work.total[2], moments[:NODE_COUNT])
     gradient[directions + 2] -= omega * speed
     gradient[directions + 3] += moments[0]
-    _add_products(work, theta, middle, half)
+    _take_places(work, theta, middle, half)
 
 
 @adder
-def at_places(polynomial: FloatArray, place: FloatArray, out: FloatArray) -> None:
-    """Evaluate a polynomial of degree 16 at the places: even and odd powers wait less apart."""
-    for i in range(PLACES):
-        square = place[i] * place[i]
-        even, odd = polynomial[NODE_COUNT - 1], polynomial[NODE_COUNT - 2]
-        for k in range(NODE_COUNT - 3, 0, -2):
-            even, odd = even * square + polynomial[k], odd * square + polynomial[k - 1]
-        out[i] = even * square + polynomial[0] + place[i] * odd
-
-
-@adder
-def add_weighted(some: FloatArray, readings: float, normal: FloatArray) -> None:
-    """Add the mean products of the columns, times the number of readings."""
-    columns, w = some.shape[0], _WEIGHTS
-    half = 0.5 * readings
-    for p in range(columns):
-        f = some[p]
-        f0, f1, f2, f3 = f[0] * w[0], f[1] * w[1], f[2] * w[2], f[3] * w[3]
-        f4, f5, f6, f7 = f[4] * w[4], f[5] * w[5], f[6] * w[6], f[7] * w[7]
+def add_scaled(
+    columns: FloatArray, weights: FloatArray, scaled: FloatArray, normal: FloatArray
+) -> None:
+    """Add the columns' weighted products; `scaled` is room for one of them."""
+    for p in range(columns.shape[0]):
+        for i in range(weights.size):
+            scaled[i] = columns[p, i] * weights[i]
         for q in range(p + 1):
-            g = some[q]
-            mean = (f0 * g[0] + f1 * g[1] + f2 * g[2] + f3 * g[3]) + (
-                f4 * g[4] + f5 * g[5] + f6 * g[6] + f7 * g[7]
-            )
-            normal[p * columns + q] += half * mean
+            normal[p * columns.shape[0] + q] += product(scaled, columns[q])
 
 
 @part
-def _add_products(work: Work, theta: FloatArray, middle: float, half: float) -> None:
-    """Add the products of the Jacobian's columns where the readings are."""
-    columns, directions, omega = work.some.shape[0], work.rates.size, work.motion[0]
-    by_omega, by_time = work.some[directions], work.some[directions + 2]
-    place, readings = work.power[:PLACES], float(theta.size)
+def add_batch(work: Work) -> None:
+    """Add the products of the Jacobian's columns at the places that wait for it."""
+    taken = int(work.wanted[2])
+    normal = work.sums[1 + work.some.shape[0] :]
+    add_scaled(work.some, work.weights[:taken], work.power[:taken], normal)
+    work.wanted[2] = 0.0
+
+
+@part
+def _take_places(work: Work, theta: FloatArray, middle: float, half: float) -> None:
+    """Write the Jacobian's columns at Gauss's places among the readings of the panel."""
+    if work.wanted[2] + PLACES > work.weights.size:
+        add_batch(work)
+    directions, omega = work.rates.size, work.motion[0]
+    taken = int(work.wanted[2])
+    here = slice(taken, taken + PLACES)
+    place, weights, readings = work.power[here], work.weights[here], float(theta.size)
+    by_omega, by_time = work.some[directions, here], work.some[directions + 2, here]
+    by_offset = work.some[directions + 3, here]
     centre = 0.5 * (theta[0] + theta[theta.size - 1])
     # Each reading stands for the time around it, half of that outside the first and the last.
     reach = 0.5 * (theta[theta.size - 1] - theta[0]) * readings / max(readings - 1.0, 1.0)
     for i in range(PLACES):
         place[i] = centre + reach * _PLACES[i]
-    at_places(work.total[1], place, by_time)
-    at_places(work.total[2], place, work.some[directions + 1])
-    for i in range(PLACES):
+        weights[i] = 0.5 * readings * _WEIGHTS[i]
+    horner_few(work.total[1], place, by_time)
+    horner_few(work.total[2], place, work.some[directions + 1, here])
+    for i in range(place.size):
         by_omega[i] = (middle + half * place[i]) * by_time[i] / omega
         by_time[i] *= -omega
-        work.some[directions + 3, i] = 1.0
+        by_offset[i] = 1.0
     for c in range(directions):
-        column, rate = work.some[c], work.rates[c] / omega
-        at_places(work.total[3 + c], place, column)
-        for i in range(PLACES):
+        column, rate = work.some[c, here], work.rates[c] / omega
+        horner_few(work.total[3 + c], place, column)
+        for i in range(place.size):
             by_omega[i] -= rate * column[i]
-    add_weighted(work.some, readings, work.sums[1 + columns :])
+    work.wanted[2] += PLACES
 
 
 @part

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.comparison import compare, compare_rest, subtract
+from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
 from pendpipe.dynamics.layout import NODE_COUNT
 from pendpipe.dynamics.panel import kernel, part
 from pendpipe.dynamics.polynomials import horner
@@ -46,8 +46,9 @@ def combine(
     dy/dp = `amplitude` and dtau/dp = `clock` at the turning point where the half cycle starts.
     """
     columns = amplitude.size
-    for j in range(NODE_COUNT):
-        total[0, j] = sign * y * polynomials[j]
+    waveform = polynomials[:NODE_COUNT]
+    for j in range(waveform.size):
+        total[0, j] = sign * y * waveform[j]
     if columns == 0:
         return
     for j in range(NODE_COUNT - 1):
@@ -58,10 +59,10 @@ def combine(
         by_start = polynomials[NODE_COUNT : 2 * NODE_COUNT]
         weight = 0.0 if c == 0 else sign * y
         outer = first_sign if c == 0 else 1.0
-        for j in range(NODE_COUNT):
-            total[2 + c, j] = outer * (
-                weight * own[j] + sign * amplitude[c] * by_start[j] - clock[c] * total[1, j]
-            )
+        moved, late = outer * sign * amplitude[c], outer * clock[c]
+        # Its size unknown to the compiler, or it would write the loop out instead of vectorising.
+        for j in range(own.size):
+            total[2 + c, j] = outer * weight * own[j] + moved * by_start[j] - late * total[1, j]
 
 
 @part
@@ -100,18 +101,16 @@ def emit(
         z, t = work.theta[: stop - at], time_s[at:stop]
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
-        if work.readings.size > 0 and work.amplitude.size > 0:
-            residual = work.residual[: z.size]
-            horner(work.total[0], z, residual)
-            subtract(work.readings[at:stop], residual)
-            compare(work, residual[: min(stop, end) - at], start, duration)
-        else:
-            horner(work.total[0], z, angle_rad[at:stop])
-            if work.readings.size > 0:
-                subtract(work.readings[at:stop], angle_rad[at:stop])
-            elif work.amplitude.size > 0:
-                _emit_derivatives(work, z, t, jacobian, at)
+        horner(work.total[0], z, angle_rad[at:stop])
+        if work.readings.size > 0:
+            subtract(work.readings[at:stop], angle_rad[at:stop])
+            if work.amplitude.size > 0:
+                compare(work, angle_rad[at : min(stop, end)], start, duration)
+        elif work.amplitude.size > 0:
+            _emit_derivatives(work, z, t, jacobian, at)
         at = stop
+    if end == time_s.size and work.readings.size > 0 and work.amplitude.size > 0:
+        add_batch(work)
     return end
 
 
@@ -145,6 +144,8 @@ def rest(
     directions, omega = work.rates.size, work.motion[0]
     level = signs[0] * y + work.motion[2]
     if work.amplitude.size > 0:
+        if work.readings.size > 0:
+            add_batch(work)
         by_omega = 0.0
         for c in range(directions):
             work.some[c, 0] = signs[0] * work.amplitude[c + 1]
@@ -154,11 +155,11 @@ def rest(
         work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
         if work.readings.size > 0:
             compare_rest(work, level, first)
-            return
     for i in range(first, angle_rad.size):
         angle_rad[i] = level
     if work.readings.size > 0:
         subtract(work.readings[first:], angle_rad[first:])
+        return
     for c in range(min(jacobian.shape[0], directions + 3)):
         for i in range(first, angle_rad.size):
             jacobian[c, i] = work.some[c, 0]

@@ -20,6 +20,8 @@ CONSTANTS = 9
 MOMENTS = NODE_COUNT + 1
 PLACES = 8
 """Of a panel, at which the normal matrix is taken; see `comparison.py`."""
+BATCH = 8 * PLACES
+"""Places that are multiplied in one go."""
 
 RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
@@ -40,8 +42,8 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     """Return how many numbers `workspace.carve` needs."""
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    compared = MOMENTS + 2 * THETA + most_columns(s) * PLACES
-    return NODE_SIZE + 4 + 6 * s + matrices + DESCRIPTION + THETA + compared
+    compared = MOMENTS + THETA + (most_columns(s) + 1) * BATCH
+    return NODE_SIZE + 5 + 6 * s + matrices + DESCRIPTION + THETA + compared
 
 
 def most_columns(sensitivities: int) -> int:

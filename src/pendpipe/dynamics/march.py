@@ -151,8 +151,8 @@ def march(
     turning
         Receives the turning points, a column each; may be empty.
     readings, sums
-        Readings at the times: without rates `angle_rad` then receives the residuals, with them
-        `sums` their comparison (see `comparison.py`). Both may be empty.
+        Readings at the times: `angle_rad` then receives the residuals, and with rates `sums`
+        their comparison (see `comparison.py`). Both may be empty.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def march(
     for c in range(columns):
         work.amplitude[c], work.clock[c] = (1.0 if c == 0 else 0.0), 0.0
     wanted = work.wanted
-    wanted[0], wanted[1] = 1.0, math.inf
+    wanted[0], wanted[1], wanted[2] = 1.0, math.inf, 0.0
     log_y, excess, k, level, first, guess = math.log(y), 0.0, 0, 0, 0, 0
     narrow = columns == 0 and polynomials == 0
     while True:

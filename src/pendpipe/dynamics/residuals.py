@@ -24,6 +24,8 @@ class Comparison(NamedTuple):
     """J' r, shape (8,)."""
     normal: FloatArray
     """J' J, shape (8, 8), for readings spread evenly within each half cycle."""
+    residual: FloatArray
+    """r, shape (n,)."""
 
 
 def residuals(
@@ -59,13 +61,14 @@ def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatAr
     readings = np.ascontiguousarray(angle_rad, dtype=np.float64)
     directions, rates = directions_of(model, None)
     columns = rates.size + 4
-    sums = np.zeros(sums_size(columns))
+    sums, residual = np.zeros(sums_size(columns)), np.empty(times.size)
     if times.size:
         run(
             model, release, tabulate=True, directions=directions, rates=rates,
-            until_s=float(times[-1]), time_s=times, readings=readings, sums=sums,
+            until_s=float(times[-1]), time_s=times, angle_rad=residual, readings=readings,
+            sums=sums,
         )  # fmt: skip
     lower = sums[1 + columns :].reshape(columns, columns)
     normal = lower + lower.T
     normal.flat[:: columns + 1] *= 0.5
-    return Comparison(float(sums[0]), sums[1 : 1 + columns], normal)
+    return Comparison(float(sums[0]), sums[1 : 1 + columns], normal, residual)

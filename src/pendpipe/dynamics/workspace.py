@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pendpipe.dynamics import layout
 from pendpipe.dynamics.layout import (
+    BATCH,
     DESCRIPTION,
     MOMENTS,
     MOST_PANELS,
     MOST_POINTS,
     NODE_COUNT,
     NODE_SIZE,
-    PLACES,
     THETA,
 )
 from pendpipe.dynamics.panel import kernel
@@ -68,14 +68,14 @@ class Work(NamedTuple):
     """What comes of it; see `comparison.py`."""
     moments: FloatArray
     """(18,): of the residuals of a block."""
-    residual: FloatArray
-    """Of a block of readings."""
     power: FloatArray
     """Residuals times a power of their place."""
     some: FloatArray
-    """(columns, 8): the Jacobian's columns at some places of the panel."""
+    """(columns, BATCH): the Jacobian's columns at some places of the last panels."""
+    weights: FloatArray
+    """(BATCH,): how many readings each of these places stands for."""
     wanted: FloatArray
-    """How `march` lays out its tables."""
+    """How `march` lays out its tables; and how many of the places are taken."""
 
 
 most_columns = kernel(layout.most_columns)
@@ -118,11 +118,11 @@ def carve(
     columns_shown = most_columns(s)
     theta, rest = rest[:THETA], rest[THETA:]
     moments, rest = rest[:MOMENTS], rest[MOMENTS:]
-    residual, rest = rest[:THETA], rest[THETA:]
     power, rest = rest[:THETA], rest[THETA:]
-    some, rest = matrix(rest, columns_shown, PLACES), rest[columns_shown * PLACES :]
+    some, rest = matrix(rest, columns_shown, BATCH), rest[columns_shown * BATCH :]
+    weights, rest = rest[:BATCH], rest[BATCH:]
     return Work(
         constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
-        theta, readings, sums, moments, residual, power, some, rest,
+        theta, readings, sums, moments, power, some, weights, rest,
     )  # fmt: skip

@@ -107,10 +107,12 @@ def _result(
     fixed: Mapping[str, float],
 ) -> tuple[FitResult, float]:  # fmt: skip
     """Judge what the fit has left; return the result and what its variances were enlarged by."""
-    residual = fitted.problem.residual(fitted.minimum.value)
+    # Of where the last step began, if that was so small that it was taken on trust.
+    residual = fitted.problem.residual(fitted.minimum.at)
     dof = len(residual) - len(NAMES) + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
-    rms = math.sqrt(float(residual @ residual) / len(residual))
+    gained = fitted.minimum.gained * fitted.problem.noise_rms**2
+    rms = math.sqrt(max(float(residual @ residual) - gained, 0.0) / len(residual))
     chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
     # What rounding leaves is slow by nature; its likelihood knows that already.
     slow = noise.slow if fitted.problem.step == 0.0 else 1.0
@@ -158,8 +160,9 @@ def _fit(
         part = slice(span.start, stop)
         problem = Waveform(samples.time_s[part], samples.values[part], points.noise_rms_rad, parts)
         minimum = minimise(
-            problem.evaluate, value, waveform.BOUNDS, held=held, chi2_only=problem.chi2
-        )
+            problem.evaluate, value, waveform.BOUNDS, held=held, chi2_only=problem.chi2,
+            foresee=problem.foresee,
+        )  # fmt: skip
         if used >= len(points):
             return _Fitted(problem, minimum, held, start)
         value = minimum.value

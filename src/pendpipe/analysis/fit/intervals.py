@@ -49,14 +49,18 @@ def intervals95(
     least 95 % of the cases (97.5 % with one bound), never less.
     """
     matrix = covariance(normal, held) if matrix is None else matrix
-    deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    pull = np.abs(gradient * deviations)
     fitted = [j for j in range(len(value)) if j not in held]
-    at_rest = bool(np.all(np.abs(gradient * deviations)[fitted] < 1e-2))
+    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < 1e-2)
     half = math.sqrt(CHI2_95) * deviations
+    room = bounds.about(value)
+    if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
+        # None can come to a bound, since following another moves it by 1.96 of its own at most.
+        return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
     # The others follow a parameter that is moved to an end of its interval.
     sizes = np.where(deviations > 0.0, deviations, 1.0)
     step = matrix[:, indices] * (half / sizes**2)[indices]
-    room = bounds.about(value)
     inside = (
         (-step >= room.lower[:, None]) & (-step <= room.upper[:, None]),
         (step >= room.lower[:, None]) & (step <= room.upper[:, None]),

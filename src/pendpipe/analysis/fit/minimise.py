@@ -17,6 +17,8 @@ from pendpipe.arrays import FloatArray
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
 _SMALL: Final = 1e4
 _KEPT: Final = 1e-3
+_FORESEEN: Final = 1e-2
+"""Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
 
 
 class Quadratic(NamedTuple):
@@ -34,6 +36,10 @@ class Minimum(NamedTuple):
     quadratic: Quadratic
     converged: bool
     evaluations: int
+    at: FloatArray
+    """Where chi^2 was looked at: `value`, or what the last step, taken on trust, began from."""
+    gained: float = 0.0
+    """By what that step lowers chi^2."""
 
 
 def minimise(
@@ -44,6 +50,7 @@ def minimise(
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
     chi2_only: Callable[[FloatArray], float] | None = None,
+    foresee: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
     most: int = 60,
 ) -> Minimum:
     """Minimise chi^2 by damped Gauss-Newton steps that respect bounds.
@@ -63,6 +70,9 @@ def minimise(
         chi^2 at a point, where that costs less. A step that lowers chi^2 by 1 +- e times
         what it promised is itself off by about e, and leaves e^2 of that to be gained: if
         this is below 1e-3 (0.03 standard deviations), it needs no new derivatives.
+    foresee
+        What a step leaves to be gained, from its two ends, the quadratic at the first and
+        what that promises. Below 1e-2 the step is taken on trust.
     most
         Greatest number of evaluations.
     """
@@ -76,24 +86,29 @@ def minimise(
         step = bounded_step(damped, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         if promised < tolerance and level < 3:
-            return Minimum(bounds.clip(value + step), _moved(now, step), True, spent)
+            return Minimum(
+                bounds.clip(value + step), _moved(now, step), True, spent, value, promised
+            )
         trial = bounds.clip(value + step)
-        if chi2_only is not None and level == 0 and promised < _SMALL:
+        near = level == 0 and promised < _SMALL
+        if foresee is not None and near and foresee(value, trial, now, promised) < _FORESEEN:
+            return Minimum(trial, _moved(now, step), True, spent, value, promised)
+        if chi2_only is not None and near:
             reached = now.chi2 - chi2_only(trial)
             if (reached - promised) ** 2 < _KEPT * promised:
-                return Minimum(trial, _moved(now, step), True, spent)
+                return Minimum(trial, _moved(now, step), True, spent, trial)
         then = evaluate(trial)
         spent += 1
         if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:
             if now.chi2 - then.chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2:
-                return Minimum(trial, then, True, spent)
+                return Minimum(trial, then, True, spent, trial)
             value, now = trial, then
             level = max(level - 2, 0)
         elif level == len(_DAMPING) - 1:
-            return Minimum(value, now, False, spent)
+            return Minimum(value, now, False, spent, value)
         else:
             level += 1
-    return Minimum(value, now, False, spent)
+    return Minimum(value, now, False, spent, value)
 
 
 def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
@@ -44,7 +42,8 @@ def judge_noise(
         rms = points.noise_rms_rad
     else:
         rms = white_rms(residual)
-    rms = max(rms, floor, 1e-15 * float(np.max(np.abs(problem.values))))
+    largest = max(float(problem.values.max()), -float(problem.values.min()))
+    rms = max(rms, floor, 1e-15 * largest)
     return Noise(rms, _slow(points, residual, problem.time_s, rms))
 
 

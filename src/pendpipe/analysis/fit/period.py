@@ -24,8 +24,9 @@ class Period(NamedTuple):
 
 
 def period_excess(
-    amplitude: FloatArray, angular_frequency: float, a: float, b: float, c: float, share: float
-) -> FloatArray:
+    amplitude: FloatArray | float, angular_frequency: float, a: float, b: float, c: float,
+    share: float,
+) -> FloatArray:  # fmt: skip
     """Relative lengthening of a half period by the losses of Eq. 8, to second order.
 
     ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2

@@ -110,10 +110,11 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     A bound is not used: what it would take off the standard deviations depends on where
     the truth lies, so they are those of the free estimate.
     """
-    free = np.array([j for j in range(len(normal)) if j not in held], dtype=np.int64)
-    part = normal[np.ix_(free, free)]
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))
-    scaled = part * scale[:, None] * scale
+    free = [j for j in range(len(normal)) if j not in held]
+    part = normal if len(free) == len(normal) else normal[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    scales = scale[:, None] * scale
+    scaled = part * scales
     try:
         inverse = np.linalg.inv(scaled)
         sound = bool(np.abs(inverse).max(initial=0.0) < _SINGULAR)
@@ -121,7 +122,7 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
         sound = False
     if not sound:
         inverse = np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
-    inverse *= scale[:, None] * scale
+    inverse *= scales
     if len(free) == len(normal):
         return np.asarray(inverse)
     result = np.zeros_like(normal)

@@ -88,7 +88,7 @@ def _first_place(samples: Samples, values: FloatArray) -> _First | None:
     # The last may still grow. A line through the places; the slope from halves of them.
     count = min(len(index) - 1, 24) // 2 * 2
     peak = values[index[:count]]
-    level = 0.25 * float(np.mean(peak[:-2] + 2.0 * peak[1:-1] + peak[2:]))
+    level = 0.25 * float((peak[:-2] + 2.0 * peak[1:-1] + peak[2:]).sum()) / (count - 2)
     at, half_period = _halves(index[:count])
     while at < 0.5 * half_period:
         at, side = at + half_period, -side
@@ -104,7 +104,7 @@ def _first_place(samples: Samples, values: FloatArray) -> _First | None:
 def _halves(places: FloatArray | IntArray) -> tuple[float, float]:
     """First place and spacing of an even number of evenly spaced ones."""
     half = len(places) // 2
-    early, late = float(places[:half].mean()), float(places[half:].mean())
+    early, late = float(places[:half].sum()) / half, float(places[half:].sum()) / half
     spacing = (late - early) / half
     return early - 0.5 * (half - 1) * spacing, spacing
 
@@ -114,8 +114,8 @@ def _begun(samples: Samples, columns: FloatArray) -> Quick | None:
     y, noise = np.abs(columns[2]), samples.noise_rms
     start_s, stop_s = float(samples.time_s[0]), float(samples.time_s[-1])
     found = decay(columns[0], y, float(columns[3, 0]))
-    a, b, c, y0, half_period, first_s = (float(number) for number in found)
-    if not (np.all(np.isfinite(found)) and half_period > 0.0):
+    a, b, c, y0, half_period, first_s = found.tolist()
+    if not (math.isfinite(sum(found.tolist())) and half_period > 0.0):
         return None
     omega = math.pi / half_period
     if not a * y0 + b + c / float(y[-1]) < _SLIGHT * omega:
@@ -131,8 +131,8 @@ def _begun(samples: Samples, columns: FloatArray) -> Quick | None:
         for _ in range(4):
             middle = 0.5 * (last + angle)
             angle = last + half_period * ((a * middle + b) * middle + c)
-        between = np.array([0.5 * (last + angle)])
-        when -= half_period * (1.0 + float(period_excess(between, omega, a, b, c, 0.5)[0]))
+        between = 0.5 * (last + angle)
+        when -= half_period * (1.0 + float(period_excess(between, omega, a, b, c, 0.5)))
         side = -side
         earlier.insert(0, (when, side * angle))
     last_s, end = float(columns[0, -1]), float(columns[2, -1])
@@ -150,5 +150,6 @@ def _begun(samples: Samples, columns: FloatArray) -> Quick | None:
         step_rad=samples.step or 0.0, start_s=start_s, stop_s=stop_s, samples=len(samples),
         unit=samples.unit,
     )  # fmt: skip
-    value = np.array([a, b, c, omega, side * angle, when, float(columns[4].mean()), 0.5])
+    level = float(columns[4].sum()) / columns.shape[1]
+    value = np.array([a, b, c, omega, side * angle, when, level, 0.5])
     return Quick(points, Start(value, before - front, len(points), ()))

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
-
 from pendpipe.analysis.fit.waveform import OMEGA, SHARE, B
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
@@ -40,10 +38,13 @@ def split_quality_factors(
     if not 0.0 < sd < _KNOWN or value[B] <= 0.0:
         return None, None, []
     b, share = float(value[B]), float(value[SHARE])
-    both = np.ix_([B, SHARE], [B, SHARE])
+    variance_b, variance_share = float(covariance[B, B]), float(covariance[SHARE, SHARE])
+    mixed = 2.0 * b * float(covariance[B, SHARE])
     parts = []
-    for part, gradient in ((share, [share, b]), (1.0 - share, [1.0 - share, -b])):
-        rate_sd = math.sqrt(float(np.array(gradient) @ covariance[both] @ np.array(gradient)))
+    for part, sign in ((share, 1.0), (1.0 - share, -1.0)):
+        # Of the product b x part.
+        variance = part**2 * variance_b + sign * part * mixed + b**2 * variance_share
+        rate_sd = math.sqrt(max(variance, 0.0))
         parts.append(_quality_factor(part * b, rate_sd, float(value[OMEGA])))
     return parts[0], parts[1], [_CAVEAT]
 

@@ -75,7 +75,7 @@ def _tracked(
     interval = even_interval(samples.time_s)
     if interval is None:
         return None
-    cores = min(os.cpu_count() or 1, _CORES, max(1, len(samples) // (2 * block)))
+    cores = min(_cores(), _CORES, max(1, len(samples) // (2 * block)))
     starts = [len(samples) * k // cores for k in range(cores)]
     heads = [_start(samples, start, measure_block, block // 64) for start in starts]
     known = [head for head in heads if head is not None]
@@ -113,6 +113,13 @@ def _tracked(
         angle_sd_rad=angle_sd, level_rad=level, level_sd_rad=noise / math.sqrt(told),
         noise_rms_rad=noise,
     )  # fmt: skip
+
+
+def _cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _start(

@@ -99,10 +99,10 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
     """
     piece = values[: 1 << 18]
     for extreme in (low, high):
-        count, runs = stays(piece, extreme)
-        share = count / len(piece)
+        share = np.count_nonzero(piece == extreme) / len(piece)
         if share <= _SATURATED:
             continue
+        count, runs = stays(piece, extreme)
         levels = np.unique(piece)
         step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
         expected = math.sqrt(max(step, 1e-12) / (high - low))
