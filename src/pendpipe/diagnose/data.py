@@ -12,6 +12,8 @@ from pendpipe.arrays import BoolArray, FloatArray
 _DITHERS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step that is tried."""
 _WORTH: Final = 12.0
+_MOST_UNEVEN: Final = 3
+"""Times `most`: how many uneven readings are taken."""
 _LEAST_IN_A_CYCLE: Final = 24.0
 """Means of readings: the fifth harmonic loses 7 %, and the fundamental's loss is known."""
 
@@ -143,6 +145,14 @@ def fast_length(count: int) -> int:
         count -= 1
 
 
+def at_even_times(data: Data, time_s: FloatArray) -> Data:
+    """The same readings at an even clock's times; evenly spaced where none is missing."""
+    interval = float(np.median(np.diff(time_s)))
+    even = bool(np.all(np.abs(np.diff(time_s) - interval) < 1e-3 * interval))
+    moved = replace(data, time_s=time_s, interval_s=interval, uniform=even)
+    return moved.first(fast_length(len(data))) if even else moved
+
+
 def gather(
     time_s: FloatArray, values: FloatArray, *, step: float | None, unit: str, counts: bool,
     period_s: float, noise_rms: float, most: int = 4000,
@@ -166,6 +176,10 @@ def gather(
     if uniform:
         # The whitening's transforms are ten times slower where the length has a large prime.
         time_s, values = time_s[: fast_length(len(time_s))], values[: fast_length(len(values))]
+    elif len(time_s) > _MOST_UNEVEN * most:
+        # Means of uneven readings would be means of uneven phases: every k-th is taken.
+        keep = slice(None, None, len(time_s) // (_MOST_UNEVEN * most) + 1)
+        time_s, values = time_s[keep], values[keep]
     return Data(
         time_s, values, interval, uniform, np.ones(len(time_s)),
         (step or 0.0) if fold == 1 else 0.0, unit,

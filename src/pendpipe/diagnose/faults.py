@@ -12,9 +12,11 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnose.data import at_even_times
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.naming import Rival, equivalent
+from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import refine
@@ -29,6 +31,8 @@ _BEHIND: Final = (
 )  # fmt: skip
 _EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
+_IN_PHASE: Final = 0.3
+"""Slip in rad up to which residuals tell the stamps' errors."""
 _BEFORE_CURVES: Final = 15.0
 """By how much random kicks are preferred to a curve in time, which follows any of them."""
 
@@ -47,9 +51,11 @@ class Forensics:
     def __init__(self, samples: Samples, level: float) -> None:
         self.samples, self.level = samples, level
         self.p_value = 1.0
+        self.said: list[str] = []
 
     def before(self, state: State, progress: Progress) -> None:
-        """Mend what would corrupt the fit: lost samples, clipping, glitches."""
+        """Mend what would corrupt the fit: stamps, lost samples, clipping, glitches."""
+        self._mend_stamps(state, progress)
         self._mend_clock(state, progress)
         if is_gross(state.fit, state.data):
             return
@@ -86,6 +92,23 @@ class Forensics:
         fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
         state.settle(fit, data, noise)
         return True
+
+    def _mend_stamps(self, state: State, progress: Progress) -> None:
+        """Take an even clock's times where the readings are evener than their stamps."""
+        if state.fit.slip_rad > _IN_PHASE or self.said:
+            return
+        finding = TESTS["time-stamps"](state.data, state.fit, state.noise, self.samples)
+        if finding.time_s is None or finding.p_value > self.level * _EACH:
+            return
+        data = at_even_times(state.data, finding.time_s)
+        noise = white_noise(data, state.noise.white_rms)
+        model = state.fit.model.at_times(data.time_s)
+        fit = refine(model, data, noise, state.fit.value, held=state.holding)
+        if fit.chi2 / data.used > state.fit.chi2 / state.data.used:
+            return
+        progress(finding.summary)
+        self.said.append(finding.summary)
+        state.settle(fit, data, noise)
 
     def _mend_clock(self, state: State, progress: Progress) -> None:
         """Put the readings behind lost samples where they belong."""

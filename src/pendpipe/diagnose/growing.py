@@ -23,12 +23,15 @@ from pendpipe.effects.model import Model
 _FIRST: Final = 4
 """Cycles of the first window."""
 _GROWTH: Final = 1.6
+_CLOSER: Final = 1.1
+"""Where much of the record is known."""
 _ROUNDS: Final = 8
 
 
 def grown(
-    model: Model, data: Data, noise_rms: float, start: FloatArray, *, held: Iterable[int] = ()
-) -> FloatArray:
+    model: Model, data: Data, noise_rms: float, start: FloatArray, *, held: Iterable[int] = (),
+    first: int | None = None,
+) -> FloatArray:  # fmt: skip
     """Fit the beginning of a record, then more and more of it.
 
     Parameters
@@ -43,6 +46,8 @@ def grown(
         Values that are right for the first cycles at least (from turning points).
     held
         Indices of what is not fitted.
+    first
+        How many readings the start values are right for, if known.
 
     Returns
     -------
@@ -56,12 +61,15 @@ def grown(
     """
     value = np.asarray(start, dtype=np.float64)
     fixed = tuple(held)
-    count = int(_FIRST * 2.0 * np.pi / value[OMEGA] / data.interval_s)
+    count = first or int(_FIRST * 2.0 * np.pi / value[OMEGA] / data.interval_s)
+    growth = _GROWTH if first is None else _CLOSER
+    if first is not None:
+        count = int(growth * count)
     while count < len(data):
         part = data.first(count)
         short = replace(model, time_s=part.time_s, _last={})
         value = refine(
             short, part, white_noise(part, noise_rms), value, held=fixed, rounds=_ROUNDS
         ).value
-        count = int(_GROWTH * count)
+        count = int(growth * count) + 1
     return value

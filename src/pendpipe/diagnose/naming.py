@@ -19,18 +19,23 @@ from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
 _MOST: Final = 9
 _NEAR: Final = 16.0
 _ALIKE: Final = 0.98
+_LARGEST: Final = 0.5
+"""Of the first amplitude: what an effect may add to the reading."""
 _LOST: Final = 1.0
 """Phase in rad from which a model has lost the motion."""
 _FROM_AFAR: Final = 4
 """How many leads are then followed from the first cycles on."""
 _SHAPE: Final = 2.0
 """What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
+_SIZE: Final = 6.0
+"""What a further size takes off a gain too large for p-values."""
 _MUCH: Final = 0.5
 """Part of the best gain that a name must explain to go before a curve."""
 
@@ -73,7 +78,7 @@ def refit_leads(
         fit = _refitted(base, data, noise, lead, held)
         if base.slip_rad > _LOST and len(fits) < _FROM_AFAR:
             fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
-        if fit is not None:
+        if fit is not None and _believable(base, fit, lead.effect):
             fits.append((lead, fit))
     if not fits:
         return []
@@ -126,7 +131,7 @@ def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]
     if not leads:
         return []
     best = _rank(leads[0])
-    near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.6 if gross else 0.3) * best]
+    near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.9 if gross else 0.3) * best]
     return near[: most + 2 if gross else most]
 
 
@@ -155,14 +160,30 @@ def evidence(lead: Lead, gain: float, chance: Chance) -> float:
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(gammaincc(0.5 * effect.sizes, 0.5 * gain))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
-    p_value = trials.global_p_value(local) if local > 1e-290 else 0.0
-    worth = equivalent(p_value, gain - _cost(effect.sizes, effect.count - effect.sizes, trials))
-    return worth - _SHAPE * max(effect.count - effect.sizes, 0) * (p_value > 0.0) + effect.prior
+    if local > 1e-290:
+        worth = equivalent(trials.global_p_value(local), gain)
+    else:
+        # Too large for p-values: what trials and further sizes take off a large gain.
+        worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (effect.sizes - 1)
+    fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
+    return worth - _SHAPE * max(fitted, 0) + effect.prior
 
 
-def _cost(sizes: int, shapes: int, trials: Trials) -> float:
-    """What free values and trials take off a gain too large for p-values."""
-    return 2.0 * math.log(max(trials.first, 1.0)) + 6.0 * (sizes - 1) + _SHAPE * shapes
+def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
+    """Whether displacements that an effect adds are smaller than the motion itself.
+
+    Two tones of nearly one frequency can take each other's place: a second that is as large
+    as the first describes a change of phase, and no second mode.
+    """
+    if effect.kind == "unnamed":
+        return True
+    first = len(base.value) + effect.switch
+    sizes = [
+        float(fit.value[first + index])
+        for index, parameter in enumerate(effect.parameters[: effect.sizes])
+        if parameter.unit == "rad"
+    ]
+    return math.hypot(*sizes) < _LARGEST * base.at.span.first_amplitude
 
 
 def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:

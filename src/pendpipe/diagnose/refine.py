@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE
+from pendpipe.effects.baseline import OMEGA, SHARE, C
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.effects.evaluated import Evaluated
 from pendpipe.effects.model import Model
@@ -49,6 +49,8 @@ class Fit:
         Whether the last step was negligible.
     slip_rad
         The largest phase by which model and readings differ.
+    spread
+        Factor of all standard deviations, for what is left beyond the noise.
     """
 
     model: Model
@@ -60,6 +62,7 @@ class Fit:
     free: tuple[int, ...]
     converged: bool
     slip_rad: float
+    spread: float = 1.0
 
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
@@ -69,7 +72,7 @@ class Fit:
         scale[scale == 0.0] = 1.0
         inverse = np.linalg.pinv(part / scale, rcond=1e-12)
         matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
-        return matrix
+        return self.spread**2 * matrix
 
 
 def pulled(fit: Fit) -> list[int]:
@@ -115,22 +118,16 @@ def refine(
         columns = _jacobian(model, noise, value, at)
         step = _step(columns, residual, free, value, low, high)
         promised = float(residual @ residual - np.sum((residual - columns @ step) ** 2))
-        accepted = False
-        for shrink in (1.0, 0.3, 0.1, 0.02):
-            trial = np.clip(value + shrink * step, low, high)
-            try:
-                there = model.evaluate(trial)
-            except NoMotionError:
-                continue
-            new, new_slip = _residual(data, noise, there, trial)
-            if new @ new < residual @ residual + 0.5 * _SETTLED:
-                accepted = True
-                break
-        if not accepted:
+        tried = _tried(model, data, noise, value, step, residual)
+        if tried is None and C in free:
+            # More friction would stop it before the last reading: the others go first.
+            step = _step(columns, residual, free[free != C], value, low, high)
+            tried = _tried(model, data, noise, value, step, residual)
+        if tried is None:
             converged = promised < 10.0 * _SETTLED
             break
-        gained = float(residual @ residual - new @ new)
-        value, at, residual, slip = trial, there, new, new_slip
+        gained = float(residual @ residual - tried.residual @ tried.residual)
+        value, at, residual, slip = tried
         if promised < _SETTLED or (gained < _SETTLED and promised < 1.0):
             converged = True
             break
@@ -139,6 +136,31 @@ def refine(
         model, value, float(residual @ residual), residual, columns, at, tuple(free.tolist()),
         converged, slip,
     )  # fmt: skip
+
+
+class _Tried(NamedTuple):
+    value: FloatArray
+    at: Evaluated
+    residual: FloatArray
+    slip_rad: float
+
+
+def _tried(
+    model: Model, data: Data, noise: Noise, value: FloatArray, step: FloatArray,
+    residual: FloatArray,
+) -> _Tried | None:  # fmt: skip
+    """Go along a step as far as it lowers chi^2; None where it does nowhere."""
+    low, high = model.bounds()
+    for shrink in (1.0, 0.3, 0.1, 0.02):
+        trial = np.clip(value + shrink * step, low, high)
+        try:
+            there = model.evaluate(trial)
+        except NoMotionError:
+            continue
+        new, slip = _residual(data, noise, there, trial)
+        if new @ new < residual @ residual + 0.5 * _SETTLED:
+            return _Tried(trial, there, new, slip)
+    return None
 
 
 def _residual(

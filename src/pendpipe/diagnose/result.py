@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pendpipe.diagnose.held_out import HeldOut
 from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.remainder import Remainder
 from pendpipe.estimate import Estimate
 
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
@@ -110,6 +111,8 @@ class Diagnosis:
         None where nothing was added.
     unexplained_rms_rad, unexplained_p_value
         What is left at the end.
+    remainder
+        The same taken apart: its size over the noise, and where it lies.
     statement
         One paragraph.
     """
@@ -127,6 +130,7 @@ class Diagnosis:
     statement: str
     warnings: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
+    remainder: Remainder | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
@@ -149,6 +153,7 @@ class Diagnosis:
             "unexplained": {
                 "residual_rms_rad": self.unexplained_rms_rad,
                 "p_value": self.unexplained_p_value,
+                **({} if self.remainder is None else self.remainder.as_json()),
             },
             "statement": self.statement,
             "figures": list(self.figures),

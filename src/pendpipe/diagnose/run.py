@@ -12,6 +12,7 @@ import numpy as np
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.diagnose.begin import Beginning, begin
+from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.freed import freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
 from pendpipe.diagnose.progress import Progress, silent
@@ -73,7 +74,7 @@ def diagnose_recording(
     points, part = measure_recording(recording.as_motion(), place)
     return diagnose_decay(
         part, points, baseline=baseline, fixed=fixed, seed=seed, level=level, place=place,
-        provenance=provenance, progress=progress,
+        provenance=provenance, progress=progress, whole=recording,
     )  # fmt: skip
 
 
@@ -83,9 +84,12 @@ def diagnose_decay(
     part: Recording, points: Any, *, baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None, seed: int = 0, level: float = LEVEL,
     place: str | Path = "recording", provenance: Mapping[str, Any] | None = None,
-    progress: Progress = silent,
+    progress: Progress = silent, whole: Recording | None = None,
 ) -> Outcome:  # fmt: skip
-    """The same for a free decay whose turning points are known."""
+    """The same for a free decay whose turning points are known.
+
+    Of the `whole` recording that it was cut from only the time stamps are looked at.
+    """
     from pendpipe.effects.catalogue import CATALOGUE
 
     fixed = fixed or {}
@@ -99,6 +103,11 @@ def diagnose_decay(
         *(fault_named(found, fault) for fault in found.faults),
         *(effect_named(found, beginning, step) for step in found.steps),
     )
+    gap = gap_note(
+        (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
+    )  # fmt: skip
+    stamps = (*([gap] if gap else []), *found.said)
+    notes = (*points.notes, *stamps)
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
     after = _judged(found.improved, found)
@@ -110,9 +119,10 @@ def diagnose_decay(
         "missing-physics" if named else "consistent", found.p_value, named, held,
         after.residual_rms_rad, found.unexplained,
         statement(
-            baseline, before, after, named, held, rms, found.unexplained, level
+            baseline, before, after, named, held, rms, found.unexplained, level,
+            unit=found.data.unit, remainder=found.remainder, notes=stamps,
         ),
-        warnings=points.notes, provenance=dict(provenance or {}),
+        warnings=notes, remainder=found.remainder, provenance=dict(provenance or {}),
     )  # fmt: skip
     return Outcome(diagnosis, found, beginning)
 

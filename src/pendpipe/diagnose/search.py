@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
@@ -12,11 +12,14 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, detect, prepare
 from pendpipe.diagnose.faults import CATALOGUE_SHARE, Forensics
 from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.large_first import large_first
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.redness import doubt_redness
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.remainder import Remainder, remainder_of
+from pendpipe.diagnose.review import credible, describe_rest, withdraw_doubtful
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
@@ -27,6 +30,15 @@ _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
 _PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
+_MAIN: Final = 0.5
+"""The same while large amplitudes are looked at by themselves: only what rules there."""
+
+
+class Reviewed(NamedTuple):
+    """A model, and what it leaves."""
+
+    fit: Fit
+    remainder: Remainder
 
 
 @dataclass(frozen=True)
@@ -51,6 +63,15 @@ class Search:
         Global p-value of what is left at the end.
     detection
         The first: of the baseline.
+    held
+        Indices of what was not fitted in the extended model.
+    remainder
+        What the extended model leaves beyond the noise.
+    named
+        The extended model by which names are weighed: without the curve that has been drawn
+        over what they leave.
+    said
+        What the tests of the time stamps have found, a clause each.
     """
 
     data: Data
@@ -62,7 +83,10 @@ class Search:
     p_value: float
     unexplained: float
     detection: Detection
-    held: tuple[int, ...] = field(default=())
+    held: tuple[int, ...]
+    remainder: Remainder
+    named: Reviewed
+    said: tuple[str, ...] = ()
 
 
 def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
@@ -84,6 +108,48 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
     return [*named, *(curve for curve in curves if curve.key not in drawn)]
 
 
+@dataclass(frozen=True)
+class Task:
+    """What a search is asked, and what it asks with.
+
+    Parameters
+    ----------
+    catalogue, freed
+        The effects that may be missing, and the held parameters that may be wrong.
+    baseline, level, seed
+        As in `search`.
+    forensics
+        The tests of the measurement.
+    progress
+        Is told each step.
+    """
+
+    catalogue: Sequence[Effect]
+    freed: Sequence[FreedParameter]
+    baseline: str
+    level: float
+    seed: int
+    forensics: Forensics
+    progress: Progress
+
+    @property
+    def threshold(self) -> float:
+        """The catalogue's part of the level."""
+        return self.level * CATALOGUE_SHARE
+
+    def scanned(self, state: State) -> list[Effect]:
+        """Score all that may be missing on what a state leaves (`state.now`)."""
+        effects = [
+            *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
+            *(entry for entry in self.freed if entry.index in state.holding),
+        ]
+        self.progress(f"scanning {len(effects)} effects")
+        scanner = prepare(state.fit, state.data, state.noise, effects)
+        state.now = detect(scanner, state.fit, seed=self.seed, known=state.now)
+        state.first = state.first or state.now
+        return effects
+
+
 def search(
     beginning: Beginning, samples: Samples, catalogue: Sequence[Effect], *, baseline: str,
     level: float, seed: int, freed: Sequence[FreedParameter] = (), progress: Progress = silent,
@@ -96,44 +162,67 @@ def search(
     state = State(fit, data, white, held, beginning.value, fit.value)
     state.settle(fit)
     forensics = Forensics(samples, level)
+    task = Task(catalogue, freed, baseline, level, seed, forensics, progress)
+    large_first(beginning, state, lambda part: _add_one(part, task, _MAIN))
     while len(state.steps) < _MOST:
         forensics.before(state, progress)
-        if not _add_one(state, forensics, catalogue, freed, baseline, level, seed, progress):
+        if not _add_one(state, task):
             break
     _prune(state, progress)
+    named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
     assert state.first is not None
     assert state.now is not None
     return Search(
-        state.data, state.noise, _baseline_alone(state, beginning), state.fit,
-        tuple(state.steps), tuple(state.faults),
+        state.data, state.noise, _baseline_alone(state, beginning),
+        replace(state.fit, spread=remainder.spread), tuple(state.steps), tuple(state.faults),
         min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value, 1.0),
         min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
+        remainder, named or Reviewed(state.fit, remainder), tuple(forensics.said),
     )  # fmt: skip
+
+
+def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
+    """Keep the names that stand against what is left, describe the rest, and measure it.
+
+    Where a curve is drawn on top of them, the names' model is handed back as well.
+    """
+    before = state.fit
+    withdraw_doubtful(state, task.level, task.progress)
+    remainder = remainder_of(state.fit, state.data, state.noise)
+    if state.fit is not before or len(state.steps) >= _MOST:
+        task.scanned(state)
+    if not remainder.systematic or _drawn(state):
+        return None, remainder
+    assert state.now is not None
+    named = Reviewed(replace(state.fit, spread=remainder.spread), remainder)
+    if describe_rest(state, state.now, state.now.p_value / CATALOGUE_SHARE):
+        task.scanned(state)
+    return named, remainder_of(state.fit, state.data, state.noise)
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were mended."""
     model = replace(state.fit.model, effects=(), _last={})
-    return refine(model, state.data, state.noise, state.bare, held=beginning.held)
+    fault = NoMotionError("it stops")
+    for start in (state.bare, beginning.value):
+        try:
+            return refine(model, state.data, state.noise, start, held=beginning.held)
+        except NoMotionError as found:
+            fault = found
+    raise fault
 
 
-def _add_one(
-    state: State, forensics: Forensics, catalogue: Sequence[Effect],
-    freed: Sequence[FreedParameter], baseline: str, level: float, seed: int, progress: Progress,
-) -> bool:  # fmt: skip
-    """Scan the catalogue, and add the best effect if it is needed; say whether to go on."""
-    gross, threshold = is_gross(state.fit, state.data), level * CATALOGUE_SHARE
-    effects = [
-        *applicable(catalogue, state.fit, baseline, state.data.unit),
-        *(entry for entry in freed if entry.index in state.holding),
-    ]
-    progress(f"scanning {len(effects)} effects")
-    scanner = prepare(state.fit, state.data, state.noise, effects)
-    state.now = detect(scanner, state.fit, seed=seed, known=state.now)
-    state.first = state.first or state.now
+def _add_one(state: State, task: Task, share: float = _PART) -> bool:
+    """Scan the catalogue, and add the best effect if it is needed; say whether to go on.
+
+    Of a gross misfit it must explain a `share`.
+    """
+    gross, threshold, progress = is_gross(state.fit, state.data), task.threshold, task.progress
+    effects = task.scanned(state)
+    assert state.now is not None
     if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
-        doubt_redness(state, effects, threshold, seed, progress)
+        doubt_redness(state, effects, threshold, task.seed, progress)
     if state.now.p_value > threshold or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
@@ -141,11 +230,16 @@ def _add_one(
         state.fit, state.data, state.noise, state.now, held=state.holding, gross=gross,
         origin=state.origin,
     )  # fmt: skip
-    if not gross and rivals and forensics.kicked_at_random(state, rivals[0], progress):
+    if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
         return False
-    if not rivals or rivals[0].gain <= max(_NEEDED, _PART * state.fit.chi2 if gross else 0.0):
+    if not rivals or rivals[0].gain <= max(_NEEDED, share * state.fit.chi2 if gross else 0.0):
         return False
-    state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit))
+    step = Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit)
+    if gross and state.steps and not credible(step, state, task.level):
+        return False
+    if share == _MAIN and rivals[0].lead.effect.kind == "unnamed":
+        return False
+    state.steps.append(step)
     winner = rivals[0]
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
     if isinstance(winner.lead.effect, FreedParameter):
@@ -155,7 +249,9 @@ def _add_one(
 
 
 def _prune(state: State, progress: Progress) -> None:
-    """Drop what later effects have made needless."""
+    """Drop what later effects have made needless; a curve may take anyone's place, and is none."""
+    if _drawn(state):
+        return
     for step in list(state.steps[:-1]):
         effect = step.winner.lead.effect
         if isinstance(effect, FreedParameter):

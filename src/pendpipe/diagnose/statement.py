@@ -3,48 +3,87 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from pendpipe.diagnose.held_out import HeldOut
+from pendpipe.diagnose.remainder import Remainder
 from pendpipe.diagnose.result import Judged, Named
 from pendpipe.estimate import Estimate
 
+_SURE: Final = 0.5
+"""Probability below which a name is said with a perhaps."""
+_SMALLEST: Final = 1e-12
+"""p-values below it rest on tails that nobody has tested."""
 _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 
 
 def statement(
     baseline: str, before: Judged, after: Judged, effects: Sequence[Named],
-    held: HeldOut | None, noise_rms: float, unexplained: float, level: float,
+    held: HeldOut | None, noise_rms: float, unexplained: float, level: float, *,
+    unit: str = "rad", remainder: Remainder | None = None, notes: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """Say where it differs, what was left out, how much better the fit is, what is open."""
     model = _NAMES.get(baseline, baseline)
+    stamps = [f"Of the record itself: {'; '.join(notes)}."] if notes else []
     if not effects:
-        return (
-            f"{model} describes the recording: what it leaves ({before.residual_rms_rad:.3g} rad)"
-            f" is noise ({noise_rms:.3g} rad), and nothing in the catalogue does better than chance"
-            f" (global p = {unexplained:.2g})."
+        said = (
+            f"{model} describes the recording: what it leaves"
+            f" ({before.residual_rms_rad:.3g} {unit}) is noise ({noise_rms:.3g} {unit}), and"
+            f" nothing in the catalogue does better than chance (global {_chance(unexplained)})."
         )
-    said = [f"{model} leaves {before.residual_rms_rad:.3g} rad where the noise is {noise_rms:.3g}."]
-    said += [_effect(effect) for effect in effects]
-    said.append(
-        f"With {'it' if len(effects) == 1 else 'them'} the residual falls to"
-        f" {after.residual_rms_rad:.3g} rad (chi^2 per degree of freedom"
-        f" {before.chi2_per_dof:.4g} to {after.chi2_per_dof:.4g})"
-        + (
-            f", and blocks held out are predicted better by {held.gain:.4g} +- {held.gain_sd:.2g}"
-            " in log density."
-            if held is not None
-            else "."
-        )
-    )
+        return " ".join([said, *stamps])
+    said = [
+        f"{model} leaves {before.residual_rms_rad:.3g} {unit} where the noise is"
+        f" {noise_rms:.3g} {unit}.",
+        *(_effect(effect) for effect in effects),
+        _improvement(len(effects), before, after, held, unit),
+    ]
     moved = _moved(before.parameters, after.parameters)
     if moved:
         said.append(f"The omission had falsified {moved}.")
-    said.append(
-        f"Nothing else stands out (global p = {unexplained:.2g})."
-        if unexplained > level
-        else f"Something is left that has not been explained (global p = {unexplained:.2g})."
+    return " ".join([*said, _open(unexplained, level, remainder), *stamps])
+
+
+def _improvement(
+    number: int, before: Judged, after: Judged, held: HeldOut | None, unit: str
+) -> str:
+    text = (
+        f"With {'it' if number == 1 else 'them'} the residual falls to"
+        f" {after.residual_rms_rad:.3g} {unit} (chi^2 per degree of freedom"
+        f" {before.chi2_per_dof:.4g} to {after.chi2_per_dof:.4g})"
     )
-    return " ".join(said)
+    if held is None:
+        return text + "."
+    return (
+        f"{text}, and blocks held out are predicted better by {held.gain:.4g} +-"
+        f" {held.gain_sd:.2g} in log density."
+    )
+
+
+def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
+    """What is still open, and what that makes of names and errors."""
+    if remainder is None or not remainder.systematic:
+        if unexplained > level:
+            return f"Nothing else stands out (global {_chance(unexplained)})."
+        return f"Something is left that has not been explained (global {_chance(unexplained)})."
+    places = {
+        "level": "in the level", "amplitude": "in the amplitude of the motion",
+        "phase": "in its phase", "harmonics": "in its higher harmonics",
+        "between": "between the harmonics",
+    }  # fmt: skip
+    shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
+    where = ", ".join(f"{share:.0%} {places[name]}" for name, share in shares if share > 0.05)
+    return (
+        f"What is left is {remainder.over_noise:.3g} times the noise and has not been explained"
+        f" (global {_chance(unexplained)}; {where}): it is systematic, so that all errors given"
+        f" are {remainder.spread:.3g} times those of noise alone, and no name is believed more"
+        " than the part of the misfit that it explains."
+    )
+
+
+def _chance(p_value: float) -> str:
+    """A p-value in words that a computer's smallest number doesn't spoil."""
+    return f"p = {p_value:.2g}" if p_value >= _SMALLEST else f"p < {_SMALLEST:.0e}"
 
 
 def _effect(effect: Named) -> str:
@@ -56,9 +95,10 @@ def _effect(effect: Named) -> str:
         )
     numbers = ", ".join(_number(name, each) for name, each in effect.parameters.items())
     kind = {"dynamics": "physics", "measurement": "the measurement", "parameter": "a parameter"}
-    text = f"Left out is {effect.name} ({kind.get(effect.kind, effect.kind)}"
+    lead = "Left out is" if effect.probability > _SURE else "Left out is perhaps"
+    text = f"{lead} {effect.name} ({kind.get(effect.kind, effect.kind)}"
     text += f"; {numbers})" if numbers else ")"
-    text += f"{where} (Delta chi^2 = {effect.delta_chi2:.4g}, p = {effect.p_value:.2g})"
+    text += f"{where} (Delta chi^2 = {effect.delta_chi2:.4g}, {_chance(effect.p_value)})"
     if effect.indistinguishable:
         others = ", ".join(name for name, _ in effect.indistinguishable)
         text += f"; this recording cannot tell it from {others}: {effect.deciding}"

@@ -33,15 +33,20 @@ _SAME: Final = 0.02
 def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
     """One effect, weighed against its rivals with all the others in the model."""
     effect = step.winner.lead.effect
+    if effect.kind != "unnamed":
+        # A curve drawn over what the names leave could imitate any of them.
+        found = replace(found, improved=found.named.fit, remainder=found.named.remainder)
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
-    mates = [
-        rival for rival in rivals
+    own = _weighed(found, own, gain, gain)
+    others = [
+        _weighed(found, rival, rival.gain, gain) for rival in rivals
         if rival.lead.effect.kind != "unnamed" and rival.identifier != effect.identifier
-        and of_one_class(own, rival)
     ]  # fmt: skip
+    mates = [mate for mate in others if of_one_class(own, mate)]
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
+    weights = weights * _explained(found, gain)
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
         effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
@@ -52,6 +57,23 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
         curve_values(found.improved, effect, found.data.unit)
         if isinstance(effect, Curve) else None,
     )  # fmt: skip
+
+
+def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
+    """A rival as its gain counts beside the best, where much is left that no model explains."""
+    if not found.remainder.systematic:
+        return rival
+    # Relative to what the best leaves: m ln(excess) counts, for m independent numbers.
+    behind = max(best - gain, 0.0)
+    worth = -found.remainder.numbers * math.log1p(behind / max(found.remainder.excess, 1.0))
+    return replace(rival, gain=worth, evidence=worth + rival.lead.effect.prior)
+
+
+def _explained(found: Search, gain: float) -> float:
+    """The part of the misfit that a name explains: it is believed no more than that."""
+    if not found.remainder.systematic:
+        return 1.0
+    return max(gain, 0.0) / max(max(gain, 0.0) + found.remainder.excess, 1.0)
 
 
 def fault_named(found: Search, fault: Fault) -> Named:

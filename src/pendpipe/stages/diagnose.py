@@ -72,7 +72,8 @@ def diagnose_motion(
         if turning_points is None:
             return diagnose_recording(recording, **asked)
         points = read_turning_points(turning_points)
-        return diagnose_decay(recording.between(points.start_s, points.stop_s), points, **asked)
+        part = recording.between(points.start_s, points.stop_s)
+        return diagnose_decay(part, points, whole=recording, **asked)
     except NoMotionError as fault:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault

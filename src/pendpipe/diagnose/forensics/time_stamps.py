@@ -69,6 +69,29 @@ def find_gaps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     )  # fmt: skip
 
 
+def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
+    """Say in a line where stamps leave a gap; None where they don't.
+
+    Parameters
+    ----------
+    time_s
+        All stamps of a recording, whether the motion there is analysed or not.
+    half_period_s
+        Of the motion.
+    counts
+        Whether each row marks a count of an encoder, which is silent at rest.
+    """
+    found = np.flatnonzero(_gaps(time_s, half_period_s, counts))
+    if not len(found):
+        return None
+    lasts = np.diff(time_s)[found]
+    longest = int(np.argmax(lasts))
+    first = float(time_s[found[longest]])
+    many = "a gap" if len(found) == 1 else f"{len(found)} gaps, the longest"
+    note = f"the time stamps have {many} of {lasts[longest]:.4g} s behind {first:.5g} s"
+    return f"{note} (an encoder that writes its counts is silent at rest)" if counts else note
+
+
 def _gaps(time: FloatArray, half_period_s: float, counts: bool) -> BoolArray:
     intervals = np.diff(time)
     if counts:

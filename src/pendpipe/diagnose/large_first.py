@@ -1,0 +1,101 @@
+"""Large amplitudes first, where a misfit is gross: then the whole record, from what was found.
+
+Contacts and the Coulomb stop rule the last cycles of a record that goes down to rest, the
+restoring torque and the fluid its first. While both are wrong, the end alone loses the phase,
+and no step of Gauss and Newton can be taken that does not stop the pendulum too early. So the
+large amplitudes are searched by themselves, and the rest is added bit by bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.growing import grown
+from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.state import State, first_noise, is_gross
+from pendpipe.dynamics.any_law import NoMotionError
+
+_LARGE: Final = 0.2
+"""Of the first amplitude."""
+_FEWEST_CYCLES: Final = 8
+_SHORTER: Final = 0.97
+_CUTS: Final = 8
+
+
+def large_first(beginning: Beginning, state: State, add_one: Callable[[State], bool]) -> None:
+    """Search the large amplitudes of a gross misfit, and start the whole record from there.
+
+    Parameters
+    ----------
+    beginning
+        Of the search.
+    state
+        Behind the baseline's fit to the whole record; what is found goes into it.
+    add_one
+        Adds the best effect to a state, and says whether there was one.
+    """
+    count = _large_readings(beginning)
+    if count is None or not is_gross(state.fit, state.data):
+        return
+    part = _first_part(beginning, state, count)
+    if part is None:
+        return
+    while is_gross(part.fit, part.data) and add_one(part):
+        pass
+    fit = _over_all(part, state)
+    if fit is None or not fit.model.effects or fit.chi2 >= state.fit.chi2:
+        return
+    state.fit, state.steps, state.first = fit, part.steps, part.first
+    state.holding = part.holding
+
+
+def _large_readings(beginning: Beginning) -> int | None:
+    """How many readings are at large amplitudes; None where that is all, or too few."""
+    points, data = beginning.points, beginning.data
+    amplitude = np.abs(points.amplitude_rad)
+    inside = points.time_s <= data.time_s[-1]
+    if np.count_nonzero(inside) < 4 * _FEWEST_CYCLES:
+        return None
+    large = np.flatnonzero(amplitude[inside] > _LARGE * amplitude[inside].max())
+    last = int(large[-1])
+    if not 2 * _FEWEST_CYCLES < last < 0.9 * np.count_nonzero(inside):
+        return None
+    return int(np.searchsorted(data.time_s, points.time_s[last]))
+
+
+def _first_part(beginning: Beginning, state: State, count: int) -> State | None:
+    data = state.data.first(count)
+    model = replace(beginning.model, time_s=data.time_s, _last={})
+    noise = first_noise(replace(beginning, data=data, model=model))
+    try:
+        fit = refine(model, data, noise, beginning.value, held=state.holding)
+    except NoMotionError:
+        return None
+    part = State(fit, data, noise, list(state.holding), state.origin, fit.value)
+    part.settle(fit)
+    return part
+
+
+def _over_all(part: State, state: State) -> Fit | None:
+    """Follow what was found to the end of the record; `state` is cut where it cannot be."""
+    whole = state.data
+    for cut in range(_CUTS):
+        data = whole.first(int(len(whole) * _SHORTER**cut))
+        model = part.fit.model.at_times(data.time_s)
+        noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
+        try:
+            value = grown(
+                model, data, noise.white_rms, part.fit.value, held=part.holding,
+                first=len(part.data),
+            )  # fmt: skip
+            fit = refine(model, data, noise, value, held=part.holding)
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+        state.data, state.noise = data, noise
+        return fit
+    return None

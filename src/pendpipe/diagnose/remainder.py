@@ -1,0 +1,151 @@
+"""What a model leaves beyond the noise: how much, where, and what it makes of a name.
+
+A sum of squares that stays far above the noise's says that the model is wrong still. The
+rest is then no noise that was drawn anew with each reading, but some function of time that is
+not known, described by a few numbers (its Fourier coefficients that stand out). Against that,
+and not against the noise, names and errors are weighed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+
+_FLOOR: Final = 1.3
+"""Residual over noise from which a model is wrong still, whatever has been named."""
+_HARMONICS: Final = 4
+_STANDS_OUT: Final = 9.0
+"""Squares of unit numbers above which a coefficient is no noise."""
+_FEWEST: Final = 2.0
+_NAMES: Final = ("level", "amplitude", "phase", "harmonics", "between")
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left.
+
+    Parameters
+    ----------
+    excess
+        chi^2 beyond the degrees of freedom; never negative.
+    over_noise
+        Square root of chi^2 per degree of freedom.
+    numbers
+        How many independent numbers describe it.
+    shares
+        Parts of `excess` in the level, the amplitude and the phase of the motion, its higher
+        harmonics, and between them.
+    """
+
+    excess: float
+    over_noise: float
+    numbers: float
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def systematic(self) -> bool:
+        """Whether a model that leaves it is wrong still."""
+        return self.over_noise > _FLOOR
+
+    @property
+    def spread(self) -> float:
+        """Factor by which standard deviations grow: 1 where noise alone is left."""
+        if not self.systematic:
+            return 1.0
+        return math.sqrt(max(self.excess / self.numbers, self.over_noise**2, 1.0))
+
+    def worth(self, gain: float, excess: float | None = None) -> float:
+        """Return what a gain of chi^2 is worth where so much is left.
+
+        A function of unknown size that is described by m numbers makes the likelihood
+        (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), and never more than
+        itself.
+
+        Parameters
+        ----------
+        gain
+            Delta chi^2.
+        excess
+            What is left behind it; by default what is left now.
+        """
+        if not self.systematic:
+            return gain
+        left = self.excess if excess is None else excess
+        return min(gain, self.numbers * math.log1p(max(gain, 0.0) / max(left, 1.0)))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its part of ``diagnosis.json``."""
+        return {
+            "over_noise": self.over_noise, "independent_numbers": self.numbers,
+            "error_factor": self.spread, "systematic": self.systematic,
+            "shares": dict(self.shares),
+        }  # fmt: skip
+
+
+def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
+    """Take a fit's residual apart: by cycle and harmonic, and by how it changes over cycles."""
+    freedom = max(data.used - len(fit.free), 1)
+    excess = max(fit.chi2 - freedom, 0.0)
+    over = math.sqrt(fit.chi2 / freedom)
+    if over <= _FLOOR:
+        return Remainder(excess, over, float(freedom))
+    series, rest = _by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
+    powers = [_powers(row) for row in series.T] + [_powers(rest)]
+    known = [float(np.sum(power - 1.0)) for power in powers[:-1]]
+    between = float(np.sum(rest**2)) - (np.count_nonzero(rest) - series.size)
+    parts = np.array([known[0], known[1], known[2], sum(known[3:]), between])
+    parts = np.maximum(parts, 0.0)
+    shares = parts / max(float(parts.sum()), 1e-300)
+    loud = np.concatenate(powers)
+    loud = loud[loud > _STANDS_OUT]
+    # Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
+    numbers = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
+    return Remainder(
+        excess, over, min(max(numbers, _FEWEST), float(freedom)),
+        dict(zip(_NAMES, shares.tolist(), strict=True)),
+    )  # fmt: skip
+
+
+def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
+    """The residual in standard deviations of a reading."""
+    sd = noise.white_rms if noise.uniform else np.sqrt(noise.variance)
+    return np.asarray(data.residual(fit.at.reading) * data.weight / sd)
+
+
+def _by_cycle(residual: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of level, cosine, sine and harmonics, (cycles, 1 + 2 harmonics); the rest.
+
+    Within a cycle they are orthonormal, so that noise gives each the variance 1.
+    """
+    number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
+    ends = np.searchsorted(number, np.arange(number[-1] + 2))
+    width, rest = 1 + 2 * _HARMONICS, residual.copy()
+    found = np.zeros((len(ends) - 1, width))
+    for cycle, (first, last) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+        size = min(width, (int(last) - int(first)) // 2)
+        if size < 1:
+            continue
+        part = phase[first:last]
+        waves = [np.ones(len(part))]
+        for harmonic in range(1, _HARMONICS + 1):
+            waves += [np.cos(harmonic * part), np.sin(harmonic * part)]
+        basis, mixing = np.linalg.qr(np.stack(waves[:size], axis=1))
+        basis *= np.sign(np.diag(mixing))
+        found[cycle, :size] = basis.T @ residual[first:last]
+        rest[first:last] -= basis @ found[cycle, :size]
+    return found, rest
+
+
+def _powers(row: FloatArray) -> FloatArray:
+    from scipy.fft import dct
+
+    return np.asarray(dct(row, norm="ortho") ** 2)
