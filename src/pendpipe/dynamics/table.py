@@ -30,7 +30,6 @@ SMOOTH_FROM = 20.0
 _LOSS_TOLERANCE = 5e-11
 """Of the last two coefficients, relative to the least loss; what follows is 30 times less."""
 _WAVEFORM_TOLERANCE = 1e-10
-"""Of the waveform over the amplitude, and of its derivatives, relative where they are large."""
 _LOW_POWERS = 4
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
@@ -130,9 +129,7 @@ def _interpolate(
             # The low powers of time in x/y stand for all: the high ones are mostly rounding.
             for j in range(first, width):
                 if 0 < (j - first) % per_panel <= _LOW_POWERS:
-                    # Derivatives by c grow as 1/y, and are largest in the last row.
-                    size = max(1.0, abs(rows[points - 1, j]))
-                    resolved = resolved and abs(scratch[j]) <= _WAVEFORM_TOLERANCE * size
+                    resolved = resolved and abs(scratch[j]) <= _WAVEFORM_TOLERANCE
         for i in range(k + 1):
             power = _POWERS[k, i]
             if power != 0.0:
