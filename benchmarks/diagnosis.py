@@ -126,6 +126,53 @@ def diagnosed(case: Case) -> dict[str, Any]:
         ],
         "right": [[each["effect"], *(each.get("also") or [])] for each in item.truth["effects"]],
         "oracle": {name: oracle.get(name) for name in ("detected", "named", "class")},
+        "inside": _inside(item.truth, found.effects),
+        **({"peers": _peers(item)} if _beside_peers(case) else {}),
+    }
+
+
+def _inside(truth: dict[str, Any], effects: Any) -> list[bool]:
+    """Whether 95 % intervals hold the parameters, where the catalogue's own law was named."""
+    from pendpipe.challenge.pulls import expected
+
+    if truth["family"] != "single" or not truth["effects"][0]["own_form"] or not effects:
+        return []
+    if effects[0].identifier != truth["effects"][0]["effect"]:
+        return []
+    told = effects[0].parameters
+    return [
+        told[name].interval95[0] <= true <= told[name].interval95[1]
+        for name, true in expected(truth).items()
+        if name in told and told[name].interval95 is not None
+    ]
+
+
+def _beside_peers(case: Case) -> bool:
+    """Recordings that the peers judge as well: they take longer than the diagnosis."""
+    if case.family == "null":
+        return case.number < 60
+    return case.number < 2 and (case.family == "outside" or case.size in (50.0, 100.0))
+
+
+def _peers(item: Any) -> dict[str, Any]:
+    """What others' ways make of the same recording: [something is missing, its name]."""
+    from benchmarks import peers_diagnosis as peers
+
+    nuisances = item.truth["nuisances"]
+    time_s = np.arange(len(item.codes)) * item.scenario.interval_s
+    kept = time_s <= nuisances["judged_until_s"]
+    time_s, angle = time_s[kept], item.angle_rad[kept]
+    noise = float(np.hypot(nuisances["white_sd_rad"], nuisances["step_rad"] / 12.0**0.5))
+    try:
+        base = peers.fit_eq8(time_s, angle, noise)
+    except (ValueError, np.linalg.LinAlgError) as fault:
+        return {"failed": str(fault)}
+    white = nuisances["alpha"] == 0.0
+    return {
+        "AIC": peers.by_criterion(base, noise, white=white, criterion="aic"),
+        "BIC": peers.by_criterion(base, noise, white=white, criterion="bic"),
+        "whiteness": peers.by_whiteness(base),
+        "pysindy": peers.by_sindy(time_s, angle, base.omega),
     }
 
 

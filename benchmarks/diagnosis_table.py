@@ -29,7 +29,14 @@ def table(outcomes: Sequence[Outcome]) -> str:
         f" as not analysable, {len(not_made)} could not be made at the size asked."
         f" CPU: median {cpu[len(cpu) // 2]:.1f} s, largest {cpu[-1]:.1f} s."
     ]
-    parts = [_nulls(done), _detection(done), _naming(done), _pairs(done), _outside(done)]
+    parts = [
+        _nulls(done),
+        _detection(done),
+        _naming(done),
+        _pairs(done),
+        _outside(done),
+        _peers(done),
+    ]
     return "\n\n".join([*head, *(part for part in parts if part)])
 
 
@@ -113,8 +120,55 @@ def _naming(done: Sequence[Outcome]) -> str:
         f" {share(sum(map(_class, singles)), len(singles))}, it comes first in"
         f" {share(sum(map(_first, singles)), len(singles))} (the oracle:"
         f" {sum(map(_oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
-        f" {_mean(oracle)}.\n\n" + "\n".join(rows)
+        f" {_mean(oracle)}. {_coverage(_of(done, 'single'))}\n\n" + "\n".join(rows)
     )
+
+
+def _coverage(singles: Sequence[Outcome]) -> str:
+    inside = [each for entry in singles for each in entry["inside"]]
+    return (
+        "95 % intervals of the named effect's parameters, where it acts by the catalogue's own"
+        f" law, hold the truth in {share(sum(inside), len(inside))}."
+    )
+
+
+def _peers(done: Sequence[Outcome]) -> str:
+    """Everyone on the same recordings."""
+    judged = [entry for entry in done if len(entry.get("peers", {})) > 1]
+    if not judged:
+        return ""
+    kinds = {
+        "nulls accused": [entry for entry in judged if entry["family"] == "null"],
+        "at 50 detected": [entry for entry in judged if entry["size"] == 50.0],
+        "at 100 detected": [entry for entry in judged if entry["size"] == 100.0],
+    }
+    named = [entry for entry in judged if entry["size"] in (50.0, 100.0)]
+    outside = [entry for entry in judged if entry["family"] == "outside"]
+    head = [*kinds, "named right first", "wrong name outside"]
+    rows = [f"| | {' | '.join(head)} |", "|---" * (len(head) + 1) + "|"]
+    for who in ("pendpipe", *judged[0]["peers"]):
+        cells = [share(sum(_says(entry, who) for entry in part), len(part))
+                 for part in kinds.values()]  # fmt: skip
+        right = sum(_name(entry, who) in entry["right"][0] for entry in named)
+        wrong = sum(not (_name(entry, who) or "unnamed").startswith("unnamed") for entry in outside)
+        cells += [share(right, len(named)), share(wrong, len(outside))]
+        rows.append(f"| {who} | {' | '.join(cells)} |")
+    return (
+        "**Beside others' ways, on the same recordings.** AIC and BIC choose one template, a"
+        " whiteness test (Ljung and Box, 1 %) names nothing, pysindy chooses its terms on smoothed"
+        " derivatives. The peers are told the noise.\n\n" + "\n".join(rows)
+    )
+
+
+def _says(entry: Outcome, who: str) -> bool:
+    return bool(entry["effects"]) if who == "pendpipe" else bool(entry["peers"][who][0])
+
+
+def _name(entry: Outcome, who: str) -> str | None:
+    if who != "pendpipe":
+        name: str | None = entry["peers"][who][1]
+        return name
+    return entry["effects"][0][0] if entry["effects"] else None
 
 
 def _mean(values: Sequence[int]) -> str:
