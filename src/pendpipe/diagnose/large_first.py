@@ -87,9 +87,7 @@ def _over_all(part: State, state: State) -> Fit | None:
     for cut in range(_CUTS):
         data = whole.first(int(len(whole) * _SHORTER**cut))
         model = part.fit.model.at_times(data.time_s)
-        noise = replace(
-            state.noise, variance=state.noise.variance[: len(data)], weight=data.weight
-        )
+        noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
         try:
             value = grown(
                 model, data, noise.white_rms, part.fit.value, held=part.holding,
@@ -101,4 +99,3 @@ def _over_all(part: State, state: State) -> Fit | None:
         state.data, state.noise = data, noise
         return fit
     return None
-
