@@ -11,9 +11,10 @@ import time
 
 import numpy as np
 from tests.diagnose.decays import Fitted, Pendulum
+from tests.diagnose.examine import examine
 from tests.diagnose.faults import AIR, FAULTS, NOISES, null
 
-from pendpipe.diagnose.forensics import TESTS, examine
+from pendpipe.diagnose.forensics import TESTS
 
 _LEVELS = (0.1, 0.01, 0.001)
 _FOUND = 1e-3
@@ -56,7 +57,7 @@ def confusion(count: int) -> None:
         seen = dict.fromkeys(names, 0)
         for seed in range(count):
             record = make(clean, np.random.default_rng(1000 + seed))
-            findings = examine(record.data, record.fit, record.noise, record.samples)
+            findings = examine(record)
             for name, finding in zip(names, findings, strict=True):
                 seen[name] += finding.p_value < _FOUND and finding.kind == "fault"
         cells = [f"[{seen[name]}]" if name == test else str(seen[name] or ".") for name in names]
@@ -69,10 +70,10 @@ def cost(repetitions: int = 20) -> None:
     print("\nprocessor time of all tests, 4000 readings, ms")
     for kind in ("white", "16 bit, 1.3 steps", "12 bit, 0.3 steps"):
         record = null(0, kind, clean)
-        examine(record.data, record.fit, record.noise, record.samples)
+        examine(record)
         begin = time.process_time()
         for _ in range(repetitions):
-            examine(record.data, record.fit, record.noise, record.samples)
+            examine(record)
         print(f"  {kind:20s} {1e3 * (time.process_time() - begin) / repetitions:.1f}")
 
 

@@ -12,7 +12,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from benchmarks.recordings_diagnosis import section
+from benchmarks.recordings_diagnosis import diagnose_viscous, section
 from pendpipe.files import read_json
 
 ROOT = Path(__file__).parents[1]
@@ -98,6 +98,7 @@ def main() -> None:
         if drawn.exists():
             shutil.copyfile(drawn, images / f"recording-{name}.svg")
             lines += [f"![Decay of {name}](images/recording-{name}.svg)", ""]
+    diagnose_viscous(ROOT, RESULTS)
     lines += section(RESULTS, [record["record"] for record in records], images)
     text = "\n".join(lines)
     print(text)

@@ -10,13 +10,14 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import gather
-from pendpipe.diagnose.forensics import TESTS, Finding, examine, find_lost_samples
+from pendpipe.diagnose.forensics import TESTS, Finding, find_lost_samples
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.cubic_stiffness import CubicStiffness
 from pendpipe.effects.model import Model
 
 from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
+from .examine import examine
 from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
 
 FOUND = 1e-3
@@ -32,7 +33,7 @@ def generator(seed: int = 0) -> np.random.Generator:
 
 
 def found(record: Fitted) -> dict[str, Finding]:
-    findings = examine(record.data, record.fit, record.noise, record.samples)
+    findings = examine(record)
     return {
         name: finding
         for name, finding in zip(TESTS, findings, strict=True)

@@ -31,6 +31,8 @@ _BEHIND: Final = (
 )  # fmt: skip
 _EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
+_CLEAN: Final = 1.3
+"""chi^2 per degree of freedom up to which a residual is noise enough for the fine tests."""
 _IN_PHASE: Final = 0.3
 """Slip in rad up to which residuals tell the stamps' errors."""
 _BEFORE_CURVES: Final = 15.0
@@ -65,8 +67,8 @@ class Forensics:
                     break
 
     def after(self, state: State, progress: Progress) -> None:
-        """Make the tests that need a clean residual."""
-        if is_gross(state.fit, state.data):
+        """Make the tests that need a clean residual; a misfit's squares look like any of them."""
+        if is_gross(state.fit, state.data) or state.fit.chi2 > _CLEAN * state.data.used:
             return
         known = [fault.finding.identifier for fault in state.faults]
         for name in [name for name in _BEHIND if name not in known]:

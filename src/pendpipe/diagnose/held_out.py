@@ -78,7 +78,9 @@ def _densities(
         except NoMotionError:
             predicted = fit.at.reading
         wanted = out & (data.weight > 0.0)
-        off = data.residual(predicted)[wanted]
+        # A curve may run away where its blocks are missing: no prediction is worse than none.
+        largest = 2.0 * fit.at.span.first_amplitude
+        off = np.clip(data.residual(predicted)[wanted], -largest, largest)
         found[wanted] = -0.5 * (
             off**2 / variance[wanted] + np.log(2.0 * math.pi * variance[wanted])
         )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -20,8 +21,9 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 
-_FLOOR: Final = 1.3
-"""Residual over noise from which a model is wrong still, whatever has been named."""
+_FLOOR: Final = 1.14
+"""Residual over noise (chi^2 of 1.3 per degree of freedom) from which a model is wrong still,
+whatever has been named: the noise itself is known far better from between the harmonics."""
 _HARMONICS: Final = 4
 _STANDS_OUT: Final = 9.0
 """Squares of unit numbers above which a coefficient is no noise."""
@@ -130,8 +132,8 @@ def _by_cycle(residual: FloatArray, phase: FloatArray) -> tuple[FloatArray, Floa
     ends = np.searchsorted(number, np.arange(number[-1] + 2))
     width, rest = 1 + 2 * _HARMONICS, residual.copy()
     found = np.zeros((len(ends) - 1, width))
-    for cycle, (first, last) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
-        size = min(width, (int(last) - int(first)) // 2)
+    for cycle, (first, last) in enumerate(pairwise(ends.tolist())):
+        size = min(width, (last - first) // 2)
         if size < 1:
             continue
         part = phase[first:last]

@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.location import tone_of
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
@@ -17,9 +18,12 @@ from pendpipe.diagnose.remainder import Remainder, remainder_of
 from pendpipe.diagnose.state import State, Step, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import OMEGA
 
 _MOST: Final = 0.75
 """Part of the misfit that a name must explain where the model leaves more than noise."""
+_OFF: Final = 0.1
+"""Of the motion's frequency: how far from a harmonic a line must be."""
 _DESCRIBES: Final = 0.5
 """Part of the excess that a curve must take away to be drawn on top of names."""
 
@@ -27,7 +31,7 @@ _DESCRIBES: Final = 0.5
 def credible(step: Step, state: State, level: float) -> bool:
     """Say whether a step's winner stands against what it would leave itself; curves do."""
     winner = step.winner
-    if winner.lead.effect.kind == "unnamed":
+    if winner.lead.effect.kind == "unnamed" or stands_apart(winner.lead.effect, winner.fit):
         return True
     remainder = remainder_of(winner.fit, state.data, state.noise)
     if not remainder.systematic:
@@ -58,6 +62,18 @@ def credibility(step: Step, remainder: Remainder, gain: float) -> float:
     values = max(effect.count, 1)
     local = float(gammaincc(0.5 * values, 0.5 * remainder.worth(gain)))
     return _trials(step).global_p_value(local)
+
+
+def stands_apart(effect: Effect, fit: Fit) -> bool:
+    """Say whether an effect is a line of its own in the spectrum, off the motion's harmonics.
+
+    What is left of the motion lies about its harmonics: it is no rival of such a line.
+    """
+    line = tone_of(fit, effect)
+    if line is None:
+        return False
+    order = line / (0.5 * float(fit.value[OMEGA]) / np.pi)
+    return abs(order - round(order)) > _OFF and order > _OFF
 
 
 def _trials(step: Step) -> Trials:
@@ -94,7 +110,8 @@ def withdraw_doubtful(state: State, level: float, progress: Progress) -> None:
 def _least_credible(state: State, remainder: Remainder) -> tuple[Step, Fit, float] | None:
     found = []
     for step in state.steps:
-        if isinstance(step.winner.lead.effect, FreedParameter):
+        effect = step.winner.lead.effect
+        if isinstance(effect, FreedParameter) or stands_apart(effect, state.fit):
             continue
         without = _without(state, step)
         if without is not None:

@@ -23,6 +23,7 @@ from pendpipe.diagnose.review import credible, describe_rest, withdraw_doubtful
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import C
 from pendpipe.effects.curves import CURVES
 
 _MOST: Final = 6
@@ -30,6 +31,8 @@ _NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
 _PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
+_LESS_FRICTION: Final = (0.9, 0.7, 0.4)
+"""Parts of the Coulomb friction with which a baseline still moves at the last reading."""
 _MAIN: Final = 0.5
 """The same while large amplitudes are looked at by themselves: only what rules there."""
 
@@ -204,8 +207,12 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were mended."""
     model = replace(state.fit.model, effects=(), _last={})
+    starts = [state.bare, beginning.value]
+    for share in _LESS_FRICTION:
+        starts.append(state.bare.copy())
+        starts[-1][C] *= share
     fault = NoMotionError("it stops")
-    for start in (state.bare, beginning.value):
+    for start in starts:
         try:
             return refine(model, state.data, state.noise, start, held=beginning.held)
         except NoMotionError as found:

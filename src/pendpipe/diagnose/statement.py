@@ -26,12 +26,12 @@ def statement(
     model = _NAMES.get(baseline, baseline)
     stamps = [f"Of the record itself: {'; '.join(notes)}."] if notes else []
     if not effects:
-        said = (
+        nothing = (
             f"{model} describes the recording: what it leaves"
             f" ({before.residual_rms_rad:.3g} {unit}) is noise ({noise_rms:.3g} {unit}), and"
             f" nothing in the catalogue does better than chance (global {_chance(unexplained)})."
         )
-        return " ".join([said, *stamps])
+        return " ".join([nothing, *stamps])
     said = [
         f"{model} leaves {before.residual_rms_rad:.3g} {unit} where the noise is"
         f" {noise_rms:.3g} {unit}.",

@@ -17,6 +17,7 @@ from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.naming import Rival, of_one_class, probabilities
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
+from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
 from pendpipe.diagnose.values import effect_parameters
@@ -46,7 +47,7 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
     ]  # fmt: skip
     mates = [mate for mate in others if of_one_class(own, mate)]
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
-    weights = weights * _explained(found, gain)
+    weights = weights * (1.0 if stands_apart(effect, found.improved) else _explained(found, gain))
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
         effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
@@ -103,7 +104,8 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if isinstance(effect, FreedParameter):
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
-    without = _refined(model, found, value, held) or step.before
+    bare = np.concatenate([found.baseline.value, value[8:]])
+    without = _refined(model, found, held, value, bare, step.before.value) or step.before
     gain = without.chi2 - found.improved.chi2
     same = abs(gain - step.winner.gain) < _SAME * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
@@ -118,14 +120,19 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     return without, rivals
 
 
-def _refined(model: Model, found: Search, value: FloatArray, held: Sequence[int]) -> Fit | None:
-    """The fit of a model, from values that may be far from its own; None if it can't move so."""
-    for start in (value, np.concatenate([found.baseline.value, value[8:]])):
+def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArray) -> Fit | None:
+    """The best fit of a model from several starts; None if it can't move from any."""
+    fits = []
+    for start in starts:
+        if len(start) != model.size:
+            continue
         try:
-            return refine(model, found.data, found.noise, start, held=held)
+            fits.append(refine(model, found.data, found.noise, start, held=held))
         except (NoMotionError, np.linalg.LinAlgError):
             continue
-    return None
+        if fits[-1].converged and not is_gross(fits[-1], found.data):
+            break
+    return min(fits, key=lambda fit: fit.chi2, default=None)
 
 
 def _refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> Fit | None:
@@ -135,4 +142,4 @@ def _refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) ->
         held = [index for index in held if index != effect.index]
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
-    return _refined(without.model.adding(effect), found, start, held)
+    return _refined(without.model.adding(effect), found, held, start, rival.fit.value)

@@ -6,7 +6,6 @@ Every module has ``find(data, fit, noise, samples) -> Finding``.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 from pendpipe.analysis.turning_points.samples import Samples
@@ -40,27 +39,8 @@ TESTS: Final[dict[str, Test]] = {
     "broadband-drive": broadband_drive.find,
 }
 """In their order: what is masked by one is not seen by those behind it."""
-_SURE: Final = 1e-3
-"""p-value from which a finding's readings are left out of the tests that follow."""
-
-
-def examine(data: Data, fit: Fit, noise: Noise, samples: Samples) -> list[Finding]:
-    """Make every test; what is found and what is not."""
-    findings = []
-    for find in TESTS.values():
-        finding = find(data, fit, noise, samples)
-        findings.append(finding)
-        if finding.p_value > _SURE:
-            continue
-        if finding.mask is not None:
-            data = data.masked((data.weight == 0.0) | finding.mask)
-        if finding.time_s is not None:
-            # To first order, the readings that the false stamps' moments would have had.
-            late = data.time_s - finding.time_s
-            data = replace(data, values=data.values + fit.at.sampled.velocity * late)
-    return findings
 
 
 __all__ = [
-    "TESTS", "Finding", "LostSamples", "Test", "examine", "find_lost_samples",
+    "TESTS", "Finding", "LostSamples", "Test", "find_lost_samples",
 ]  # fmt: skip
