@@ -20,6 +20,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
+from pendpipe.effects.curves import Curve
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
@@ -94,13 +95,19 @@ def refit_leads(
 
 
 def _names_before_curves(rivals: list[Rival]) -> list[Rival]:
-    """Prefer a name to a curve that the record cannot tell from it: curves follow any law."""
+    """Prefer a name to a curve that the record cannot tell from it: curves follow any law.
+
+    And a curve of the motion or the sensor to one in time, which follows anything.
+    """
     best = rivals[0].evidence
-    near = [
-        rival for rival in rivals
-        if rival.lead.effect.kind != "unnamed" and best - rival.evidence < CLASS
-    ]  # fmt: skip
+    near = [rival for rival in rivals if best - rival.evidence < CLASS]
+    near.sort(key=lambda rival: _freedom(rival.lead.effect))
     return [*near, *(rival for rival in rivals if rival not in near)]
+
+
+def _freedom(effect: Effect) -> int:
+    """How much an effect could follow: names, curves, curves in time."""
+    return int(effect.kind == "unnamed") + int(isinstance(effect, Curve) and effect.in_time)
 
 
 def of_one_class(best: Rival, rival: Rival) -> bool:

@@ -15,6 +15,7 @@ from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.large_first import large_first
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.one_curve import prefer_one_curve
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.redness import doubt_redness
 from pendpipe.diagnose.refine import Fit, refine
@@ -172,6 +173,7 @@ def search(
         if not _add_one(state, task):
             break
     _prune(state, progress)
+    prefer_one_curve(state, progress)
     named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
     assert state.first is not None

@@ -12,6 +12,7 @@ from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, A, B, C
 from pendpipe.estimate import Estimate
@@ -33,9 +34,7 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))
         if sd == 0.0 or index in (A, B, C, OFFSET):
             continue
-        moved = fit.value.copy()
-        moved[index] += _STEP * sd
-        jacobian[:, index] = (_numbers(fit, moved) - numbers) / (_STEP * sd)
+        jacobian[:, index] = _slope(fit, index, _STEP * sd / fit.spread, numbers)
     spread = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
     intervals = _intervals(fit)
     dress = units(unit)
@@ -63,6 +62,18 @@ def _numbers(fit: Fit, value: FloatArray) -> FloatArray:
     first = min(first, len(motion.time_s) - 1)
     turned = math.pi if motion.upwards < 0.0 else 0.0
     return np.array([motion.amplitude[first, 0], sampled.phase[0] + turned])
+
+
+def _slope(fit: Fit, index: int, step: float, numbers: FloatArray) -> FloatArray:
+    """Derivatives by one value; backwards where more of it stops the pendulum too early."""
+    for signed in (step, -step):
+        moved = fit.value.copy()
+        moved[index] += signed
+        try:
+            return np.asarray((_numbers(fit, moved) - numbers) / signed)
+        except NoMotionError:
+            continue
+    return np.zeros(2)
 
 
 def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:

@@ -42,6 +42,8 @@ class Curve(Effect):
     ordinate: ClassVar[str]
     """What is drawn."""
     flavour: ClassVar[str] = ""
+    in_time: ClassVar[bool] = False
+    """Whether it is drawn against time, and so can follow anything that happens once."""
 
     def __init__(self, span: Span, mixing: FloatArray | None = None) -> None:
         self.span = span
@@ -206,6 +208,7 @@ class ProfileCurve(Curve):
 class DriveCurve(Curve):
     """A torque that comes and goes with the time, in step with the motion."""
 
+    in_time = True
     identifier = "unnamed-drive"
     name = "a torque that depends on the time in an unknown way"
     equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
@@ -260,6 +263,7 @@ class ReadingCurve(Curve):
 class BaselineCurve(Curve):
     """A level that wanders in time."""
 
+    in_time = True
     identifier = "unnamed-measurement"
     name = "a level that wanders"
     equation = r"y = x + s(t)"
