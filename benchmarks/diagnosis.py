@@ -126,6 +126,9 @@ def diagnosed(case: Case) -> dict[str, Any]:
         ],
         "right": [[each["effect"], *(each.get("also") or [])] for each in item.truth["effects"]],
         "oracle": {name: oracle.get(name) for name in ("detected", "named", "class")},
+        "marginal": [
+            float(each.get("marginal_delta_chi2") or 0.0) for each in item.truth["effects"]
+        ],
         "inside": _inside(item.truth, found.effects),
         **({"peers": _peers(item)} if _beside_peers(case) else {}),
     }

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 Outcome = dict[str, Any]
+MASKED = 50.0
+"""Delta chi^2 of one of a pair with the other in the model, below which it is hidden by it."""
 
 
 def share(hits: int, count: int) -> str:
@@ -179,11 +181,31 @@ def _pairs(done: Sequence[Outcome]) -> str:
     pairs = _of(done, "pair")
     if not pairs:
         return ""
-    both = 0
-    for entry in pairs:
-        named = [set(names) for names in _named(entry)]
-        both += all(any(set(right) & names for names in named) for right in entry["right"])
-    return f"**Two effects at once** (400 each): both found in {share(both, len(pairs))}."
+    plain = [entry for entry in pairs if min(entry["marginal"]) > MASKED]
+    rows = ["| pair | both found | of those that can be told | one found |", "|---|---|---|---|"]
+    for names in sorted({tuple(entry["names"]) for entry in pairs}):
+        part = [entry for entry in pairs if tuple(entry["names"]) == names]
+        told = [entry for entry in part if entry in plain]
+        some = sum(_count_right(entry) == 1 for entry in part)
+        rows.append(
+            f"| {' + '.join(names)} | {sum(map(_both, part))}/{len(part)}"
+            f" | {sum(map(_both, told))}/{len(told)} | {some} |"
+        )
+    return (
+        f"**Two effects at once** (400 each): both found in"
+        f" {share(sum(map(_both, pairs)), len(pairs))}. Some cancel each other: of the pairs in"
+        f" which each adds more than {MASKED:g} to the other for the oracle,"
+        f" {share(sum(map(_both, plain)), len(plain))}.\n\n" + "\n".join(rows)
+    )
+
+
+def _count_right(entry: Outcome) -> int:
+    named = [set(names) for names in _named(entry)]
+    return sum(any(set(right) & names for names in named) for right in entry["right"])
+
+
+def _both(entry: Outcome) -> bool:
+    return _count_right(entry) == len(entry["right"])
 
 
 def _outside(done: Sequence[Outcome]) -> str:
