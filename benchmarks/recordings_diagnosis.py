@@ -116,7 +116,7 @@ def row(name: str, content: Mapping[str, Any]) -> str:
     before, after = (content[key]["residual_rms_rad"] for key in ("baseline", "improved"))
     found = "; ".join(effect(each) for each in content["effects"]) or "nothing"
     sizes = f"{compact(before, unit)}, {compact(after, unit)}"
-    left = content["unexplained"]
+    left = content["unexplained"] | (content["remainder"] or {})
     p_value = left["p_value"]
     chance = f"{p_value:.2g}" if p_value >= 1e-12 else "< 1e-12"
     rest = f"{left['over_noise']:.3g} | {chance} | {remainder(left)}"

@@ -153,8 +153,8 @@ class Diagnosis:
             "unexplained": {
                 "residual_rms_rad": self.unexplained_rms_rad,
                 "p_value": self.unexplained_p_value,
-                **({} if self.remainder is None else self.remainder.as_json()),
             },
+            "remainder": None if self.remainder is None else self.remainder.as_json(),
             "statement": self.statement,
             "figures": list(self.figures),
             "warnings": list(self.warnings),

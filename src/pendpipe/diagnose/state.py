@@ -22,6 +22,8 @@ GROSS: Final = 2.0
 """chi^2 per degree of freedom above which scores to first order mean nothing."""
 _SLIP: Final = 0.1
 """Phase in rad, likewise."""
+_MISJUDGED: Final = 2.5
+"""By how much the first guess of the noise may be too small."""
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
 
@@ -119,8 +121,14 @@ def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Judge the noise anew where the model is near enough, and refit."""
-    if is_gross(fit, data) or data.time_noise:
+    if data.time_noise or fit.slip_rad > _SLIP:
         return fit, data, noise
-    data = with_lattice(data, fit.at.reading)
-    noise = noise_left(fit, data, red=red)
-    return refine(fit.model, data, noise, fit.value, held=held), data, noise
+    finer = with_lattice(data, fit.at.reading)
+    left = noise_left(fit, finer, red=red)
+    if is_gross(fit, data) and left.white_rms > _MISJUDGED * noise.white_rms:
+        return fit, data, noise
+    better = refine(fit.model, finer, left, fit.value, held=held)
+    # What is gross beside the first guess of the noise may be noise: it is if it is so anywhere.
+    if is_gross(fit, data) and is_gross(better, finer):
+        return fit, data, noise
+    return better, finer, left
