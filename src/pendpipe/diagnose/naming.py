@@ -35,6 +35,8 @@ _FROM_AFAR: Final = 4
 """How many leads are then followed from the first cycles on."""
 _SHAPE: Final = 2.0
 """What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
+_FORM: Final = 3.0
+"""Standard deviation of a difference of evidence for what a law's own form is worth."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 _MUCH: Final = 0.5
@@ -231,7 +233,15 @@ def _better(one: Fit | None, other: Fit | None) -> Fit | None:
 
 
 def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
-    """Probability of each rival, with `none` the evidence that it is none of these."""
-    values = np.array([rival.evidence for rival in rivals] + [none])
-    weights = np.exp(0.5 * (values - values.max()))
+    """Probability of each rival, with `none` the evidence that it is none of these.
+
+    Real laws differ a little from the catalogue's forms, so that differences of evidence
+    between names are uncertain by `_FORM`; log odds are averaged over that (MacKay's
+    approximation).
+    """
+    shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * _FORM) ** 2)
+    evidence = np.array([rival.evidence for rival in rivals])
+    best = float(evidence.max())
+    logs = np.append(0.5 * shrunk * (evidence - best), 0.5 * (none - best))
+    weights = np.exp(logs - logs.max())
     return np.asarray(weights / weights.sum())
