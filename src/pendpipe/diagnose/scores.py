@@ -30,8 +30,6 @@ _STANDS_OUT = 4.0
 """Standard deviations by which a mixture of a curve's hats must be seen to be kept."""
 
 
-Piece = tuple[Effect, tuple[float, ...], FloatArray]
-"""An effect, a shape of it, and what its sizes do to the readings, shape (sizes, n)."""
 _AT_ONCE = 32
 
 
@@ -106,42 +104,77 @@ def tangent_basis(fit: Fit) -> FloatArray:
 
 
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
-    """Work out the columns of all effects along a fitted motion."""
-    basis = tangent_basis(fit)
-    pieces: list[Piece] = []
-    pendulum = fit.model.pendulum(fit.value)
+    """Work out the columns of all effects along a fitted motion.
+
+    A few shapes at a time, and kept in single precision: the whole in double precision would
+    be a hundred megabytes for a long record, and memory is what this costs.
+    """
+    kept = _Kept(tangent_basis(fit), [], [], [])
     for effect in effects:
         if isinstance(effect, FreedParameter):
+            kept.add(effect, [()], fit.jacobian[:, [effect.index]].T)
             continue
-        small = effect.small(fit.at.span)
-        shapes = effect.shapes(fit.at.span)
-        changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
-        columns = responses(effect, changes, fit.at, pendulum) / small
-        columns[~np.all(np.isfinite(columns), axis=1)] = 0.0
-        for row, shape in enumerate(shapes):
-            own = columns[row * effect.sizes : (row + 1) * effect.sizes]
-            pieces.append((effect, tuple(float(number) for number in shape), own))
-    count = sum(len(columns) for _, _, columns in pieces)
-    known = [effect for effect in effects if isinstance(effect, FreedParameter)]
-    # Columns that stand together in memory: transforms and products are far quicker so.
-    tall = np.zeros((len(fit.jacobian), count + len(known)), order="F")
-    before = np.zeros(tall.shape[1])
-    place = 0
-    for _, _, columns in pieces:
-        part = slice(place, place + len(columns))
-        tall[:-1, part] = noise.whiten(columns.T)
-        before[part] = np.linalg.norm(tall[:, part], axis=0)
-        place = part.stop
-    for effect in known:
-        tall[:, place] = fit.jacobian[:, effect.index]
-        before[place] = np.linalg.norm(tall[:, place])
-        pieces.append((effect, (), tall[:, [place]].T))
-        place += 1
-    for first in range(0, place, _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
-        for _ in range(2):
-            tall[:, part] -= basis @ (basis.T @ tall[:, part])
-    return _gathered(pieces, tall, before, basis)
+        shapes = [tuple(float(number) for number in row) for row in effect.shapes(fit.at.span)]
+        some = max(_AT_ONCE // effect.sizes, 1)
+        for first in range(0, len(shapes), some):
+            part = shapes[first : first + some]
+            kept.add(effect, part, _whitened(fit, noise, effect, part))
+    return kept.bank()
+
+
+def _whitened(
+    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[tuple[float, ...]]
+) -> FloatArray:
+    """What each size of each shape does to the whitened readings, shape (columns, n + 1)."""
+    small = effect.small(fit.at.span)
+    changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
+    raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
+    raw /= small
+    raw[~np.all(np.isfinite(raw), axis=1)] = 0.0
+    rows = np.zeros((len(raw), len(fit.jacobian)))
+    rows[:, :-1] = noise.whiten(raw.T).T
+    return rows
+
+
+class _Kept(NamedTuple):
+    """Unit columns that can be told from the model's own, as they are found."""
+
+    basis: FloatArray
+    rows: list[NDArray[np.float32]]
+    candidates: list[Candidate]
+    lengths: list[float]
+
+    def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
+        """Project off the model's tangent space, and keep what is left at unit length."""
+        before = np.linalg.norm(columns, axis=1)
+        left = columns - (columns @ self.basis) @ self.basis.T
+        left -= (left @ self.basis) @ self.basis.T
+        width = len(columns) // len(shapes)
+        for index, shape in enumerate(shapes):
+            own = slice(index * width, (index + 1) * width)
+            self._add_one(effect, shape, left[own], before[own])
+
+    def _add_one(
+        self, effect: Effect, shape: tuple[float, ...], part: FloatArray, before: FloatArray
+    ) -> None:
+        if isinstance(effect, Curve):
+            effect, part = _visible(effect, part)
+            before = np.zeros(len(part))
+        length = np.linalg.norm(part, axis=1)
+        if not len(part) or not np.all(length > np.maximum(_SEEN * before, 1e-300)):
+            return
+        unit = np.linalg.qr(part.T)[0].T if len(part) > 1 else part / length[:, None]
+        first = sum(self.candidates[-1][2:]) if self.candidates else 0
+        self.rows.append(unit.astype(np.float32))
+        self.candidates.append(Candidate(effect, shape, first, len(unit)))
+        self.lengths.append(float(length[0]))
+
+    def bank(self) -> Bank:
+        """Everything that was kept."""
+        rows = self.rows or [np.zeros((0, len(self.basis)), dtype=np.float32)]
+        return Bank(
+            self.basis, np.concatenate(rows).T, tuple(self.candidates), np.array(self.lengths)
+        )
 
 
 def _sizes(
@@ -153,37 +186,11 @@ def _sizes(
     return low, high
 
 
-def _gathered(
-    pieces: list[Piece], tall: FloatArray, before: FloatArray, basis: FloatArray,
-) -> Bank:  # fmt: skip
-    """Keep what can be told, at unit length."""
-    stacked = np.zeros(tall.shape, dtype=np.float32, order="F")
-    candidates, lengths, place, found = [], [], 0, 0
-    for effect, shape, columns in pieces:
-        part = tall[:, place : place + len(columns)]
-        whole = before[place : place + len(columns)]
-        place += len(columns)
-        if isinstance(effect, Curve):
-            effect, part = _visible(effect, part)
-            if not part.shape[1]:
-                continue
-            whole = np.zeros(part.shape[1])
-        length = np.linalg.norm(part, axis=0)
-        if not np.all(length > _SEEN * np.maximum(whole, 1e-300)) or not np.all(length > 0.0):
-            continue
-        unit = np.linalg.qr(part)[0] if part.shape[1] > 1 else part / length
-        stacked[:, found : found + unit.shape[1]] = unit
-        candidates.append(Candidate(effect, shape, found, unit.shape[1]))
-        lengths.append(float(length[0]))
-        found += unit.shape[1]
-    return Bank(basis, stacked[:, :found], tuple(candidates), np.array(lengths))
-
-
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     """Keep the mixtures of a curve's hats that would stand out if they were of reasonable size."""
-    _, lengths, mixtures = np.linalg.svd(part, full_matrices=False)
-    mixing = mixtures[lengths > _STANDS_OUT].T
-    return curve.reduced(mixing), part @ mixing
+    mixtures, lengths, _ = np.linalg.svd(part, full_matrices=False)
+    mixing = mixtures[:, lengths > _STANDS_OUT]
+    return curve.reduced(mixing), mixing.T @ part
 
 
 def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:

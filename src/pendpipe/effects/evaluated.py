@@ -48,11 +48,17 @@ class Evaluated:
         log, late = kick_sizes(there, acting, there)
         node_log, node_time, by_log, by_time = self._start
         then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
-        scale = (log / then_log)[:, None]
-        later = late[:, None] + (by_time - then_time[:, None]) * scale
+        scale = log / then_log
         sampled = self.sampled
-        after = sampled.angle * by_log * scale - sampled.velocity * later
-        change[rows] = np.where(sampled.time_s > instants[:, None], after, 0.0)
+        first = np.searchsorted(sampled.time_s, instants, side="right")
+        angle, velocity = sampled.angle, sampled.velocity
+        grown, slowed = angle * by_log, velocity * by_time
+        for row, start, size, moved, rest in zip(
+            rows, first, scale, late, then_time * scale, strict=True
+        ):
+            # Nothing before the instant.
+            change[row, start:] = size * (grown[start:] - slowed[start:])
+            change[row, start:] -= (moved - rest) * velocity[start:]
         return change
 
 
