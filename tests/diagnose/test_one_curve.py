@@ -37,7 +37,7 @@ class Magnet(Effect):
         self,
         motion: Motion,
         pendulum: Pendulum,
-        values: FloatArray,  # noqa: ARG002
+        values: FloatArray,
     ) -> FloatArray:
         """Return the torque over the moment of inertia."""
         pull, width = values
