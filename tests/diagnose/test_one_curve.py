@@ -36,7 +36,7 @@ class Magnet(Effect):
     def acceleration(
         self,
         motion: Motion,
-        pendulum: Pendulum,
+        pendulum: Pendulum,  # noqa: ARG002
         values: FloatArray,
     ) -> FloatArray:
         """Return the torque over the moment of inertia."""
