@@ -41,6 +41,8 @@ _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 _MUCH: Final = 0.5
 """Part of the best gain that a name must explain to go before a curve."""
+_SOME: Final = 0.25
+"""The same of what every pendulum has."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +129,13 @@ def _named_first(rivals: list[Rival]) -> list[Rival]:
     best = max(rival.gain for rival in rivals)
     named = [
         rival for rival in rivals
-        if rival.lead.effect.kind != "unnamed" and rival.gain > _MUCH * best
+        if rival.lead.effect.kind != "unnamed"
+        and rival.gain > (_SOME if rival.lead.effect.expected else _MUCH) * best
     ]  # fmt: skip
     # What must be there anyway goes before what merely fits a trifle better.
     named.sort(key=lambda rival: -rival.lead.effect.prior if rival.gain > _ALIKE * best else 0.0)
+    # Bearing and fluid are there in any case, and what else bends is judged with them.
+    named.sort(key=lambda rival: not rival.lead.effect.expected)
     return [*named, *(rival for rival in rivals if rival not in named)]
 
 

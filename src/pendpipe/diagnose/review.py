@@ -65,10 +65,13 @@ def credibility(step: Step, remainder: Remainder, gain: float) -> float:
 
 
 def stands_apart(effect: Effect, fit: Fit) -> bool:
-    """Say whether an effect is a line of its own in the spectrum, off the motion's harmonics.
+    """Say whether an effect needs no doubt beside what is left.
 
-    What is left of the motion lies about its harmonics: it is no rival of such a line.
+    A line of its own in the spectrum, off the motion's harmonics, has no rival in what is
+    left of the motion; and what every pendulum has is there in any case.
     """
+    if effect.expected:
+        return True
     line = tone_of(fit, effect)
     if line is None:
         return False

@@ -23,6 +23,8 @@ class CoulombFriction(Effect):
     equation = r"\ddot x \mathrel{+}= -\tfrac{\pi}{2}\, \omega c\, \operatorname{sgn}\dot x"
     parameters = (Parameter("c", "rad/s", 0.0, 10.0),)
     inside = ("eq8",)
+    expected = True
+    prior = 6.0
     deciding = "let it swing to the end: it must stop, off the equilibrium, and not fade away"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
@@ -43,6 +45,8 @@ class QuadraticDrag(Effect):
     )
     parameters = (Parameter("a", "1/(rad s)", 0.0, 100.0),)
     inside = ("eq8",)
+    expected = True
+    prior = 6.0
     deciding = "change the fluid's density (a vacuum, or another gas): a must follow it"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:

@@ -152,6 +152,8 @@ class Effect:
     spectral: ClassVar[bool] = False
     """Whether it is a tone, looked for at thousands of frequencies by Fourier transform (see
     `tone`); `shapes` is a rough grid."""
+    expected: ClassVar[bool] = False
+    """Whether every pendulum has some of it, so that it is to be doubted last."""
     prior: ClassVar[float] = 0.0
     """Twice the logarithm of how much likelier it is beforehand than others."""
     template: ClassVar[bool] = True
