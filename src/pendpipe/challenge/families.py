@@ -107,14 +107,17 @@ def _singles(count: int, random: np.random.Generator) -> list[dict[str, Any]]:
 
 
 def make_item(recipe: dict[str, Any], random: np.random.Generator) -> Item:
-    """Make a synthetic item; a size that nothing drawn can show is made smaller."""
+    """Make a synthetic item; a size that nothing drawn can show is made smaller, or larger.
+
+    A fault of whole codes may be nothing, or more than was asked.
+    """
     family = recipe["family"]
     if family == "null":
         return make_null(random, oracle=True)
     effects, sizes = recipe["effects"], recipe["delta_chi2"]
-    for smaller in (1.0, 0.25, 0.06, 0.02):
+    for factor in (1.0, 0.25, 0.06, 0.02, 4.0, 16.0, 64.0):
         try:
-            item = _made(family, effects, [smaller * size for size in sizes], recipe, random)
+            item = _made(family, effects, [factor * size for size in sizes], recipe, random)
         except ValueError:
             continue
         item.truth["family"] = family
