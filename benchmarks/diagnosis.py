@@ -4,7 +4,7 @@ The recordings come from the challenge's generator, which shares no code with wh
 its oracle knows nuisances, noise and catalogue, and pays the same look-elsewhere. Every
 recording's outcome is kept under ``.evidence/diagnosis.jsonl``, so that a run can be broken
 off and taken up; `python -m benchmarks.diagnosis` makes what is missing and writes the table
-to ``docs/diagnosis.md``. ``--part 0.1`` makes a tenth of it.
+to ``docs/diagnosis.md``. ``--part 0.1`` makes a tenth of it, ``--nulls 500`` that many nulls.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ class Case(NamedTuple):
         return f"{self.family}:{'+'.join(self.names)}:{self.size:g}:{self.number}"
 
 
-def cases(part: float) -> Iterator[Case]:
-    """All recordings of the evidence, or a part of each kind."""
+def cases(part: float, nulls: int | None = None) -> Iterator[Case]:
+    """All recordings of the evidence, or a part of each kind (nulls may be given by number)."""
     from pendpipe.challenge.items import outside_names
 
     def numbers(whole: int) -> range:
         return range(max(1, round(part * whole)))
 
-    for number in numbers(1000):
+    for number in numbers(1000) if nulls is None else range(nulls):
         yield Case("null", (), 0.0, number)
     for number in numbers(20):
         for name in EFFECTS:
@@ -179,7 +179,7 @@ def _peers(item: Any) -> dict[str, Any]:
     }
 
 
-def run(part: float, processes: int) -> list[dict[str, Any]]:
+def run(part: float, processes: int, nulls: int | None = None) -> list[dict[str, Any]]:
     """Make what is missing; return all outcomes."""
     JOURNAL.parent.mkdir(exist_ok=True)
     known = {}
@@ -187,7 +187,7 @@ def run(part: float, processes: int) -> list[dict[str, Any]]:
         for line in JOURNAL.read_text(encoding="utf-8").splitlines():
             entry = json.loads(line)
             known[entry["key"]] = entry
-    wanted = list(cases(part))
+    wanted = list(cases(part, nulls))
     todo = [case for case in wanted if case.key not in known]
     with Pool(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
         for done, entry in enumerate(pool.imap_unordered(diagnosed, todo), start=1):
@@ -203,6 +203,7 @@ def main() -> None:
     """Run and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--part", type=float, default=1.0)
+    parser.add_argument("--nulls", type=int, help="this many nulls, whatever the part")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--table", action="store_true", help="write the table of what there is")
     arguments = parser.parse_args()
@@ -212,7 +213,7 @@ def main() -> None:
         lines = JOURNAL.read_text(encoding="utf-8").splitlines()
         outcomes = list({entry["key"]: entry for entry in map(json.loads, lines)}.values())
     else:
-        outcomes = run(arguments.part, arguments.processes)
+        outcomes = run(arguments.part, arguments.processes, arguments.nulls)
     text = table(outcomes)
     print(text)
     page = PAGE.read_text(encoding="utf-8")

@@ -107,7 +107,18 @@ class PlaneCoupling(Effect):
         return rows([*(-beats[::-1]), *beats])
 
 
-class PeriodicDrive(Effect):
+class SteadyTone(Effect):
+    """What a scan over frequency finds as a line that does not fade."""
+
+    sizes = 2
+    spectral = True
+
+    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
+        """A steady tone."""
+        return (frequency_hz,) if math.isinf(decay_time_s) else None
+
+
+class PeriodicDrive(SteadyTone):
     """A periodic torque: fan, building, mains. Also rings the pendulum where it sets in."""
 
     identifier = "periodic-drive"
@@ -119,17 +130,11 @@ class PeriodicDrive(Effect):
         Parameter("d_sine", "rad/s^2", -100.0, 100.0, 0.0),
         Parameter("f_d", "Hz", 0.0, 1e6),
     )
-    sizes = 2
-    spectral = True
     deciding = "record the pendulum at rest: the tone must stay, and fall off above resonance"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the drive, its time counted from the motion's start."""
         return _tone(values, 2.0 * math.pi * values[2] * since_start(motion))
-
-    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
-        """A steady tone."""
-        return (frequency_hz,) if math.isinf(decay_time_s) else None
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """A rough grid of frequencies about the pendulum's."""
@@ -137,7 +142,7 @@ class PeriodicDrive(Effect):
         return rows([*np.linspace(0.3, 0.97, 8) * own, *np.geomspace(1.03, 4.0, 8) * own])
 
 
-class TonePickup(Effect):
+class TonePickup(SteadyTone):
     """A steady tone in the reading, the alias of the mains for instance."""
 
     identifier = "tone-pickup"
@@ -149,17 +154,11 @@ class TonePickup(Effect):
         Parameter("a_sine", "rad", -10.0, 10.0, 0.0),
         Parameter("f_a", "Hz", 0.0, 1e6),
     )
-    sizes = 2
-    spectral = True
     deciding = "record with the pendulum held, and at another sampling rate: an alias moves"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the tone, its time counted from the first reading."""
         return _tone(values, 2.0 * math.pi * values[2] * (sampled.time_s - sampled.time_s[0]))
-
-    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
-        """A steady tone."""
-        return (frequency_hz,) if math.isinf(decay_time_s) else None
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """A rough grid of frequencies."""
