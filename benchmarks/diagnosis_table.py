@@ -70,7 +70,31 @@ def _detection(done: Sequence[Outcome]) -> str:
         counts = [sum(test(entry) for entry in part) for test in tests]
         cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
         rows.append(f"| {size:g} ({len(part)}) | {cells} |")
-    return "**Single effects**\n\n" + "\n".join(rows) if singles else ""
+    if not singles:
+        return ""
+    return "**Single effects**\n\n" + "\n".join(rows) + "\n\n" + _reached(singles)
+
+
+def _reached(singles: Sequence[Outcome]) -> str:
+    """Delta chi^2 at which half and nine tenths of the effects are detected, and the oracle's."""
+    import numpy as np
+
+    from pendpipe.challenge.intervals import power_ratio
+
+    sizes = np.array([entry["size"] for entry in singles])
+    ours, best = (
+        np.array([float(test(entry)) for entry in singles]) for test in (_found, _oracle_found)
+    )
+    found = power_ratio(sizes, ours, best)
+    said = []
+    for key, words in (("half", "Half"), ("nine_tenths", "Nine tenths")):
+        one = found[key]
+        low, high = one["interval95"]
+        said.append(
+            f"{words} are detected at {one['found']:.3g}, by the oracle at {one['oracle']:.3g}:"
+            f" {one['ratio']:.2f} times ({low:.2f} to {high:.2f})."
+        )
+    return " ".join(said)
 
 
 def _found(entry: Outcome) -> bool:
