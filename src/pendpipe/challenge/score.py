@@ -162,9 +162,12 @@ def held_out(items: list[Solved]) -> dict[str, Any]:
 
 
 def calibration(items: list[Solved]) -> dict[str, Any]:
-    """Compare stated probabilities of the first name with how often they come true."""
+    """Compare stated probabilities of the first name with how often they come true.
+
+    It is true if it is the name of any effect that is there: of two, either may come first.
+    """
     told = [i for i in items if i.answer.detected and np.isfinite(i.answer.probability)]
-    correct = [right(i.answer.lead, i.effect) for i in told]
+    correct = [any(right(i.answer.lead, effect) for effect in i.truth["effects"]) for i in told]
     return intervals.calibration(
         np.array([i.answer.probability for i in told]), np.array(correct, dtype=float)
     )
