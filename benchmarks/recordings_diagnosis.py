@@ -58,8 +58,8 @@ one describes most of it, and *remainder* says in which parts of the motion it l
 VISCOUS_HEAD = """### From the viscous baseline
 
 `pendpipe diagnose --baseline viscous`: Eq. 3 has neither Coulomb friction nor quadratic drag,
-so that both are to be found. On these recordings they are **not** found by name yet: the loss is
-described by other names or by a curve.
+so that both are to be found, beside what Eq. 8 leaves out. Names that stand for a part of a
+law that was not found (a step of the damping, a drift) are the tool's errors.
 """
 
 COLUMNS = [

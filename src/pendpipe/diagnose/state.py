@@ -22,8 +22,8 @@ GROSS: Final = 2.0
 """chi^2 per degree of freedom above which scores to first order mean nothing."""
 _SLIP: Final = 0.1
 """Phase in rad, likewise."""
-_MISJUDGED: Final = 2.5
-"""By how much the first guess of the noise may be too small."""
+_MISJUDGED: Final = 1.6
+"""By how much the first guess of the noise may be too small; more is a misfit."""
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
 
@@ -125,7 +125,8 @@ def settled(
         return fit, data, noise
     finer = with_lattice(data, fit.at.reading)
     left = noise_left(fit, finer, red=red)
-    if is_gross(fit, data) and left.white_rms > _MISJUDGED * noise.white_rms:
+    misjudged = not fit.model.effects and left.white_rms < _MISJUDGED * noise.white_rms
+    if is_gross(fit, data) and not misjudged:
         return fit, data, noise
     better = refine(fit.model, finer, left, fit.value, held=held)
     # What is gross beside the first guess of the noise may be noise: it is if it is so anywhere.
