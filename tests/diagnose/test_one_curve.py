@@ -9,7 +9,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose import diagnose_recording
-from pendpipe.diagnose.naming import Rival
+from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.one_curve import prefer_one_curve
 from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import Fit, refine

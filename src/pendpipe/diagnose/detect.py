@@ -126,6 +126,13 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
 
 
+def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
+    """Score effects that were not scanned, on what a fit leaves."""
+    bank = build_bank(fit, noise, effects)
+    residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
+    return _bank_leads(bank, residual, {})
+
+
 def _bank_leads(bank: Bank, residual: FloatArray, own: dict[str, Trials]) -> list[Lead]:
     if not bank.candidates:
         return []

@@ -15,7 +15,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import at_even_times
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
-from pendpipe.diagnose.naming import Rival, equivalent
+from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, Lead
+from pendpipe.diagnose.evidence import (
+    Rival,
+    class_width,
+    equivalent,
+    evidence,
+    needed_sizes,
+)
 from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.growing import grown
@@ -20,10 +25,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.curves import Curve
 
-CLASS: Final = 6.0
-"""Twice the logarithm of the likelihood within which effects are of one class."""
 _MOST: Final = 9
 _NEAR: Final = 16.0
 _ALIKE: Final = 0.98
@@ -33,44 +35,10 @@ _LOST: Final = 1.0
 """Phase in rad from which a model has lost the motion."""
 _FROM_AFAR: Final = 4
 """How many leads are then followed from the first cycles on."""
-_SHAPE: Final = 2.0
-"""What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
-_FORM: Final = 3.0
-"""Standard deviation of a difference of evidence for what a law's own form is worth."""
-_SIZE: Final = 6.0
-"""What a further size takes off a gain too large for p-values."""
 _MUCH: Final = 0.5
 """Part of the best gain that a name must explain to go before a curve."""
 _SOME: Final = 0.25
 """The same of what every pendulum has."""
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An effect, refitted.
-
-    Parameters
-    ----------
-    lead
-        What it was found by.
-    fit
-        The extended model's.
-    gain
-        Delta chi^2 over the model before it.
-    evidence
-        chi^2 of one degree of freedom that is as improbable by chance, the effect's own
-        scan counted.
-    """
-
-    lead: Lead
-    fit: Fit
-    gain: float
-    evidence: float
-
-    @property
-    def identifier(self) -> str:
-        """The effect's."""
-        return self.lead.effect.identifier
 
 
 def refit_leads(
@@ -91,7 +59,8 @@ def refit_leads(
     left = max(min(fit.chi2 for _, fit in fits) / max(data.used, 1), 1.0)
     rivals = [
         Rival(lead, fit, base.chi2 - fit.chi2,
-              evidence(lead, (base.chi2 - fit.chi2) / left, detection.chance))
+              evidence(lead, (base.chi2 - fit.chi2) / left, detection.chance,
+                       needed_sizes(fit, lead.effect)))
         for lead, fit in fits
     ]  # fmt: skip
     rivals.sort(key=lambda rival: -rival.evidence)
@@ -103,25 +72,16 @@ def _names_before_curves(rivals: list[Rival]) -> list[Rival]:
 
     And a curve of the motion or the sensor to one in time, which follows anything.
     """
-    best = rivals[0].evidence
-    near = [rival for rival in rivals if best - rival.evidence < CLASS]
-    near.sort(key=lambda rival: _freedom(rival.lead.effect))
+    best = rivals[0]
+    within = class_width(best)
+    near = [rival for rival in rivals if best.evidence - rival.evidence < within]
+    near.sort(key=lambda rival: (_freedom(rival.lead.effect), -rival.lead.effect.prior))
     return [*near, *(rival for rival in rivals if rival not in near)]
 
 
 def _freedom(effect: Effect) -> int:
     """How much an effect could follow: names, curves, curves in time."""
-    return int(effect.kind == "unnamed") + int(isinstance(effect, Curve) and effect.in_time)
-
-
-def of_one_class(best: Rival, rival: Rival) -> bool:
-    """Whether the record cannot tell two effects apart, or only what is known beforehand can.
-
-    A value that one has more takes 2 off its gain (Akaike).
-    """
-    more = max(best.lead.effect.count - rival.lead.effect.count, 0)
-    by_record = best.gain - rival.gain - _SHAPE * more < CLASS
-    return by_record or best.evidence - rival.evidence < CLASS
+    return int(effect.kind == "unnamed") + int(effect.in_time)
 
 
 def _named_first(rivals: list[Rival]) -> list[Rival]:
@@ -151,36 +111,6 @@ def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]
 
 def _rank(lead: Lead) -> float:
     return equivalent(lead.p_value, lead.score) + lead.effect.prior
-
-
-def equivalent(p_value: float, score: float) -> float:
-    """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
-    from scipy.special import ndtri_exp
-
-    if p_value <= 1e-290:
-        return score
-    return float(ndtri_exp(math.log(0.5 * p_value)) ** 2) if p_value < 1.0 else 0.0
-
-
-def evidence(lead: Lead, gain: float, chance: Chance) -> float:
-    """What a gain is worth, beside effects with more or fewer free values and shapes."""
-    from scipy.special import gammaincc
-
-    if gain <= 0.0:
-        return 0.0
-    effect = lead.effect
-    if effect.switch:
-        # Its size is predicted: a free one would have had to be found.
-        gain += max(math.log(gain) - 0.45, 0.0)
-    local = float(gammaincc(0.5 * effect.sizes, 0.5 * gain))
-    trials = chance.own.get(effect.key, Trials(1.0, 0.0))
-    if local > 1e-290:
-        worth = equivalent(trials.global_p_value(local), gain)
-    else:
-        # Too large for p-values: what trials and further sizes take off a large gain.
-        worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (effect.sizes - 1)
-    fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
-    return worth - _SHAPE * max(fitted, 0) + effect.prior
 
 
 def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
@@ -237,16 +167,3 @@ def _better(one: Fit | None, other: Fit | None) -> Fit | None:
     return one if one.chi2 <= other.chi2 else other
 
 
-def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
-    """Probability of each rival, with `none` the evidence that it is none of these.
-
-    Real laws differ a little from the catalogue's forms, so that differences of evidence
-    between names are uncertain by `_FORM`; log odds are averaged over that (MacKay's
-    approximation).
-    """
-    shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * _FORM) ** 2)
-    evidence = np.array([rival.evidence for rival in rivals])
-    best = float(evidence.max())
-    logs = np.append(0.5 * shrunk * (evidence - best), 0.5 * (none - best))
-    weights = np.exp(logs - logs.max())
-    return np.asarray(weights / weights.sum())

@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.naming import Rival
+from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import build_bank

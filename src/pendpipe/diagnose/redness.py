@@ -10,7 +10,8 @@ import numpy as np
 
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import detect, prepare
-from pendpipe.diagnose.naming import Rival, refit_leads
+from pendpipe.diagnose.evidence import Rival
+from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.detect import Detection, detect, prepare
+from pendpipe.diagnose.detect import Detection, detect, more_leads, prepare
 from pendpipe.diagnose.faults import CATALOGUE_SHARE, Forensics
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.large_first import large_first
@@ -25,7 +25,8 @@ from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
-from pendpipe.effects.curves import CURVES
+from pendpipe.effects.closer_curves import CLOSER_CURVES
+from pendpipe.effects.curves import CURVES, Curve
 
 _MOST: Final = 6
 _NEEDED: Final = 9.0
@@ -107,9 +108,14 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
+    return [*named, *undrawn(CURVES, fit)]
+
+
+def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:
+    """Curves along a fitted motion, without those that are in its model."""
     drawn = {effect.key for effect in fit.model.effects}
-    curves = [curve(fit.at.span) for curve in CURVES]
-    return [*named, *(curve for curve in curves if curve.key not in drawn)]
+    made = [curve(fit.at.span) for curve in curves]
+    return [curve for curve in made if curve.key not in drawn]
 
 
 @dataclass(frozen=True)
@@ -235,8 +241,10 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     if state.now.p_value > threshold or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
+    closer = more_leads(state.fit, state.noise, undrawn(CLOSER_CURVES, state.fit))
+    found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
-        state.fit, state.data, state.noise, state.now, held=state.holding, gross=gross,
+        state.fit, state.data, state.noise, found, held=state.holding, gross=gross,
         origin=state.origin,
     )  # fmt: skip
     if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
@@ -258,8 +266,8 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
 
 
 def _prune(state: State, progress: Progress) -> None:
-    """Drop what later effects have made needless; a curve may take anyone's place, and is none."""
-    if _drawn(state):
+    """Drop what later effects have made needless; a curve in time may follow any, and drops none."""
+    if _drawn(state) and state.steps[-1].winner.lead.effect.in_time:
         return
     for step in list(state.steps[:-1]):
         effect = step.winner.lead.effect

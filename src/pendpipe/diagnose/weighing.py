@@ -14,7 +14,7 @@ from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import locate
-from pendpipe.diagnose.naming import Rival, of_one_class, probabilities
+from pendpipe.diagnose.evidence import Rival, of_one_class, probabilities
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.review import stands_apart
@@ -43,9 +43,9 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
     own = _weighed(found, own, gain, gain)
     others = [
         _weighed(found, rival, rival.gain, gain) for rival in rivals
-        if rival.lead.effect.kind != "unnamed" and rival.identifier != effect.identifier
+        if rival.identifier != effect.identifier
     ]  # fmt: skip
-    mates = [mate for mate in others if of_one_class(own, mate)]
+    mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
     weights = weights * (1.0 if stands_apart(effect, found.improved) else _explained(found, gain))
     return Named(
@@ -58,6 +58,14 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
         curve_values(found.improved, effect, found.data.unit)
         if isinstance(effect, Curve) else None,
     )  # fmt: skip
+
+
+def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
+    """One of each identifier, the best first: several curves may draw what has no name."""
+    best: dict[str, Rival] = {}
+    for rival in sorted(rivals, key=lambda rival: -rival.evidence):
+        best.setdefault(rival.identifier, rival)
+    return list(best.values())
 
 
 def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:

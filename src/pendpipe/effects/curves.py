@@ -42,8 +42,6 @@ class Curve(Effect):
     ordinate: ClassVar[str]
     """What is drawn."""
     flavour: ClassVar[str] = ""
-    in_time: ClassVar[bool] = False
-    """Whether it is drawn against time, and so can follow anything that happens once."""
 
     def __init__(self, span: Span, mixing: FloatArray | None = None) -> None:
         self.span = span
@@ -134,7 +132,8 @@ class DampingCurve(Curve):
 
     def make_knots(self, span: Span) -> FloatArray:
         """Knots over the amplitude, in equal ratios."""
-        ends = (0.95 * span.last_amplitude, 1.05 * span.first_amplitude)
+        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
+        ends = (0.95 * last, 1.05 * span.first_amplitude)
         return np.asarray(np.geomspace(*ends, 9))
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
@@ -148,7 +147,7 @@ class DampingCurve(Curve):
 
     def scale(self, pendulum: Pendulum) -> float:
         """The usual loss rate."""
-        return _loss_rate(pendulum, self.span)
+        return usual_loss_rate(pendulum, self.span)
 
 
 class FrictionCurve(Curve):
@@ -172,7 +171,7 @@ class FrictionCurve(Curve):
 
     def scale(self, pendulum: Pendulum) -> float:
         """The usual friction."""
-        usual = _loss_rate(pendulum, self.span) * pendulum.angular_frequency
+        usual = usual_loss_rate(pendulum, self.span) * pendulum.angular_frequency
         return usual * self.span.first_amplitude
 
 
@@ -202,7 +201,7 @@ class ProfileCurve(Curve):
 
     def scale(self, pendulum: Pendulum) -> float:
         """The usual friction over the amplitude."""
-        return _loss_rate(pendulum, self.span) * pendulum.angular_frequency
+        return usual_loss_rate(pendulum, self.span) * pendulum.angular_frequency
 
 
 class DriveCurve(Curve):
@@ -284,7 +283,7 @@ class BaselineCurve(Curve):
         return 0.05 * self.span.first_amplitude
 
 
-def _loss_rate(pendulum: Pendulum, span: Span) -> float:
+def usual_loss_rate(pendulum: Pendulum, span: Span) -> float:
     """The usual loss rate, 1/s: that of the middle amplitude."""
     middle = math.sqrt(span.first_amplitude * span.last_amplitude)
     return (

@@ -161,6 +161,9 @@ class Effect:
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
 
+    in_time: ClassVar[bool] = False
+    """Whether it is drawn against time, and so can follow anything that happens once."""
+
     @property
     def key(self) -> str:
         """What tells it from other entries."""

@@ -1,0 +1,167 @@
+"""What a refitted effect is worth beside others, and how sure that makes its name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.chance import Chance, Trials
+from pendpipe.diagnose.detect import Lead
+from pendpipe.diagnose.refine import Fit
+from pendpipe.effects import Effect
+from pendpipe.effects.curves import Curve
+
+CLASS: Final = 6.0
+"""Twice the logarithm of the likelihood within which effects are of one class."""
+_SHAPE: Final = 2.0
+"""What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
+_FORM: Final = 3.0
+"""Standard deviation of a difference of evidence for what a law's own form is worth, where
+little is gained: it grows with the gain by `_MISSHAPEN`."""
+_MISSHAPEN: Final = 0.03
+"""Part of a gain that a real law leaves to the catalogue's form of it: a flexure's sinh to its
+cubic term, a drag that follows C_D(Re) to a power."""
+_KNOTTED: Final = 0.01
+"""The same of a curve, which is straight between its knots."""
+_SIZE: Final = 6.0
+"""What a further size takes off a gain too large for p-values."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect, refitted.
+
+    Parameters
+    ----------
+    lead
+        What it was found by.
+    fit
+        The extended model's.
+    gain
+        Delta chi^2 over the model before it.
+    evidence
+        chi^2 of one degree of freedom that is as improbable by chance, the effect's own
+        scan counted.
+    """
+
+    lead: Lead
+    fit: Fit
+    gain: float
+    evidence: float
+
+    @property
+    def identifier(self) -> str:
+        """The effect's."""
+        return self.lead.effect.identifier
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it is a curve without a name."""
+        return self.lead.effect.kind == "unnamed"
+
+
+def form_spread(best: Rival) -> float:
+    """Standard deviation of a difference of evidence from the best's.
+
+    The catalogue's forms are not quite those of real laws, and curves have knots.
+    """
+    part = _KNOTTED if best.drawn else _MISSHAPEN
+    return math.hypot(_FORM, part * max(best.gain, 0.0))
+
+
+def class_width(best: Rival) -> float:
+    """How far behind the best's evidence one may be that the record cannot tell from it."""
+    return CLASS * form_spread(best) / _FORM
+
+
+def of_one_class(best: Rival, rival: Rival) -> bool:
+    """Whether the record cannot tell two effects apart, or only what is known beforehand can.
+
+    A value that one has more takes 2 off its gain (Akaike).
+    """
+    within = class_width(best)
+    more = max(best.lead.effect.count - rival.lead.effect.count, 0)
+    by_record = best.gain - rival.gain - _SHAPE * more < within
+    return by_record or best.evidence - rival.evidence < within
+
+
+def equivalent(p_value: float, score: float) -> float:
+    """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
+    from scipy.special import ndtri_exp
+
+    if p_value <= 1e-290:
+        return score
+    return float(ndtri_exp(math.log(0.5 * p_value)) ** 2) if p_value < 1.0 else 0.0
+
+
+def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int]) -> float:
+    """What a gain is worth, beside effects with more or fewer free values and shapes.
+
+    Parameters
+    ----------
+    lead
+        The effect.
+    gain
+        Delta chi^2.
+    chance
+        What its own scan amounts to.
+    needed
+        Of the gain, what needless sizes make up; and how many are needed (`needed_sizes`).
+    """
+    from scipy.special import gammaincc
+
+    gain, sizes = gain - needed[0], needed[1]
+    if gain <= 0.0:
+        return 0.0
+    effect = lead.effect
+    if effect.switch:
+        # Its size is predicted: a free one would have had to be found.
+        gain += max(math.log(gain) - 0.45, 0.0)
+    local = float(gammaincc(0.5 * sizes, 0.5 * gain))
+    trials = chance.own.get(effect.key, Trials(1.0, 0.0))
+    if local > 1e-290:
+        worth = equivalent(trials.global_p_value(local), gain)
+    else:
+        # Too large for p-values: what trials and further sizes take off a large gain.
+        worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (sizes - 1)
+    fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
+    return worth - _SHAPE * max(fitted, 0) + effect.prior
+
+
+def needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
+    """How much of a gain needless sizes make up, and how many of an effect's are needed.
+
+    All are, but of a curve's mixtures: a curve is charged for those that stand out, the
+    first (which the record sees best) being taken by itself before the second, and so on.
+    """
+    if not isinstance(effect, Curve):
+        return 0.0, effect.sizes
+    place = next(place for other, place in fit.model.places() if other is effect)
+    others = [index for index in fit.free if not place.start <= index < place.stop]
+    own, rest = fit.jacobian[:, place], fit.jacobian[:, others]
+    basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
+    left = own - basis @ (basis.T @ own)
+    squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
+    needless = squares < _SIZE
+    return float(squares[needless].sum()), max(int(np.count_nonzero(~needless)), 1)
+
+
+def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
+    """Probability of each rival, with `none` the evidence that it is none of these.
+
+    Real laws differ a little from the catalogue's forms, so that differences of evidence
+    are uncertain (`form_spread`); log odds are averaged over that (MacKay's approximation).
+    """
+    spread = form_spread(max(rivals, key=lambda rival: rival.evidence))
+    shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
+    prior = np.array([rival.lead.effect.prior for rival in rivals])
+    likelihood = np.array([rival.evidence for rival in rivals]) - prior
+    best = float(likelihood.max())
+    logs = np.append(0.5 * (shrunk * (likelihood - best) + prior), 0.5 * (none - best))
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
