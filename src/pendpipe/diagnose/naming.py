@@ -20,7 +20,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.curve import Curve
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
