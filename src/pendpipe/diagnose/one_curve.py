@@ -6,7 +6,6 @@ That both should be there by chance is improbable; that one unknown thing is, is
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,7 +18,8 @@ from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import build_bank
 from pendpipe.diagnose.state import State, Step
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.curves import CURVES, Curve
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import CURVES
 
 _BETTER: Final = 40.0
 """By how much (in chi^2, two a free value counted) several names must be better than one
@@ -55,7 +55,7 @@ def _cost(fit: Fit) -> float:
 
 def _bare(state: State) -> Fit | None:
     """The baseline alone, as the readings and their noise are judged now."""
-    model = replace(state.fit.model, effects=(), _last={})
+    model = state.fit.model.bare()
     try:
         return refine(model, state.data, state.noise, state.bare, held=state.holding)
     except (NoMotionError, np.linalg.LinAlgError):

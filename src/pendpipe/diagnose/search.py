@@ -208,7 +208,7 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were mended."""
-    model = replace(state.fit.model, effects=(), _last={})
+    model = state.fit.model.bare()
     starts = [state.bare, beginning.value]
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())

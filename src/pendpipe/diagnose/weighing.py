@@ -22,7 +22,8 @@ from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.baseline import BASELINE
+from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
 _NONE: Final = 4.0
@@ -104,7 +105,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if isinstance(effect, FreedParameter):
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
-    bare = np.concatenate([found.baseline.value, value[8:]])
+    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
     without = _refined(model, found, held, value, bare, step.before.value) or step.before
     gain = without.chi2 - found.improved.chi2
     same = abs(gain - step.winner.gain) < _SAME * gain
