@@ -8,7 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
+from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.diagnose.data import Data, fast_length, gather, rounding_bias, with_lattice
+from pendpipe.diagnose.forensics.lattice import noise_before_rounding
+from pendpipe.diagnose.forensics.local import Local
 
 from .decays import rounded
 from .records import INTERVAL_S, TIME_S, TRUTH, other_engine, white
@@ -44,6 +47,18 @@ def test_the_noise_before_the_rounding_is_found(share: float, shift: float) -> N
     assert np.mod(origin / step - shift + 0.5, 1.0) == pytest.approx(0.5, abs=1e-3)
     assert noise / step == pytest.approx(share, abs=0.045)
     assert np.std(found.residual(plain)) < np.std(data.residual(plain))
+
+
+@pytest.mark.parametrize("share", [0.12, 0.25, 0.4])
+def test_where_the_model_is_the_truth_two_ways_find_the_same_noise(share: float) -> None:
+    """The fit's search between all noises, and the forensics' grid, whose steps are a fifth."""
+    step, plain = 1e-3, other_engine(TRUTH)
+    left = rounded(plain + white(4, rms=share * step), step) - plain
+    every = np.ones(len(left), dtype=bool)
+    local = Local(left, float(np.std(left)), np.zeros(len(left)), every)
+    fitted = best_noise(left, step, 0.1 * step)
+    assert fitted / step == pytest.approx(share, rel=0.1)
+    assert noise_before_rounding(local, step) == pytest.approx(fitted, rel=0.15)
 
 
 @pytest.mark.parametrize(("share", "step"), [(1.0, 1e-3), (0.3, 0.0)])

@@ -8,7 +8,8 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
-from pendpipe.effects.curves import Curve, DampingCurve, DriveCurve
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import DampingCurve, DriveCurve
 
 _POINTS: Final = 61
 

@@ -110,6 +110,11 @@ def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArra
 def with_lattice(data: Data, reading: FloatArray) -> Data:
     """Find the noise before the rounding, where the rounding's bias is seen in the readings.
 
+    This is not the noise that makes the codes likeliest (`analysis.fit.rounding.best_noise`):
+    the model may still be wrong by a part of the step, which smears the bias as noise does.
+    What counts is how much of the sawtooth is left in the residual, and whether it is worth
+    taking off.
+
     Parameters
     ----------
     data

@@ -14,7 +14,7 @@ from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.curve import Curve
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
@@ -149,6 +149,24 @@ def needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
     needless = squares < _SIZE
     return float(squares[needless].sum()), max(int(np.count_nonzero(~needless)), 1)
+
+
+def ranked(rivals: Sequence[Rival]) -> list[Rival]:
+    """Sort by evidence, names before curves that the record cannot tell from them.
+
+    Curves follow any law; and those in time follow anything, so that a curve of the motion or
+    the sensor goes before them.
+    """
+    best = max(rivals, key=lambda rival: rival.evidence)
+    within = class_width(best)
+
+    def order(rival: Rival) -> tuple[int, float, float]:
+        if best.evidence - rival.evidence >= within:
+            return 3, 0.0, -rival.evidence
+        freedom = int(rival.drawn) + int(rival.lead.effect.in_time)
+        return freedom, -rival.lead.effect.prior if rival.drawn else 0.0, -rival.evidence
+
+    return sorted(rivals, key=order)
 
 
 def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:

@@ -13,9 +13,9 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import at_even_times
+from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
-from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress
@@ -74,19 +74,22 @@ class Forensics:
         for name in [name for name in _BEHIND if name not in known]:
             self._examine(name, state, progress)
 
+    def _tested(self, name: str, state: State) -> tuple[Finding, float]:
+        """Make one test; its p-value is that of the test's share of the level."""
+        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
+        return finding, min(finding.p_value / _EACH, 1.0)
+
     def _examine(self, name: str, state: State, progress: Progress) -> bool:
         """Make one test; keep what it finds; say whether to look again."""
-        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
-        p_value = min(finding.p_value / _EACH, 1.0)
-        if not any(fault.finding.identifier == finding.identifier for fault in state.faults):
+        finding, p_value = self._tested(name, state)
+        known = any(fault.finding.identifier == name for fault in state.faults)
+        if not known:
             self.p_value = min(self.p_value, p_value)
         if finding.kind != "fault" or p_value > self.level:
             return False
         progress(f"{name}: {finding.summary}")
-        known = [fault for fault in state.faults if fault.finding.identifier != name]
-        earlier = [fault for fault in state.faults if fault.finding.identifier == name]
-        kept = Fault(finding, p_value) if not earlier else earlier[0]
-        state.faults[:] = [*known, kept]
+        if not known:
+            state.faults.append(Fault(finding, p_value))
         if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
             return False
         data = state.data.masked((state.data.weight == 0.0) | finding.mask)
@@ -142,8 +145,7 @@ class Forensics:
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
         """Ask whether random kicks explain more than the best effect of the catalogue does."""
         name = "broadband-drive"
-        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
-        p_value = min(finding.p_value / _EACH, 1.0)
+        finding, p_value = self._tested(name, state)
         lead = _BEFORE_CURVES if rival.lead.effect.kind == "unnamed" else 0.0
         if p_value > self.level:
             return False

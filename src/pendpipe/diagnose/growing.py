@@ -8,7 +8,6 @@ fitted, then over more and more of the record, each time from where the last one
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -67,7 +66,7 @@ def grown(
         count = int(growth * count)
     while count < len(data):
         part = data.first(count)
-        short = replace(model, time_s=part.time_s, _last={})
+        short = model.at_times(part.time_s)
         value = refine(
             short, part, white_noise(part, noise_rms), value, held=fixed, rounds=_ROUNDS
         ).value

@@ -70,7 +70,7 @@ def _large_readings(beginning: Beginning) -> int | None:
 
 def _first_part(beginning: Beginning, state: State, count: int) -> State | None:
     data = state.data.first(count)
-    model = replace(beginning.model, time_s=data.time_s, _last={})
+    model = beginning.model.at_times(data.time_s)
     noise = first_noise(replace(beginning, data=data, model=model))
     try:
         fit = refine(model, data, noise, beginning.value, held=state.holding)

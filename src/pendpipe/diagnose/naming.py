@@ -13,10 +13,10 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, Lead
 from pendpipe.diagnose.evidence import (
     Rival,
-    class_width,
     equivalent,
     evidence,
     needed_sizes,
+    ranked,
 )
 from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
@@ -63,29 +63,12 @@ def refit_leads(
                        needed_sizes(fit, lead.effect)))
         for lead, fit in fits
     ]  # fmt: skip
-    rivals.sort(key=lambda rival: -rival.evidence)
-    return _named_first(rivals) if gross else _names_before_curves(rivals)
-
-
-def _names_before_curves(rivals: list[Rival]) -> list[Rival]:
-    """Prefer a name to a curve that the record cannot tell from it: curves follow any law.
-
-    And a curve of the motion or the sensor to one in time, which follows anything.
-    """
-    best = rivals[0]
-    within = class_width(best)
-    near = [rival for rival in rivals if best.evidence - rival.evidence < within]
-    near.sort(key=lambda rival: (_freedom(rival.lead.effect), -rival.lead.effect.prior))
-    return [*near, *(rival for rival in rivals if rival not in near)]
-
-
-def _freedom(effect: Effect) -> int:
-    """How much an effect could follow: names, curves, curves in time."""
-    return int(effect.kind == "unnamed") + int(effect.in_time)
+    return _named_first(rivals) if gross else ranked(rivals)
 
 
 def _named_first(rivals: list[Rival]) -> list[Rival]:
     """While the misfit is gross, prefer names that explain much of it to curves that bend."""
+    rivals = sorted(rivals, key=lambda rival: -rival.evidence)
     best = max(rival.gain for rival in rivals)
     named = [
         rival for rival in rivals
@@ -165,5 +148,3 @@ def _better(one: Fit | None, other: Fit | None) -> Fit | None:
     if one is None or other is None:
         return one or other
     return one if one.chi2 <= other.chi2 else other
-
-

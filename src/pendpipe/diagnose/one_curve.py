@@ -6,20 +6,22 @@ That both should be there by chance is improbable; that one unknown thing is, is
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.chance import Chance
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import Rival
+from pendpipe.diagnose.evidence import Rival, evidence, needed_sizes, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import build_bank
 from pendpipe.diagnose.state import State, Step
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.curves import CURVES, Curve
+from pendpipe.effects.closer_curves import CLOSER_CURVES
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import CURVES
 
 _BETTER: Final = 40.0
 """By how much (in chi^2, two a free value counted) several names must be better than one
@@ -35,18 +37,22 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     bare = _bare(state)
     if bare is None:
         return
-    found = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
-    if not found:
+    fits = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
+    if not fits or min(map(_cost, fits)) > _cost(state.fit) + _BETTER:
         return
-    best = min(found, key=_cost)
-    if _cost(best) > _cost(state.fit) + _BETTER:
-        return
-    curve = best.model.effects[-1]
-    progress(f"{curve.identifier} alone does as well as {len(names)} names")
-    gain = bare.chi2 - best.chi2
+    assert state.first is not None
+    rivals = ranked([_rival(bare, fit, state.first.chance) for fit in fits])
+    best = rivals[0]
+    progress(f"{best.identifier} alone does as well as {len(names)} names")
+    state.steps[:] = [Step(tuple(rivals), names[0].p_value, bare)]
+    state.settle(best.fit)
+
+
+def _rival(bare: Fit, fit: Fit, chance: Chance) -> Rival:
+    curve = fit.model.effects[-1]
+    gain = bare.chi2 - fit.chi2
     lead = Lead(curve, (), gain, 0.0)
-    state.steps[:] = [Step((Rival(lead, best, gain, gain),), names[0].p_value, bare)]
-    state.settle(best)
+    return Rival(lead, fit, gain, evidence(lead, gain, chance, needed_sizes(fit, curve)))
 
 
 def _cost(fit: Fit) -> float:
@@ -55,7 +61,7 @@ def _cost(fit: Fit) -> float:
 
 def _bare(state: State) -> Fit | None:
     """The baseline alone, as the readings and their noise are judged now."""
-    model = replace(state.fit.model, effects=(), _last={})
+    model = state.fit.model.bare()
     try:
         return refine(model, state.data, state.noise, state.bare, held=state.holding)
     except (NoMotionError, np.linalg.LinAlgError):
@@ -64,7 +70,7 @@ def _bare(state: State) -> Fit | None:
 
 def _curves(bare: Fit, state: State) -> list[Curve]:
     """The mixtures that the recording can see; a curve in time follows anything, and is none."""
-    drawn = [curve(bare.at.span) for curve in CURVES if not curve.in_time]
+    drawn = [curve(bare.at.span) for curve in (*CURVES, *CLOSER_CURVES) if not curve.in_time]
     seen = build_bank(bare, state.noise, drawn).candidates
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 

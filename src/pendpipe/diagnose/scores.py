@@ -20,7 +20,7 @@ from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
 from pendpipe.effects import Effect
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.curve import Curve
 from pendpipe.effects.responses import responses
 
 _SEEN = 1e-4

@@ -26,7 +26,8 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.closer_curves import CLOSER_CURVES
-from pendpipe.effects.curves import CURVES, Curve
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import CURVES
 
 _MOST: Final = 6
 _NEEDED: Final = 9.0
@@ -214,7 +215,7 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were mended."""
-    model = replace(state.fit.model, effects=(), _last={})
+    model = state.fit.model.bare()
     starts = [state.bare, beginning.value]
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())

@@ -12,8 +12,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection
-from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.evidence import Rival
+from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA

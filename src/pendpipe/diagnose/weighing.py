@@ -12,9 +12,9 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.curve_values import curve_values
+from pendpipe.diagnose.evidence import Rival, of_one_class, probabilities
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import locate
-from pendpipe.diagnose.evidence import Rival, of_one_class, probabilities
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.review import stands_apart
@@ -22,7 +22,8 @@ from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.baseline import BASELINE
+from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
 _NONE: Final = 4.0
@@ -112,7 +113,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if isinstance(effect, FreedParameter):
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
-    bare = np.concatenate([found.baseline.value, value[8:]])
+    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
     without = _refined(model, found, held, value, bare, step.before.value) or step.before
     gain = without.chi2 - found.improved.chi2
     same = abs(gain - step.winner.gain) < _SAME * gain

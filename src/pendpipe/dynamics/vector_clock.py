@@ -49,11 +49,35 @@ class HalfCycles:
     polynomials: FloatArray
 
 
-@dataclass
+@dataclass(frozen=True)
+class _Place:
+    """Where a panel lies: its start and width in psi, and about which centre, from which side.
+
+    `radius` is that of each half cycle at the start; on the `finest` panel any error is taken.
+    """
+
+    radius: FloatArray
+    psi: float
+    width: float
+    side: float
+    centre: float
+
+    @property
+    def finest(self) -> bool:
+        return self.width <= FINEST
+
+    @property
+    def phase(self) -> FloatArray:
+        """At the nodes, shape (17,)."""
+        return np.asarray(self.psi + 0.5 * self.width * (1.0 + NODES))
+
+
+@dataclass(frozen=True)
 class _Panel:
+    """A panel's radii and times since its start at the nodes, (half cycles, 17)."""
+
     radius: FloatArray
     time_s: FloatArray
-    resolved: bool
 
 
 def half_cycles(law: Autonomous, start: FloatArray, side: float, centre: float) -> HalfCycles:
@@ -73,11 +97,11 @@ def half_cycles(law: Autonomous, start: FloatArray, side: float, centre: float) 
         width = min(width, math.pi - psi)
         if math.pi - psi - width < 1e-9 * width:
             width = math.pi - psi
-        finest = width <= FINEST
-        panel = _solve(law, radius, psi, width, side, centre, finest)
-        inverted = _in_time(panel, radius, psi, width, side, centre, finest) if panel else None
+        place = _Place(radius, psi, width, side, centre)
+        panel = _solve(law, place)
+        inverted = _in_time(panel, place) if panel else None
         if panel is None or inverted is None:
-            if finest:
+            if place.finest:
                 message = "the pendulum does not swing through its equilibrium"
                 raise ValueError(message)
             width *= 0.5
@@ -90,21 +114,13 @@ def half_cycles(law: Autonomous, start: FloatArray, side: float, centre: float) 
     return HalfCycles(centre + side * radius, np.stack(ends, 1), np.stack(polynomials, 1))
 
 
-def _solve(
-    law: Autonomous,
-    radius: FloatArray,
-    psi: float,
-    width: float,
-    side: float,
-    centre: float,
-    finest: bool,
-) -> _Panel | None:
+def _solve(law: Autonomous, place: _Place) -> _Panel | None:
     """Solve a panel by Picard's iteration; None if it is too wide."""
-    omega = law.restoring.angular_frequency
-    phase = psi + 0.5 * width * (1.0 + NODES)
-    cos, sin = np.cos(phase), np.sin(phase)
-    r = np.repeat(radius[:, None], NODES.size, axis=1)
-    integrate = 0.5 * width * INTEGRATION.T
+    omega, side, centre = law.restoring.angular_frequency, place.side, place.centre
+    cos, sin = np.cos(place.phase), np.sin(place.phase)
+    radius = place.radius[:, None]
+    r = np.repeat(radius, NODES.size, axis=1)
+    integrate = 0.5 * place.width * INTEGRATION.T
     before = np.inf
     for _ in range(60):
         push = -side * law.acceleration(centre - side * r * cos, side * omega * r * sin, side)
@@ -112,10 +128,10 @@ def _solve(
         if not (turning > 0.0).all():
             return None
         slope = -sin * (omega * r * cos + push / omega) / turning
-        new = radius[:, None] + slope @ integrate
+        new = radius + slope @ integrate
         if not (new > 0.0).all():
             return None
-        change = float(np.max(np.abs(new - r) / radius[:, None]))
+        change = float(np.max(np.abs(new - r) / radius))
         r = new
         if change < 1e-15 or (change < 1e-13 and change >= before):
             break
@@ -123,11 +139,11 @@ def _solve(
     else:
         return None
     clock = 1.0 / turning
-    fine = finest or (
-        _unresolved(slope / radius[:, None]) * width <= TOLERANCE
-        and _unresolved(clock * omega) * width <= TOLERANCE
+    fine = place.finest or (
+        _unresolved(slope / radius) * place.width <= TOLERANCE
+        and _unresolved(clock * omega) * place.width <= TOLERANCE
     )
-    return _Panel(r, clock @ integrate, fine) if fine else None
+    return _Panel(r, clock @ integrate) if fine else None
 
 
 def _unresolved(values: FloatArray) -> float:
@@ -137,18 +153,9 @@ def _unresolved(values: FloatArray) -> float:
     return float(np.max(last * np.minimum(1.0, last / before)))
 
 
-def _in_time(
-    panel: _Panel,
-    radius: FloatArray,
-    psi: float,
-    width: float,
-    side: float,
-    centre: float,
-    finest: bool,
-) -> FloatArray | None:
+def _in_time(panel: _Panel, place: _Place) -> FloatArray | None:
     """Return the angle as polynomials in the panel's time; None if these do not resolve it."""
-    phase = psi + 0.5 * width * (1.0 + NODES)
-    angle = centre - side * panel.radius * np.cos(phase)
+    angle = place.centre - place.side * panel.radius * np.cos(place.phase)
     duration = panel.time_s[:, -1:]
     target = 0.5 * duration * (1.0 + NODES)
     zeta = np.broadcast_to(NODES, target.shape).copy()
@@ -163,7 +170,7 @@ def _in_time(
         if np.max(np.abs(step)) < 1e-10:
             break
     values = np.einsum("kij,kj->ki", _chebyshev_table(zeta), angle @ ANALYSIS.T)
-    if not finest and _unresolved(values / radius[:, None]) > TOLERANCE:
+    if not place.finest and _unresolved(values / place.radius[:, None]) > TOLERANCE:
         return None
     return np.asarray(values @ ANALYSIS.T @ _POWERS)
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendpipe.effects.curves import Curve, FrictionCurve, usual_loss_rate
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import FrictionCurve, usual_loss_rate
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -45,9 +46,7 @@ class MemoryCurve(FrictionCurve):
         phase = np.mod(motion.clock.psi, np.pi)
         phase[:, -1] = np.pi
         way = motion.amplitude * (1.0 - np.cos(phase))
-        return np.asarray(
-            -motion.direction * self.scale(pendulum) * self.curve(values, way)
-        )
+        return np.asarray(-motion.direction * self.scale(pendulum) * self.curve(values, way))
 
 
 class DampingInTimeCurve(Curve):
@@ -113,9 +112,7 @@ class DelayCurve(GainCurve):
     equation = r"y = x(t - \tau(y))"
     argument, ordinate = "amplitude, rad", "delay, s"
     flavour = "delay"
-    deciding = (
-        "pass a light barrier at the middle: its times must show the same frequency"
-    )
+    deciding = "pass a light barrier at the middle: its times must show the same frequency"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -tau(r) v."""

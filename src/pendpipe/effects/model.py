@@ -72,6 +72,14 @@ class Model:
         """The same for readings at other times."""
         return replace(self, time_s=time_s, _last={})
 
+    def bare(self) -> Model:
+        """The baseline alone."""
+        return replace(self, effects=(), _last={})
+
+    def over(self, half_cycles: int) -> Model:
+        """The same, followed over so many half cycles."""
+        return replace(self, half_cycles=half_cycles, _last={})
+
     @property
     def size(self) -> int:
         """Number of values."""

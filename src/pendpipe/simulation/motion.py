@@ -68,7 +68,7 @@ def _longest(model: Model, value: FloatArray, omega: float, place: str) -> Piece
     found: Pieces | None = None
     while good < count < bad:
         try:
-            pieces = replace(model, half_cycles=count, _last={}).follow(value)
+            pieces = model.over(count).follow(value)
         except NoMotionError:
             bad = count
         else:

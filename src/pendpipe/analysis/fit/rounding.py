@@ -65,7 +65,10 @@ def rounded(
 def best_noise(residual: FloatArray, step: float, start: float) -> float:
     """Noise before the rounding that makes the readings likeliest, between step/25 and step.
 
-    By golden section on its logarithm.
+    By golden section on its logarithm. The diagnosis asks about the same noise in two more
+    places, each with a question of its own: what a reading's neighbours make of it
+    (`forensics.lattice.noise_before_rounding`), and whether the rounding's bias is to be seen
+    at all (`diagnose.data.with_lattice`).
     """
     score, weight = np.empty_like(residual), np.empty_like(residual)
 

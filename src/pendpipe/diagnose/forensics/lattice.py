@@ -85,6 +85,10 @@ def whole_readings(data: Data, samples: Samples) -> slice | None:
 def noise_before_rounding(local: Local, step: float) -> float:
     """Maximum likelihood of the noise that was there before rounding, from P(code).
 
+    The likelihood is that of `analysis.fit.rounding`, but here the true angle is no model's:
+    it is drawn through the neighbours, whose own noise it carries. So each reading has a
+    spread of its own, and those that are no noise at all (glitches) have no say.
+
     Parameters
     ----------
     local

@@ -1,0 +1,86 @@
+"""A record down to small amplitudes, whose first swings the baseline cannot follow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.growing import grown
+from pendpipe.diagnose.large_first import large_first
+from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.state import State, first_noise, is_gross
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.baseline import OMEGA, B
+from pendpipe.effects.circular_error import CircularError
+from pendpipe.recording import Recording
+
+from .records import TRUTH, beginning_of, other_engine, recording
+
+RATE_HZ, NOISE_RAD, LINEAR, OMEGA_TRUE, RELEASE_RAD = 15.0, 1e-3, 0.03, 6.1, 1.3
+TIME_S = np.arange(1500) / RATE_HZ
+
+
+def wide_swings() -> FloatArray:
+    """Solve x'' + omega^2 sin x + 2 b x' = 0 from 1.3 rad down to a twentieth of it."""
+
+    def rate(_: float, state: FloatArray) -> list[float]:
+        x, v = state
+        return [v, -(OMEGA_TRUE**2) * math.sin(x) - 2.0 * LINEAR * v]
+
+    begin = [RELEASE_RAD, 0.0]
+    solved = solve_ivp(rate, (0.0, TIME_S[-1]), begin, "DOP853", t_eval=TIME_S, rtol=1e-10)
+    return np.asarray(solved.y[0] + NOISE_RAD * np.random.default_rng(4).standard_normal(1500))
+
+
+def searching(record: Recording) -> tuple[State, list[int]]:
+    """Search with circular error alone; and over how many readings it was asked for."""
+    beginning = beginning_of(record)
+    noise = first_noise(beginning)
+    fit = refine(beginning.model, beginning.data, noise, beginning.value)
+    state = State(fit, beginning.data, noise, [], beginning.value, fit.value)
+    asked: list[int] = []
+
+    def add_circular_error(part: State) -> bool:
+        asked.append(len(part.data))
+        if part.fit.model.effects:
+            return False
+        model = part.fit.model.adding(CircularError())
+        start = np.append(beginning.value, 1.0)
+        try:
+            value = grown(model, part.data, part.noise.white_rms, start)
+        except NoMotionError:
+            return False
+        part.settle(refine(model, part.data, part.noise, value))
+        return True
+
+    large_first(beginning, state, add_circular_error)
+    return state, asked
+
+
+def test_what_rules_the_large_amplitudes_is_found_there_and_followed_to_the_end() -> None:
+    state, asked = searching(Recording(TIME_S, wide_swings(), "angle_rad"))
+    assert asked[0] < 0.8 * len(TIME_S)
+    assert [effect.identifier for effect in state.fit.model.effects] == ["circular-error"]
+    assert len(state.data) > 0.9 * len(TIME_S)
+    assert state.fit.chi2 / state.data.used == pytest.approx(1.0, abs=0.15)
+    covariance = state.fit.covariance()
+    for index, truth in ((OMEGA, OMEGA_TRUE), (B, LINEAR)):
+        assert abs(state.fit.value[index] - truth) < 5.0 * math.sqrt(covariance[index, index])
+
+
+def test_a_record_that_the_baseline_explains_is_searched_as_a_whole() -> None:
+    state, asked = searching(recording(other_engine(TRUTH), 2))
+    assert not is_gross(state.fit, state.data)
+    assert asked == []
+
+
+def test_a_record_of_large_amplitudes_alone_is_searched_as_a_whole() -> None:
+    """A quarter of it, over which the swing falls to half."""
+    quarter = slice(0, len(TIME_S) // 4)
+    state, asked = searching(Recording(TIME_S[quarter], wide_swings()[quarter], "angle_rad"))
+    assert is_gross(state.fit, state.data)
+    assert asked == []
