@@ -26,7 +26,7 @@ little is gained: it grows with the gain by `_MISSHAPEN`."""
 _MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it: a flexure's sinh to its
 cubic term, a drag that follows C_D(Re) to a power."""
-_KNOTTED: Final = 0.01
+_KNOTTED: Final = 0.02
 """The same of a curve, which is straight between its knots."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""

@@ -6,6 +6,7 @@ That both should be there by chance is improbable; that one unknown thing is, is
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import Rival, evidence, needed_sizes, ranked
+from pendpipe.diagnose.evidence import Rival, evidence, form_spread, needed_sizes, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import build_bank
@@ -38,11 +39,13 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     if bare is None:
         return
     fits = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
-    if not fits or min(map(_cost, fits)) > _cost(state.fit) + _BETTER:
+    if not fits:
         return
     assert state.first is not None
     rivals = ranked([_rival(bare, fit, state.first.chance) for fit in fits])
     best = rivals[0]
+    if _cost(best.fit) > _cost(state.fit) + math.hypot(_BETTER, form_spread(best)):
+        return
     progress(f"{best.identifier} alone does as well as {len(names)} names")
     state.steps[:] = [Step(tuple(rivals), names[0].p_value, bare)]
     state.settle(best.fit)

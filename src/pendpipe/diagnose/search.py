@@ -267,7 +267,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
 
 
 def _prune(state: State, progress: Progress) -> None:
-    """Drop what later effects have made needless; a curve in time may follow any, and drops none."""
+    """Drop what later effects have made needless; a curve in time, that follows any, drops none."""
     if _drawn(state) and state.steps[-1].winner.lead.effect.in_time:
         return
     for step in list(state.steps[:-1]):

@@ -32,6 +32,8 @@ class MemoryCurve(FrictionCurve):
     equation = r"\ddot x \to \ddot x + g(|x - x_\mathrm{turn}|)\,\mathrm{sgn}\,\dot x"
     argument, ordinate = "way since the turning point, rad", "extra friction, rad/s^2"
     flavour = "memory"
+    prior = -4.0
+    # Every clamp and bearing creeps a little before it slides.
     deciding = (
         "turn it back in mid swing, by hand and slowly: the friction must start anew from there"
     )

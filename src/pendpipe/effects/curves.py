@@ -136,6 +136,7 @@ class DriveCurve(Curve):
     """A torque that comes and goes with the time, in step with the motion."""
 
     in_time = True
+    prior = -9.0
     identifier = "unnamed-drive"
     name = "a torque that depends on the time in an unknown way"
     equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
