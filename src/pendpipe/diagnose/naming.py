@@ -102,9 +102,9 @@ def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     Two tones of nearly one frequency can take each other's place: a second that is as large
     as the first describes a change of phase, and no second mode.
     """
-    if effect.kind == "unnamed":
-        return True
     first = len(base.value) + effect.switch
+    if not effect.believable(fit.value[first:]):
+        return False
     sizes = [
         float(fit.value[first + index])
         for index, parameter in enumerate(effect.parameters[: effect.sizes])

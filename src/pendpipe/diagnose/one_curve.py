@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.chance import Chance
+from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.evidence import Rival, evidence, form_spread, needed_sizes, ranked
 from pendpipe.diagnose.progress import Progress
@@ -28,6 +28,8 @@ _BETTER: Final = 40.0
 """By how much (in chi^2, two a free value counted) several names must be better than one
 curve: each name is one of some forty (2 ln 40 = 7), and to need two at once is rare."""
 _EACH: Final = 2.0
+_NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
+"""A curve has no shapes to try."""
 
 
 def prefer_one_curve(state: State, progress: Progress) -> None:
@@ -41,8 +43,7 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     fits = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
     if not fits:
         return
-    assert state.first is not None
-    rivals = ranked([_rival(bare, fit, state.first.chance) for fit in fits])
+    rivals = ranked([_rival(bare, fit) for fit in fits])
     best = rivals[0]
     if _cost(best.fit) > _cost(state.fit) + math.hypot(_BETTER, form_spread(best)):
         return
@@ -51,11 +52,11 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     state.settle(best.fit)
 
 
-def _rival(bare: Fit, fit: Fit, chance: Chance) -> Rival:
+def _rival(bare: Fit, fit: Fit) -> Rival:
     curve = fit.model.effects[-1]
     gain = bare.chi2 - fit.chi2
     lead = Lead(curve, (), gain, 0.0)
-    return Rival(lead, fit, gain, evidence(lead, gain, chance, needed_sizes(fit, curve)))
+    return Rival(lead, fit, gain, evidence(lead, gain, _NO_SCAN, needed_sizes(fit, curve)))
 
 
 def _cost(fit: Fit) -> float:
@@ -81,6 +82,7 @@ def _curves(bare: Fit, state: State) -> list[Curve]:
 def _drawn(bare: Fit, curve: Curve, state: State) -> Fit | None:
     start: FloatArray = np.concatenate([bare.value, np.zeros(curve.count)])
     try:
-        return refine(bare.model.adding(curve), state.data, state.noise, start, held=state.holding)
+        fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.holding)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
+    return fit if curve.believable(fit.value[len(bare.value) :]) else None

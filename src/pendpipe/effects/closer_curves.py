@@ -32,8 +32,6 @@ class MemoryCurve(FrictionCurve):
     equation = r"\ddot x \to \ddot x + g(|x - x_\mathrm{turn}|)\,\mathrm{sgn}\,\dot x"
     argument, ordinate = "way since the turning point, rad", "extra friction, rad/s^2"
     flavour = "memory"
-    prior = -4.0
-    # Every clamp and bearing creeps a little before it slides.
     deciding = (
         "turn it back in mid swing, by hand and slowly: the friction must start anew from there"
     )
@@ -42,6 +40,11 @@ class MemoryCurve(FrictionCurve):
         """Knots from a turning point to the next, closer where the way begins."""
         shares = np.array([0.0, 0.03, 0.08, 0.16, 0.28, 0.44, 0.66, 1.02])
         return np.asarray(2.0 * span.first_amplitude * shares)
+
+    def believable(self, values: FloatArray) -> bool:
+        """A contact that is pushed on resists the more the farther it has crept."""
+        first, *_, last = self.mixing @ values
+        return bool(last > first)
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -g(r (1 - cos psi)) sgn(v), psi from the last turning point."""
@@ -84,7 +87,7 @@ class GainCurve(Curve):
     equation = r"y = x\,[1 + g(y)]"
     argument, ordinate = "amplitude, rad", "gain less 1"
     flavour = "gain"
-    prior = -9.0
+    prior = -8.0
     deciding = "film the swing: a second sensor must see the same amplitudes"
 
     def make_knots(self, span: Span) -> FloatArray:

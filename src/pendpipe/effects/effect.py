@@ -191,6 +191,10 @@ class Effect:
         """Return the extra acceleration, rad/s^2, at the nodes of a motion."""
         return None
 
+    def believable(self, values: FloatArray) -> bool:
+        """Whether fitted values are those of the thing that is named."""
+        return True
+
     def kick(self, values: FloatArray) -> Kick | None:
         """Return the sudden change of the motion."""
         return None
