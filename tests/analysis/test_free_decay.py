@@ -232,3 +232,25 @@ def test_metres_are_as_good_as_radians() -> None:
     found = find_free_decay(moved)
     assert found.start_s == 0.0
     assert len(found.of(moved)) >= 0.9 * len(moved)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "phase"), [(0.6305, -2.0), (0.722, -1.0), (0.8257, 1.0), (0.8379, 2.0)]
+)
+@pytest.mark.parametrize("wild", [False, True])
+def test_few_samples_a_cycle_hold_no_amplitude_up(
+    frequency_hz: float, phase: float, wild: bool
+) -> None:
+    """With 12 to 16 samples a cycle the turning points lie between samples, now more, now less.
+
+    That beats slowly, and must not pass for a driven beginning; a wild reading is none either.
+    """
+    time = 0.1 * np.arange(3000)
+    angle = 0.06 * np.exp(-0.0055 * time) * np.cos(2.0 * np.pi * frequency_hz * time + phase)
+    angle += 2e-5 * np.random.default_rng(3).standard_normal(len(time))
+    if wild:
+        angle[[40, 2500]] += 0.1
+    found = find_free_decay(Recording(time, angle, "angle_rad"))
+    assert found.start_s == 0.0
+    assert found.stop_s == time[-1]
+    assert not found.cuts

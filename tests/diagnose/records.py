@@ -33,7 +33,7 @@ LINEAR = np.array([0.0, 9.6e-3, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.01])
 INSTANT_S, TONE_HZ = 41.3, 3.3
 VALUES: dict[str, tuple[float, ...]] = {
     "circular-error": (1.0,),
-    "frequency-drift": (3e-6,),
+    "frequency-drift": (6e-6, 40.0),
     "equilibrium-step": (4e-4, INSTANT_S),
     "tone-pickup": (2e-4, 1.5e-4, TONE_HZ),
     "sensor-quadratic": (0.02,),

@@ -43,8 +43,10 @@ def test_the_density_of_noise_is_that_of_its_distribution() -> None:
 def test_an_effect_that_is_not_there_predicts_no_better(name: str) -> None:
     """One free value more loses half a unit of ln p, give or take a few."""
     fit, data, noise = null_fit()
-    model = fit.model.adding(by_identifier(name))
-    more = refine(model, data, noise, np.append(fit.value, 0.0))
+    effect = by_identifier(name)
+    model = fit.model.adding(effect)
+    shape = [parameter.default for parameter in effect.parameters[effect.sizes :]]
+    more = refine(model, data, noise, np.concatenate([fit.value, [0.0], shape]))
     found = held_out(fit, more, data, noise, (), ())
     assert found.gain < 6.0
     assert found.gain < 3.0 * found.gain_sd + 1.0

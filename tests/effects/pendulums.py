@@ -32,7 +32,7 @@ VALUES: dict[str, tuple[float, ...]] = {
     "second-mode": (1e-3, 2e-3, 4.3, 3.0),
     "plane-coupling": (1e-3, 5e-4, 0.02),
     "periodic-drive": (5e-4, 3e-4, 1.2),
-    "frequency-drift": (1e-5,),
+    "frequency-drift": (1e-5, 30.0),
     "damping-drift": (1e-4, 25.0),
     "equilibrium-creep": (1e-3, 10.0, 0.5),
     "equilibrium-step": (1e-3, 21.03),
@@ -44,11 +44,11 @@ VALUES: dict[str, tuple[float, ...]] = {
     "sensor-quadratic": (0.05,),
     "sensor-cubic": (0.05,),
     "sensor-backlash": (1e-3,),
-    "offset-drift": (1e-5,),
-    "gain-drift": (1e-4,),
+    "offset-drift": (1e-5, 25.0),
+    "gain-drift": (1e-4, 20.0),
     "ac-coupling": (1e-3, 5.0),
     "tone-pickup": (1e-3, 5e-4, 3.3),
-    "clock-drift": (1e-5,),
+    "clock-drift": (1e-5, 15.0),
     "dropped-samples": (1e-2, 21.03),
 }
 """Values at which each effect with a template is plain to see."""

@@ -70,7 +70,11 @@ CASES: dict[str, tuple[tuple[float, ...], Any, dict[str, Any]]] = {
         ),
         {},
     ),
-    "frequency-drift": ((1e-4,), lambda t, x, v, s, turn: -2e-4 * OMEGA**2 * t * x, {}),
+    "frequency-drift": (
+        (1e-4, 7.0),
+        lambda t, x, v, s, turn: 1.4e-3 * OMEGA**2 * math.expm1(-t / 7.0) * x,
+        {},
+    ),
     "equilibrium-creep": (
         (3e-3, 4.0, 0.0), lambda t, x, v, s, turn: 3e-3 * OMEGA**2 * math.log1p(t / 4.0), {},
     ),

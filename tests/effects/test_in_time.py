@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.scan import STRAIGHT_S
 
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
@@ -19,7 +20,7 @@ CYCLE = 2.0 * math.pi / OMEGA
 def test_a_drifting_frequency_runs_ahead_with_the_square_of_time() -> None:
     """The phase is w (t + eps t^2/2)."""
     eps = 1e-4
-    found = evaluated("frequency-drift", (eps,), baseline(b=0.01), TIME).reading
+    found = evaluated("frequency-drift", (eps, STRAIGHT_S), baseline(b=0.01), TIME).reading
     for start in (0.0, 20.0, 45.0):
         window = lock_in(TIME, found, OMEGA, start, start + 8.0 * CYCLE)
         assert window.angular_frequency / OMEGA - 1.0 == pytest.approx(

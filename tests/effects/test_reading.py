@@ -7,6 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.scan import STRAIGHT_S
+
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
 
@@ -51,17 +54,33 @@ def test_play_in_the_sensor_is_the_play_operator() -> None:
 
 
 def test_drifts_of_offset_and_gain() -> None:
+    """They relax; where nothing is said of that, they are straight."""
+    tau = 12.0
+    relaxed = tau * (1.0 - np.exp(-TIME / tau))
     np.testing.assert_allclose(
-        reading("offset-drift", (1e-4,), BASE, TIME), OWN + 1e-4 * TIME, 0.0, 1e-12
+        reading("offset-drift", (1e-4, tau), BASE, TIME), OWN + 1e-4 * relaxed, 0.0, 1e-12
     )
     np.testing.assert_allclose(
-        reading("gain-drift", (1e-3,), BASE, TIME), OWN * (1.0 + 1e-3 * TIME), 0.0, 1e-12
+        reading("gain-drift", (1e-3, tau), BASE, TIME), OWN * (1.0 + 1e-3 * relaxed), 0.0, 1e-12
     )
+    np.testing.assert_allclose(
+        reading("offset-drift", (1e-4, STRAIGHT_S), BASE, TIME), OWN + 1e-4 * TIME, 0.0, 1e-7
+    )
+    np.testing.assert_allclose(
+        reading("gain-drift", (1e-3, STRAIGHT_S), BASE, TIME), OWN * (1.0 + 1e-3 * TIME), 0.0, 1e-7
+    )
+
+
+@pytest.mark.parametrize(
+    "identifier", ["frequency-drift", "damping-drift", "clock-drift", "offset-drift", "gain-drift"]
+)
+def test_a_drift_is_straight_unless_its_relaxation_is_told(identifier: str) -> None:
+    assert by_identifier(identifier).parameters[1].default == STRAIGHT_S
 
 
 def test_drifts_count_from_the_first_reading() -> None:
     """And so do not depend on when the clock of the record was set."""
-    for identifier, values in (("offset-drift", (1e-4,)), ("gain-drift", (1e-3,))):
+    for identifier, values in (("offset-drift", (1e-4, 9.0)), ("gain-drift", (1e-3, 9.0))):
         early = reading(identifier, values, BASE, TIME)
         late_base = BASE.copy()
         late_base[6] += 1000.0
@@ -97,7 +116,18 @@ def test_a_tone_is_a_line() -> None:
 def test_a_drifting_clock_reads_later_and_later() -> None:
     rate = 1e-5
     late = plain(BASE, TIME + 0.5 * rate * TIME**2)
-    np.testing.assert_allclose(reading("clock-drift", (rate,), BASE, TIME), late, 0.0, 1e-7)
+    straight = reading("clock-drift", (rate, STRAIGHT_S), BASE, TIME)
+    np.testing.assert_allclose(straight, late, 0.0, 1e-7)
+
+
+def test_the_rate_of_a_clock_that_warms_up_is_the_relaxed_drift() -> None:
+    """Its delay, differentiated over the readings."""
+    rate, tau = 1e-3, 8.0
+    delay = by_identifier("clock-drift").delay(TIME, np.array([rate, tau]))
+    assert delay is not None
+    gained = np.diff(delay) / np.diff(TIME)
+    middle = 0.5 * (TIME[1:] + TIME[:-1])
+    np.testing.assert_allclose(gained, rate * tau * (1.0 - np.exp(-middle / tau)), 1e-5, 1e-8)
 
 
 def test_dropped_samples_are_the_readings_that_follow() -> None:

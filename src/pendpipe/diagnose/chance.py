@@ -17,27 +17,31 @@ _AT_ONCE: Final = 32
 """Draws that are worked on together: few enough to stay in the processor's cache."""
 _TAIL: Final = 0.4
 """Part of the draws from whose smallest p-values the number of trials is read."""
-_GROWTH: Final = 0.05
+_GROWTH: Final = 0.5
 """A scan over one continuous shape has trials in proportion to the root of the threshold in
-chi^2 (Rice's formula): from p = 0.01 to 1e-6 a factor 1.5."""
+chi^2 (Rice's formula), which is -2 ln p but for slower terms."""
 
 
 @dataclass(frozen=True)
 class Trials:
     """The number of independent trials that a scan amounts to.
 
-    P(smallest local p-value < p) = 1 - (1 - p)^m(p), with m = first p^(-growth): scans over
-    continuous shapes have the more trials the rarer the event.
+    P(smallest local p-value < p) = 1 - (1 - p)^m(p), with m = first (ln p/ln usual)^growth
+    where p is smaller than usual: scans over continuous shapes have the more trials the rarer
+    the event.
     """
 
     first: float
     growth: float
+    usual: float = 0.05
+    """The p-value at which the trials were counted."""
 
     def global_p_value(self, local: float) -> float:
         """The probability that chance finds a local p-value as small anywhere."""
         if local <= 0.0:
             return 0.0
-        trials = max(self.first * local ** (-self.growth), 1.0)
+        rarer = max(math.log(local) / math.log(self.usual), 1.0)
+        trials = max(self.first * rarer**self.growth, 1.0)
         return float(-math.expm1(trials * math.log1p(-min(local, 1.0 - 1e-15))))
 
 
@@ -97,4 +101,4 @@ def _trials(smallest: FloatArray, growth: float) -> Trials:
     part = slice(max(2, draws // 50), int(_TAIL * draws))
     middle = float(np.exp(np.mean(np.log(trials[part]))))
     at = float(np.exp(np.mean(np.log(ordered[part]))))
-    return Trials(max(middle, 1.0) * at**growth, growth)
+    return Trials(max(middle, 1.0), growth, min(at, 0.5))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import rows, since_start
+from pendpipe.effects.scan import RELAXATION, relaxation_times, relaxed, rows, since_start
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -15,19 +15,24 @@ if TYPE_CHECKING:
 
 
 class FrequencyDrift(Effect):
-    """omega (1 + eps t): the rod's temperature, a loss of mass."""
+    """omega (1 + eps tau (1 - e^(-t/tau))): the rod warms up; straight where tau is long."""
 
     identifier = "frequency-drift"
     name = "drifting frequency"
     kind = "dynamics"
-    equation = r"\omega^2 x \to \omega^2 (1 + 2 \epsilon t)\, x"
-    parameters = (Parameter("rate", "1/s", -1.0, 1.0),)
+    equation = r"\omega^2 x \to \omega^2 \left[1 + 2 \epsilon \tau (1 - e^{-t/\tau})\right] x"
+    parameters = (Parameter("rate", "1/s", -1.0, 1.0), RELAXATION)
     deciding = "release it again with the same amplitude: the frequency must have moved on"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 eps t omega^2 x, t from the motion's start."""
-        omega = pendulum.angular_frequency
-        return np.asarray(-2.0 * values[0] * omega * omega * since_start(motion) * motion.angle)
+        """Return -2 eps tau (1 - e^(-t/tau)) omega^2 x, t from the motion's start."""
+        rate, tau = values
+        change = rate * relaxed(since_start(motion), tau)
+        return np.asarray(-2.0 * change * pendulum.angular_frequency**2 * motion.angle)
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and relaxing."""
+        return relaxation_times(span)
 
 
 class DampingDrift(Effect):
@@ -41,20 +46,18 @@ class DampingDrift(Effect):
     name = "drifting damping"
     kind = "dynamics"
     equation = r"\ddot x \mathrel{+}= -2 \dot\gamma\, \tau (1 - e^{-t/\tau})\, \dot x"
-    parameters = (
-        Parameter("rate", "1/s^2", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e5, 1e5),
-    )  # fmt: skip
+    parameters = (Parameter("rate", "1/s^2", -10.0, 10.0), RELAXATION)
     deciding = "release it again with the same amplitude: the damping must have moved on"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 gamma(t) v, t from the motion's start."""
         rate, tau = values
-        gamma = -rate * tau * np.expm1(-since_start(motion) / tau)
+        gamma = rate * relaxed(since_start(motion), tau)
         return np.asarray(-2.0 * gamma * motion.velocity)
 
-    def shapes(self, span: Span) -> list[tuple[float, ...]]:
-        """Straight, and over two fifths and a sixth of the record."""
-        return rows((1e5, 0.4 * span.duration_s, span.duration_s / 6.0))
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and relaxing."""
+        return relaxation_times(span)
 
 
 class EquilibriumCreep(Effect):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from pendpipe.effects.effect import Parameter
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -40,6 +42,25 @@ def finer_instants(span: Span, count: int, instant_s: float) -> list[tuple[float
     low, high = rough[max(place - 1, 0)], rough[min(place + 1, count - 1)] + 0.5 * span.period_s
     number = min(int((high - low) / (0.125 * span.period_s)) + 2, 300)
     return [(float(time),) for time in np.linspace(low, high, number)]
+
+
+STRAIGHT_S: Final = 1e7
+"""A relaxation time that no record can tell from infinity."""
+RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S)
+
+
+def relaxed(time_s: FloatArray, tau: float) -> FloatArray:
+    """Return tau (1 - e^(-t/tau)): how far a drift has come that relaxes; t where tau is long."""
+    return np.asarray(-tau * np.expm1(-time_s / tau))
+
+
+def relaxation_times(span: Span) -> list[tuple[float]]:
+    """Return rows for a scan: straight, and over two fifths and a sixth of the record.
+
+    Between them no exponential is told from the next: 0.4 and 1/6 of the record, fitted with
+    what a baseline can do, overlap by more than 0.9.
+    """
+    return [(STRAIGHT_S,), (0.4 * span.duration_s,), (span.duration_s / 6.0,)]
 
 
 def since_start(motion: Motion) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import rows
+from pendpipe.effects.scan import RELAXATION, relaxation_times, relaxed, rows
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -15,34 +15,46 @@ if TYPE_CHECKING:
 
 
 class OffsetDrift(Effect):
-    """The reading of the equilibrium drifts, time counted from the first reading."""
+    """The reading of the equilibrium drifts, from the first reading on, as an amplifier warms up.
+
+    It is straight where tau is long.
+    """
 
     identifier = "offset-drift"
     name = "drifting offset"
     kind = "measurement"
-    equation = r"y = x + \rho t"
-    parameters = (Parameter("rate", "rad/s", -10.0, 10.0),)
+    equation = r"y = x + \rho\, \tau (1 - e^{-t/\tau})"
+    parameters = (Parameter("rate", "rad/s", -10.0, 10.0), RELAXATION)
     deciding = "a second sensor, or the sensor turned round: creep of the equilibrium turns too"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return rho t."""
-        return np.asarray(values[0] * (sampled.time_s - sampled.time_s[0]))
+        """Return rho tau (1 - e^(-t/tau))."""
+        rate, tau = values
+        return np.asarray(rate * relaxed(sampled.time_s - sampled.time_s[0], tau))
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and relaxing."""
+        return relaxation_times(span)
 
 
 class GainDrift(Effect):
-    """The sensor's constant drifts, time counted from the first reading."""
+    """The sensor's constant drifts, from the first reading on; straight where tau is long."""
 
     identifier = "gain-drift"
     name = "drifting gain"
     kind = "measurement"
-    equation = r"y = x\, (1 + g t)"
-    parameters = (Parameter("rate", "1/s", -10.0, 10.0),)
+    equation = r"y = x \left[1 + g\, \tau (1 - e^{-t/\tau})\right]"
+    parameters = (Parameter("rate", "1/s", -10.0, 10.0), RELAXATION)
     deciding = "read a known tilt before and after the record"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return g t x."""
-        late = sampled.time_s - sampled.time_s[0]
-        return np.asarray(values[0] * late * sampled.angle)
+        """Return g tau (1 - e^(-t/tau)) x."""
+        rate, tau = values
+        return np.asarray(rate * relaxed(sampled.time_s - sampled.time_s[0], tau) * sampled.angle)
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and relaxing."""
+        return relaxation_times(span)
 
 
 class AcCoupling(Effect):

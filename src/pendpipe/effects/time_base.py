@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Span
-from pendpipe.effects.scan import finer_instants, instants, reading_step
+from pendpipe.effects.scan import (
+    RELAXATION,
+    finer_instants,
+    instants,
+    reading_step,
+    relaxation_times,
+    relaxed,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,18 +24,27 @@ if TYPE_CHECKING:
 
 
 class ClockDrift(Effect):
-    """The digitiser's clock changes its rate: readings come later by rate t^2/2."""
+    """The digitiser's clock changes its rate by kappa tau (1 - e^(-t/tau)), as it warms up.
+
+    Where tau is long, readings come later by kappa t^2/2.
+    """
 
     identifier = "clock-drift"
     name = "drifting clock"
     kind = "measurement"
-    equation = r"t \to t + \tfrac12 \kappa t^2"
-    parameters = (Parameter("rate", "1/s", -1.0, 1.0),)
+    equation = r"t \to t + \kappa \tau \left[t - \tau (1 - e^{-t/\tau})\right]"
+    parameters = (Parameter("rate", "1/s", -1.0, 1.0), RELAXATION)
     deciding = "record a second clock (GPS, mains) on another channel"
 
     def delay(self, time_s: FloatArray, values: FloatArray) -> FloatArray:
-        """Return kappa t^2/2, t from the first reading."""
-        return np.asarray(0.5 * values[0] * (time_s - time_s[0]) ** 2)
+        """Return kappa tau [t - tau (1 - e^(-t/tau))], t from the first reading."""
+        rate, tau = values
+        late = time_s - time_s[0]
+        return np.asarray(rate * tau * (late - relaxed(late, tau)))
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and relaxing."""
+        return relaxation_times(span)
 
 
 class DroppedSamples(Effect):
