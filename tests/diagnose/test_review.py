@@ -135,7 +135,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
 
 def some_step() -> Step:
     fit, _, _ = null_fit()
-    effect = by_identifier("frequency-drift")
+    effect = by_identifier("sensor-quadratic")
     return Step((Rival(Lead(effect, (), 50.0, 1e-9), fit, 50.0, 50.0),), 1e-9, fit)
 
 
