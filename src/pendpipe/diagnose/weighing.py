@@ -28,6 +28,8 @@ from pendpipe.effects.model import Model
 
 _NONE: Final = 4.0
 """Evidence (in chi^2) that it is none of the class's, where the model leaves nothing."""
+_LISTED: Final = 0.05
+"""Probability from which a curve without a name is listed beside names."""
 _SAME: Final = 0.02
 """Part by which a gain may change in the end for its rivals not to be refitted."""
 
@@ -54,7 +56,7 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
         effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
         float(weights[0]),
         tuple((mate.identifier, float(weight)) for mate, weight in
-              zip(mates, weights[1:], strict=False)),
+              zip(mates, weights[1:], strict=False) if weight > _LISTED or not mate.drawn),
         effect.deciding, locate(without, found.improved, found.data, effect),
         curve_values(found.improved, effect, found.data.unit)
         if isinstance(effect, Curve) else None,
