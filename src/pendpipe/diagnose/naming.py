@@ -13,6 +13,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, Lead
+from pendpipe.diagnose.distributions import chi2_beyond, chi2_of_one
 from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.growing import grown
@@ -155,24 +156,20 @@ def _rank(lead: Lead) -> float:
 
 def equivalent(p_value: float, score: float) -> float:
     """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
-    from scipy.special import ndtri_exp
-
     if p_value <= 1e-290:
         return score
-    return float(ndtri_exp(math.log(0.5 * p_value)) ** 2) if p_value < 1.0 else 0.0
+    return chi2_of_one(p_value)
 
 
 def evidence(lead: Lead, gain: float, chance: Chance) -> float:
     """What a gain is worth, beside effects with more or fewer free values and shapes."""
-    from scipy.special import gammaincc
-
     if gain <= 0.0:
         return 0.0
     effect = lead.effect
     if effect.switch:
         # Its size is predicted: a free one would have had to be found.
         gain += max(math.log(gain) - 0.45, 0.0)
-    local = float(gammaincc(0.5 * effect.sizes, 0.5 * gain))
+    local = float(chi2_beyond(gain, effect.sizes))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     if local > 1e-290:
         worth = equivalent(trials.global_p_value(local), gain)
