@@ -7,6 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.minimise import Quadratic, minimise
+from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.arrays import FloatArray
 
 REFERENCE_HZ: Final = 0.05
@@ -16,6 +18,8 @@ _WORTH: Final = (2.5, 12.0)
 """Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
 is missed accuses drifts and slow tones of the noise; a needless one costs little."""
 _STEEPEST: Final = 1.6
+_SETTLED: Final = 1e-4
+"""Of -2 ln L: a step that promises less is the last."""
 _OUTLIER: Final = 12.0
 """Power over the spectrum beyond which a cosine holds no noise but a line."""
 
@@ -73,7 +77,10 @@ def fit_colour(
     """
     # Glitches and tones are no noise: what is far above its neighbours is clipped.
     level = _clipped_mean(power, max(float(np.median(power)) / 0.4549, 1e-300))
-    best, least = Colour(level), _whittle(power, np.full(len(power), level))[0]
+    best, least = (
+        Colour(level),
+        float(np.sum(math.log(level) + np.minimum(power / level, _OUTLIER))),
+    )
     for ends in (math.inf, REFERENCE_HZ) if red else ():
         found, cost = _red(power, frequency_hz, level, ends)
         if cost < least - (_WORTH[0] if not best.red else 0.0):
@@ -84,65 +91,76 @@ def fit_colour(
     return best
 
 
-def _whittle(power: FloatArray, spectrum: FloatArray) -> tuple[float, FloatArray]:
-    """-2 ln L, what is far above clipped; and its derivatives by ln S."""
+def _whittle(power: FloatArray, spectrum: FloatArray, slopes: FloatArray) -> Quadratic:
+    """-2 ln L, what is far above clipped, about a spectrum.
+
+    Parameters
+    ----------
+    power, spectrum
+        Shape (n,).
+    slopes
+        Derivatives of ln S by the values that are fitted, shape (values, n). What is expected
+        of the second derivatives by ln S is 1.
+    """
     ratio = power / spectrum
     total = float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER)))
-    return total, np.where(ratio < _OUTLIER, 1.0 - ratio, 1.0)
+    pull = np.where(ratio < _OUTLIER, ratio, 0.0) - 1.0
+    return Quadratic(total, 0.5 * slopes @ pull, 0.5 * slopes @ slopes.T)
 
 
 def _red(
     power: FloatArray, frequency: FloatArray, level: float, ends: float
 ) -> tuple[Colour, float]:
     """The best red part that ends at a frequency, or goes on."""
-    from scipy.optimize import minimize
-
     inside = frequency <= ends
     if np.count_nonzero(inside) < 3:
         return Colour(level), math.inf
     # Above its end there is white noise alone.
-    near, beyond = power[inside], power[~inside]
-    logs = np.log(REFERENCE_HZ / np.maximum(frequency[inside], 1e-12))
+    logs = np.where(inside, np.log(REFERENCE_HZ / np.maximum(frequency, 1e-12)), 0.0)
 
-    def cost(values: FloatArray) -> tuple[float, FloatArray]:
-        white = math.exp(values[0])
-        rise = np.exp(values[1] + values[2] * logs)
-        total, by_log = _whittle(near, white * (1.0 + rise))
-        far, by_far = _whittle(beyond, np.full(len(beyond), white))
-        by_rise = by_log * rise / (1.0 + rise)
-        slopes = [by_log.sum() + by_far.sum(), by_rise.sum(), by_rise @ logs]
-        return total + far, np.array(slopes)
+    def cost(values: FloatArray) -> Quadratic:
+        rise = np.exp(values[1] + values[2] * logs) * inside
+        by_rise = rise / (1.0 + rise)
+        slopes = np.stack([np.ones_like(rise), by_rise, by_rise * logs])
+        return _whittle(power, math.exp(values[0]) * (1.0 + rise), slopes)
 
     # Far below the powers all of them are clipped, and the cost would fall without end.
     middle = math.log(level)
-    bounds = [
-        (middle - 8.0, middle + 4.0),
-        (-12.0, 8.0),
-        (0.0 if ends < math.inf else 0.3, _STEEPEST),
-    ]
-    found = minimize(cost, np.array([middle, 0.0, 1.0]), jac=True, bounds=bounds)
-    white, red, slope = found.x
-    return Colour(math.exp(white), math.exp(red), float(slope), 0.0, ends), float(found.fun)
+    flattest = 0.0 if ends < math.inf else 0.3
+    bounds = Bounds(
+        np.array([middle - 8.0, -12.0, flattest]), np.array([middle + 4.0, 8.0, _STEEPEST])
+    )
+    starts = [np.array([middle, 0.0, 1.0]), _red_throughout(power[inside], logs[inside], bounds)]
+    start = min(starts, key=lambda values: cost(values).chi2)
+    found = minimise(cost, start, bounds, tolerance=_SETTLED)
+    white, red, slope = found.value.tolist()
+    return Colour(math.exp(white), math.exp(red), slope, 0.0, ends), found.quadratic.chi2
+
+
+def _red_throughout(power: FloatArray, logs: FloatArray, bounds: Bounds) -> FloatArray:
+    """Start values of noise that is red at all frequencies: a line through ln P."""
+    slope, height = np.polyfit(logs, np.log(np.maximum(power, 1e-300)), 1)
+    # The logarithm of a squared normal number is -1.27 on average.
+    height += 1.27
+    white = bounds.lower[0] + 4.0
+    return bounds.clip(np.array([white, height - white, slope]))
 
 
 def _low_pass(
     power: FloatArray, frequency: FloatArray, interval: float, level: float
 ) -> tuple[Colour, float]:
     """The best first-order memory."""
-    from scipy.optimize import minimize
-
     cosine = np.cos(2.0 * math.pi * frequency * interval)
 
-    def cost(values: FloatArray) -> tuple[float, FloatArray]:
+    def cost(values: FloatArray) -> Quadratic:
         gain = 1.0 - 2.0 * values[1] * cosine + values[1] ** 2
-        total, by_log = _whittle(power, math.exp(values[0]) / gain)
-        by_memory = by_log @ (2.0 * (cosine - values[1]) / gain)
-        return total, np.array([by_log.sum(), by_memory])
+        slopes = np.stack([np.ones_like(gain), 2.0 * (cosine - values[1]) / gain])
+        return _whittle(power, math.exp(values[0]) / gain, slopes)
 
     middle = math.log(level)
-    bounds = [(middle - 8.0, middle + 4.0), (-0.95, 0.95)]
-    found = minimize(cost, np.array([middle, 0.3]), jac=True, bounds=bounds)
-    return Colour(math.exp(found.x[0]), memory=float(found.x[1])), float(found.fun)
+    bounds = Bounds(np.array([middle - 8.0, -0.95]), np.array([middle + 4.0, 0.95]))
+    found = minimise(cost, np.array([middle, 0.3]), bounds, tolerance=_SETTLED)
+    return Colour(math.exp(found.value[0]), memory=float(found.value[1])), found.quadratic.chi2
 
 
 def _clipped_mean(power: FloatArray, level: float) -> float:

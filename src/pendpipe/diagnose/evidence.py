@@ -12,6 +12,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
+from pendpipe.diagnose.distributions import chi2_beyond, chi2_of_one
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
 from pendpipe.effects.curve import Curve
@@ -92,11 +93,9 @@ def of_one_class(best: Rival, rival: Rival) -> bool:
 
 def equivalent(p_value: float, score: float) -> float:
     """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
-    from scipy.special import ndtri_exp
-
     if p_value <= 1e-290:
         return score
-    return float(ndtri_exp(math.log(0.5 * p_value)) ** 2) if p_value < 1.0 else 0.0
+    return chi2_of_one(p_value)
 
 
 def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int]) -> float:
@@ -113,8 +112,6 @@ def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int])
     needed
         Of the gain, what needless sizes make up; and how many are needed (`needed_sizes`).
     """
-    from scipy.special import gammaincc
-
     gain, sizes = gain - needed[0], needed[1]
     if gain <= 0.0:
         return 0.0
@@ -122,7 +119,7 @@ def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int])
     if effect.switch:
         # Its size is predicted: a free one would have had to be found.
         gain += max(math.log(gain) - 0.45, 0.0)
-    local = float(gammaincc(0.5 * sizes, 0.5 * gain))
+    local = float(chi2_beyond(gain, sizes))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     if local > 1e-290:
         worth = equivalent(trials.global_p_value(local), gain)

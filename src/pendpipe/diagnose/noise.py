@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.colour import fit_colour
+from pendpipe.diagnose.cosines import cosines, from_cosines
 from pendpipe.diagnose.data import Data
 
 _HARMONICS: Final = 7
@@ -51,23 +52,24 @@ class Noise:
     def whiten(self, columns: FloatArray) -> FloatArray:
         """Turn readings (or columns of them) into numbers of unit variance, shape kept."""
         scale = 1.0 / np.sqrt(self.variance)
-        if not self.uniform:
+        if not self.coloured:
             return np.asarray((columns.T * (self.weight * scale)).T)
-        from scipy.fft import dct
-
         # A column at a time stands together in memory: the transform is far quicker so.
         rows = np.multiply(columns.T, self.weight, order="C")
-        return np.asarray((dct(rows, norm="ortho", overwrite_x=True) * scale).T)
+        return np.asarray((cosines(rows) * scale).T)
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
         """The transpose of `whiten`: from white numbers back to weights of readings."""
         scale = 1.0 / np.sqrt(self.variance)
-        if not self.uniform:
+        if not self.coloured:
             return np.asarray((columns.T * (self.weight * scale)).T)
-        from scipy.fft import idct
-
         rows = np.multiply(columns.T, scale, order="C")
-        return np.asarray((idct(rows, norm="ortho", overwrite_x=True) * self.weight).T)
+        return np.asarray((from_cosines(rows) * self.weight).T)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether cosines differ in variance; else a reading is as white as they are."""
+        return self.uniform and bool(self.red or self.memory)
 
     @property
     def rms(self) -> float:
@@ -117,11 +119,9 @@ def estimate_noise(
     if not data.uniform:
         rms = max(_robust_rms(residual[data.weight > 0.0]), floor)
         return white_noise(data, rms)
-    from scipy.fft import dct
-
     count = len(data)
     filled = count / max(data.used, 1)
-    power = dct(residual * data.weight, norm="ortho") ** 2 * filled
+    power = cosines(residual * data.weight) ** 2 * filled
     frequency = np.arange(count) / (2.0 * count * data.interval_s)
     quiet = _quiet(frequency, frequency_hz)
     if np.count_nonzero(quiet) < 40:

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.bounded import bounded_least_squares
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.unwrapped import unwrapped
@@ -196,21 +197,9 @@ def _step(
     solved = np.linalg.lstsq(small, right, rcond=1e-11)[0]
     floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
     if np.any(solved < floor) or np.any(solved > ceiling):
-        solved = _bounded(small, right, floor, ceiling)
+        solved = bounded_least_squares(small, right, floor, ceiling)
     step[free] = solved / scale
     limit = 0.05 * value[OMEGA]
     if abs(step[OMEGA]) > limit:
         step *= limit / abs(step[OMEGA])
     return step
-
-
-def _bounded(
-    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
-) -> FloatArray:
-    """Linear least squares within bounds."""
-    from scipy.optimize import lsq_linear
-
-    # A value on its bound has no room to one side; the solver asks for some.
-    room = 1e-9 * (1.0 + np.abs(right).max())
-    found = lsq_linear(matrix, right, bounds=(floor - room, ceiling + room), method="bvls")
-    return np.clip(found.x, floor, ceiling)

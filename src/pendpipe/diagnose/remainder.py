@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.cosines import cosines
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -148,6 +149,4 @@ def _by_cycle(residual: FloatArray, phase: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _powers(row: FloatArray) -> FloatArray:
-    from scipy.fft import dct
-
-    return np.asarray(dct(row, norm="ortho") ** 2)
+    return np.asarray(cosines(row) ** 2)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
+from pendpipe.diagnose.distributions import chi2_beyond
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import tone_of
 from pendpipe.diagnose.naming import refit_leads
@@ -54,13 +55,11 @@ def credibility(step: Step, remainder: Remainder, gain: float) -> float:
     gain
         By how much chi^2 rises without the effect.
     """
-    from scipy.special import gammaincc
-
     if gain < _MOST * (gain + remainder.excess):
         return 1.0
     effect = step.winner.lead.effect
     values = max(effect.count, 1)
-    local = float(gammaincc(0.5 * values, 0.5 * remainder.worth(gain)))
+    local = float(chi2_beyond(remainder.worth(gain), values))
     return _trials(step).global_p_value(local)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.distributions import chi2_beyond
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
@@ -195,7 +196,7 @@ def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
 
 def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
     """How often chance alone does better, of each candidate by itself."""
-    from scipy.special import gammaincc
-
-    shaped = freedom.reshape(-1, *([1] * (scores.ndim - 1)))
-    return np.asarray(gammaincc(0.5 * shaped, 0.5 * scores))
+    found = np.empty_like(scores)
+    for width in np.unique(freedom).astype(int).tolist():
+        found[freedom == width] = chi2_beyond(scores[freedom == width], width)
+    return found

@@ -55,11 +55,13 @@ class Sampled:
 
     def at_nodes(self, values: FloatArray) -> FloatArray:
         """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""
-        flat = values.reshape(*values.shape[:-2], -1)
-        total = self._weights[0] * flat[..., self._first]
-        for point in range(1, _POINTS):
-            total = total + self._weights[point] * flat[..., self._first + point]
-        return np.asarray(total)
+        index = self._first + np.arange(_POINTS)[:, None]
+        flat = values.reshape(-1, values.shape[-2] * values.shape[-1])
+        found = np.empty((len(flat), len(self._first)))
+        # A row at a time stays in the processor's cache.
+        for row, out in zip(flat, found, strict=True):
+            np.einsum("pn,pn->n", row.take(index, mode="clip"), self._weights, out=out)
+        return found.reshape(*values.shape[:-2], -1)
 
     def change(self, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
         """Change of the angle, rad, from changes of ln r and of t at fixed phase."""
@@ -82,7 +84,7 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     theta = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0)) / math.pi * order
     left = np.clip(np.rint(theta - 0.5 * (_POINTS - 1)), 0, order + 1 - _POINTS)
     first = (half * (order + 1) + left).astype(np.intp)
-    weights = _lagrange(nodes.reshape(-1), first, time_s)
+    weights = lagrange(nodes.reshape(-1), first, time_s)
     omega = motion.angular_frequency
     slow = (motion.clock.psi - omega * (nodes - nodes[0, 0])).reshape(-1)
     logs = motion.log_amplitude.reshape(-1)
@@ -118,7 +120,7 @@ def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) ->
     )  # fmt: skip
 
 
-def _lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
+def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
     """Weights of the six nodes from `first` on at each time, shape (6, n)."""
     near = [nodes[first + point] for point in range(_POINTS)]
     weights = np.empty((_POINTS, len(time_s)))

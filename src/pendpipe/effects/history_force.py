@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pendpipe.effects.complex_erf import erf
 from pendpipe.effects.effect import Effect, Parameter, Pendulum
 from pendpipe.effects.scan import since_start
 
@@ -36,8 +37,6 @@ class HistoryForce(Effect):
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -h d^(1/2) v/dt^(1/2)."""
-        from scipy.special import erf
-
         rate = _local_rate(motion)
         memory = np.sqrt(rate) * erf(np.sqrt(rate * since_start(motion)))
         # v = Re(V), V = i omega upwards r e^(i psi).

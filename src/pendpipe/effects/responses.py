@@ -35,21 +35,31 @@ def responses(
         total -= at.after_kicks([effect.kick(low) for low, _ in changes])
     for row, (low, high) in enumerate(changes):
         added = effect.reading(sampled, pendulum, high)
-        before = effect.reading(sampled, pendulum, low)
-        if added is not None and before is not None:
-            total[row] += added - before
+        if added is not None:
+            total[row] += added
+            if not _absent(effect, low):
+                total[row] -= _some(effect.reading(sampled, pendulum, low))
         late = effect.delay(sampled.time_s, high)
-        earlier = effect.delay(sampled.time_s, low)
-        if late is not None and earlier is not None:
-            total[row] += sampled.velocity * (late - earlier)
+        if late is not None:
+            if not _absent(effect, low):
+                late = late - _some(effect.delay(sampled.time_s, low))
+            total[row] += sampled.velocity * late
     return total
+
+
+def _absent(effect: Effect, values: FloatArray) -> bool:
+    """Whether an effect changes nothing: all its sizes are zero."""
+    return not np.any(values[: effect.sizes])
+
+
+def _some(found: FloatArray | None) -> FloatArray | float:
+    return 0.0 if found is None else found
 
 
 def _force_change(
     effect: Effect, motion: Motion, pendulum: Pendulum, low: FloatArray, high: FloatArray
 ) -> FloatArray | None:
-    before = effect.acceleration(motion, pendulum, low)
     after = effect.acceleration(motion, pendulum, high)
-    if before is None or after is None:
-        return None
-    return np.asarray(after - before)
+    if after is None or _absent(effect, low):
+        return after
+    return np.asarray(after - _some(effect.acceleration(motion, pendulum, low)))

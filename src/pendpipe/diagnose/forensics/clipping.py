@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.distributions import log_normal_below
 from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import (
@@ -110,11 +111,9 @@ def _common(before: float, step: float) -> float:
 
 def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
     """Chance that no reading goes beyond, its common error averaged over."""
-    from scipy.special import log_ndtr
-
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
     shifted = (room[:, None] + common * nodes) / spread[:, None]
-    chance = np.exp(np.sum(log_ndtr(shifted), axis=0))
+    chance = np.exp(np.sum(log_normal_below(shifted), axis=0))
     return float(min(chance @ weights / weights.sum(), 1.0))
 
 

@@ -19,6 +19,7 @@ from pendpipe.diagnose.forensics.lattice import (
 )
 from pendpipe.diagnose.forensics.local import local_residual, residual_of
 from pendpipe.diagnose.refine import Fit
+from pendpipe.dynamics.sampling import lagrange
 
 _MOST: Final = 12000
 """Readings that are looked at: of more, every second, third, ..."""
@@ -139,7 +140,8 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
 
 
 def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:
-    """A smooth curve through values."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(time, values)(when))
+    """Polynomials through six neighbouring values each."""
+    first = np.clip(np.searchsorted(time, when) - 3, 0, len(time) - 6)
+    weights = lagrange(time, first, when)
+    near = np.stack([values[first + point] for point in range(len(weights))])
+    return np.asarray(np.sum(weights * near, axis=0))

@@ -11,6 +11,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.distributions import binomial_at_least
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import (
     Local,
@@ -125,15 +126,13 @@ def _largest_about(error: FloatArray) -> FloatArray:
 
 def _smallest(sorted_error: FloatArray) -> float:
     """The p-value over all numbers of glitches."""
-    from scipy.special import bdtrc
-
     count = len(sorted_error)
     numbers = [k for k in _NUMBERS if k <= count // 30]
     best = 1.0
     for k in numbers:
         tail = fit_tail(sorted_error, k)
         chance = float(tail.beyond(sorted_error[count - k]))
-        p_value = float(bdtrc(k - 1, count, min(chance, 1.0)))
+        p_value = binomial_at_least(k, count, min(chance, 1.0))
         share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
         best = min(p_value / share, best)
     return best

@@ -11,6 +11,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.distributions import normal_below
 from pendpipe.diagnose.forensics.local import Local
 
 _RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56)
@@ -96,8 +97,6 @@ def noise_before_rounding(local: Local, step: float) -> float:
     step
         Of the readings.
     """
-    from scipy.special import ndtr
-
     if local.rms > _PLAINLY * step:
         # Rounding is dithered: variances add.
         return math.sqrt(local.rms**2 - step**2 / 12.0)
@@ -108,7 +107,7 @@ def noise_before_rounding(local: Local, step: float) -> float:
     best, most = 0.0, -np.inf
     for ratio in _RATIOS:
         spread = ratio * np.sqrt(1.0 + extra)
-        chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
+        chance = normal_below((left + 0.5) / spread) - normal_below((left - 0.5) / spread)
         likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
         if likelihood > most:
             best, most = ratio, likelihood
@@ -130,12 +129,10 @@ def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, Fl
     square, variance
         E[e^2] in steps^2 and Var[e^2] in steps^4, e = code - value; shape (n,).
     """
-    from scipy.special import ndtr
-
     grid = np.linspace(-0.5, 0.5, 65)
     reach = int(np.ceil(5.0 * ratio)) + 1
     codes = np.arange(-reach, reach + 1)
-    chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(
+    chance = normal_below((codes + 0.5 - grid[:, None]) / ratio) - normal_below(
         (codes - 0.5 - grid[:, None]) / ratio
     )
     error = codes - grid[:, None]

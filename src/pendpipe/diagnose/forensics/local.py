@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnose.cosines import cosines, from_cosines
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -91,11 +92,9 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
         return np.asarray(residual / np.sqrt(noise.variance))
     if noise.red == 0.0 and noise.memory == 0.0:
         return residual / noise.rms
-    from scipy.fft import dct, idct
-
     count = len(residual)
     inverse = 1.0 / noise.variance
-    filtered = idct(dct(residual, norm="ortho") * inverse, norm="ortho")
+    filtered = from_cosines(cosines(residual) * inverse)
     # (S^-1)_jj = (2/n) sum of cos^2(pi k (2 j + 1)/(2 n))/S_k, from a sum of cosines.
     doubled = np.fft.rfft(inverse, n=2 * count).real
     odd = 2 * np.arange(count) + 1

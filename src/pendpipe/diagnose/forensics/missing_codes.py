@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.distributions import normal_below, poisson_from, poisson_up_to
 from pendpipe.diagnose.forensics.codes import Coded, read_codes
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.noise import Noise
@@ -77,9 +78,6 @@ def occupied(coded: Coded) -> Occupation:
 
 def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
     """Sum over readings of P(code), by a fine histogram of the angles."""
-    from scipy.fft import irfft, next_fast_len, rfft
-    from scipy.special import ndtr
-
     fine = 10 if spread < 1.0 else 4
     cells = np.bincount(
         np.clip(((position - first + 0.5) * fine).astype(np.int64), 0, size * fine - 1),
@@ -88,22 +86,20 @@ def _expected(position: FloatArray, first: int, size: int, spread: float) -> Flo
     reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
     # A code's expectation: its chance about its middle, summed over the cells.
     offset = (np.arange(-reach, reach) + 0.5) / fine
-    kernel = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
-    length = next_fast_len(len(cells) + 2 * reach, real=True)
-    smooth = irfft(rfft(cells, length) * rfft(kernel, length), length)
+    kernel = normal_below((offset + 0.5) / spread) - normal_below((offset - 0.5) / spread)
+    length = 2 ** math.ceil(math.log2(len(cells) + 2 * reach))
+    smooth = np.fft.irfft(np.fft.rfft(cells, length) * np.fft.rfft(kernel, length), length)
     start = reach + fine // 2 - 1
     return np.asarray(np.maximum(smooth[start : start + size * fine : fine], 0.0))
 
 
 def _chances(occupation: Occupation) -> FloatArray:
     """Two-sided chance of each code's number; shape (codes that are looked at,)."""
-    from scipy.special import gammainc, gammaincc
-
     looked = occupation.low > _LEAST
     found = occupation.found
     # P(N <= found) at the smallest expectation, P(N >= found) at the largest.
-    fewer = gammaincc(found + 1.0, np.maximum(occupation.low, 1e-12))
-    more = np.where(found > 0.0, gammainc(np.maximum(found, 1.0), occupation.high), 1.0)
+    fewer = poisson_up_to(found, occupation.low)
+    more = poisson_from(found, occupation.high)
     chance = np.where(looked, 2.0 * np.minimum(fewer, more), 1.0)
     return np.asarray(np.minimum(chance, 1.0)) if looked.any() else np.zeros(0)
 
@@ -114,8 +110,6 @@ def _stuck_bits(coded: Coded) -> tuple[tuple[int, float], float]:
     Where code 0 of the converter lies is not known: a bit of weight 2^b splits the codes
     into runs of 2^b, and every place of the runs is tried.
     """
-    from scipy.special import ndtr
-
     best, chance, tried = (0, 0.5), 1.0, 0
     span = int(np.ptp(coded.code))
     for bit in range(_BITS):
@@ -133,7 +127,7 @@ def _stuck_bits(coded: Coded) -> tuple[tuple[int, float], float]:
         effective = len(coded.code) / max(1.0, _in_a_half(coded, run))
         excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
         worst = int(np.argmax(excess))
-        p_value = float(2.0 * ndtr(-excess[worst]))
+        p_value = float(2.0 * normal_below(-excess[worst]))
         if p_value < chance:
             best, chance = (bit, float(found[worst])), p_value
     return best, min(1.0, tried * chance)

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.distributions import each, student_beyond
 
 _INVERSE_FREEDOM: Final = (
     1e-6, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,
@@ -34,10 +35,8 @@ class Tail:
 
     def beyond(self, size: FloatArray) -> FloatArray:
         """Return how often chance gives |error| > size; shape of `size`."""
-        from scipy.special import stdtr
-
         ratio = np.asarray(size)[..., None] / self.scale
-        return np.asarray(2.0 * stdtr(self.freedom, -ratio) @ self.weight)
+        return np.asarray(student_beyond(self.freedom, ratio) @ self.weight)
 
     @property
     def inverse_freedom(self) -> float:
@@ -57,8 +56,6 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False) -> Tail:
     foreign
         Whether they are: then not even their number says anything of the noise.
     """
-    from scipy.special import stdtr
-
     bulk = size[: len(size) - largest]
     edge = float(bulk[-1])
     counts, edges = np.histogram(bulk, bins=_BINS, range=(0.0, edge))
@@ -74,7 +71,7 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False) -> Tail:
     ratio = middle**2 / scale**2
     density = _log_density(freedom, scale) - 0.5 * (freedom + 1.0) * np.log1p(ratio / freedom)
     likelihood = np.sum(counts * density, axis=1)
-    beyond = 2.0 * stdtr(freedom, -edge / scale)[:, 0]
+    beyond = student_beyond(freedom, edge / scale)[:, 0]
     if foreign:
         likelihood -= len(bulk) * np.log1p(-beyond)
     else:
@@ -85,10 +82,8 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False) -> Tail:
 
 def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
     """Logarithm of Student's density at zero."""
-    from scipy.special import gammaln
-
     return np.asarray(
-        gammaln(0.5 * (freedom + 1.0)) - gammaln(0.5 * freedom)
+        each(math.lgamma, 0.5 * (freedom + 1.0)) - each(math.lgamma, 0.5 * freedom)
         - 0.5 * np.log(math.pi * freedom) - np.log(scale)
     )  # fmt: skip
 
