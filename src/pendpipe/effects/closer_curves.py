@@ -87,7 +87,7 @@ class GainCurve(Curve):
     equation = r"y = x\,[1 + g(y)]"
     argument, ordinate = "amplitude, rad", "gain less 1"
     flavour = "gain"
-    prior = -8.0
+    prior = -5.0
     deciding = "film the swing: a second sensor must see the same amplitudes"
 
     def make_knots(self, span: Span) -> FloatArray:

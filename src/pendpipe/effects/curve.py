@@ -34,7 +34,7 @@ class Curve(Effect, ABC):
 
     kind = "unnamed"
     parameters = ()
-    prior = -6.0
+    prior = -3.0
     argument: ClassVar[str]
     """What the curve is drawn against, with its unit."""
     ordinate: ClassVar[str]

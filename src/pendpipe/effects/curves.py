@@ -62,7 +62,7 @@ class DampingCurve(Curve):
         """Knots over the amplitude, in equal ratios."""
         last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
         ends = (0.95 * last, 1.05 * span.first_amplitude)
-        return np.asarray(np.geomspace(*ends, 9))
+        return np.asarray(np.geomspace(*ends, 15))
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 beta(r) v."""
@@ -136,7 +136,7 @@ class DriveCurve(Curve):
     """A torque that comes and goes with the time, in step with the motion."""
 
     in_time = True
-    prior = -9.0
+    prior = -6.0
     identifier = "unnamed-drive"
     name = "a torque that depends on the time in an unknown way"
     equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
