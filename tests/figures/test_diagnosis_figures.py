@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.integrate import solve_ivp
 
 from pendpipe.diagnose import diagnose_recording
@@ -104,6 +105,20 @@ def test_the_map_is_loud_before_and_quiet_after(content: Shown) -> None:
     rows = np.nanmean(before**2, axis=1)
     quarter = diagnosis_map.PHASES // 4
     assert rows[quarter] > 10.0 * rows[0]
+
+
+@pytest.mark.parametrize("quieter", [1.0, 10.0, 300.0, 1e4, 1e6])
+def test_no_label_of_the_map_is_cut_off(content: Shown, quieter: float) -> None:
+    """However loud the residual is beside the noise, and so however long the numbers are."""
+    variance = content.noise.variance / quieter**2
+    noise = replace(content.noise, variance=variance, white_rms=content.noise.white_rms / quieter)
+    figure = diagnosis_map.draw(replace(content, noise=noise))
+    whole = FigureCanvasAgg(figure).figure.bbox
+    for axes in figure.axes:
+        inside = axes.get_tightbbox()
+        assert inside is not None
+        assert whole.x0 <= inside.x0 < inside.x1 <= whole.x1
+        assert whole.y0 <= inside.y0 < inside.y1 <= whole.y1
 
 
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:

@@ -22,6 +22,8 @@ PHASES: Final = 24
 _COLUMNS: Final = 90
 _IN_A_CELL: Final = 4
 """Readings, usually: fewer would leave holes."""
+_CHARACTER: Final = 0.0165
+"""Width of a figure in a tick label, over the drawing's."""
 _COLOURS = LinearSegmentedColormap.from_list(
     "residual", [BLUE, "#FFFFFF", VERMILION]
 ).with_extremes(bad="#E3E6EA")
@@ -38,8 +40,11 @@ def draw(content: Shown) -> Figure:
     norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
     figure = Figure(figsize=(WIDTH_IN, 2.0 * len(maps) + 0.95))
     height = figure.get_figheight()
+    ticks = _ticks(largest)
+    labels = _signed(ticks)
+    right = 0.845 - _CHARACTER * max(max(map(len, labels)) - 3, 0)
     figure.subplots_adjust(
-        left=0.105, right=0.845, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
+        left=0.105, right=right, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
     )
     rows = figure.subplots(len(maps), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (name, fit), values in zip(rows, models, maps, strict=True):
@@ -48,9 +53,8 @@ def draw(content: Shown) -> Figure:
         axes.set_title(f"{name}: residual {compact(rms, content.data.unit)} rms")
     rows[-1].set_xlabel("Time (s)")
     low = rows[-1].get_position().y0
-    place = figure.add_axes((0.865, low, 0.02, rows[0].get_position().y1 - low))
-    ticks = _ticks(largest)
-    bar = figure.colorbar(image, cax=place, ticks=ticks, format=FixedFormatter(_signed(ticks)))
+    place = figure.add_axes((right + 0.02, low, 0.02, rows[0].get_position().y1 - low))
+    bar = figure.colorbar(image, cax=place, ticks=ticks, format=FixedFormatter(labels))
     bar.ax.minorticks_off()
     bar.set_label("Data − model (standard errors)", labelpad=1)
     return figure
