@@ -9,26 +9,18 @@ nothing to ``pendpipe.diagnose`` or ``pendpipe.effects``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from pendpipe.challenge.sindy import Judgement, by_sindy
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
 
+__all__ = ["Baseline", "Judgement", "by_criterion", "by_sindy", "by_whiteness", "fit_eq8"]
+
 NAMES: Final = ("angle", "rate", "omega", "gamma", "hysteretic", "quadratic", "coulomb", "offset")
-SINDY: Final = {
-    "x^2": "quadratic-stiffness", "x^3": "cubic-stiffness", "x^2 v": "cubic-damping",
-    "v^3": "cubic-damping", "x v": None,
-}  # fmt: skip
-"""Terms of the library that Eq. 8 does not have."""
-
-
-class Judgement(NamedTuple):
-    """What a peer says of a recording."""
-
-    missing: bool
-    name: str | None
 
 
 @dataclass(frozen=True)
@@ -187,38 +179,3 @@ def by_whiteness(base: Baseline, lags: int = 20, level: float = 0.01) -> Judgeme
     rho = np.array([r[k:] @ r[:-k] for k in range(1, lags + 1)]) / (r @ r)
     statistic = count * (count + 2.0) * np.sum(rho**2 / (count - np.arange(1, lags + 1)))
     return Judgement(bool(chi2.sf(statistic, lags) < level), None)
-
-
-def by_sindy(time_s: FloatArray, angle_rad: FloatArray, omega: float) -> Judgement:
-    """Pysindy on smoothed derivatives: the threshold that predicts the last third best.
-
-    Angles in units of the amplitude and times of 1/omega, so that one threshold suits all
-    terms; the library holds Eq. 8's terms and those of `SINDY`.
-    """
-    import pysindy as ps
-
-    scale = float(np.abs(angle_rad).max())
-    t = omega * (time_s - time_s[0])
-    step = float(t[-1] / (len(t) - 1))
-    smooth = ps.SmoothedFiniteDifference(smoother_kws={"window_length": 7, "polyorder": 3})
-    x = angle_rad / scale
-    v = np.asarray(smooth(x[:, None], step))[:, 0]
-    a = np.asarray(smooth(v[:, None], step))[:, 0]
-    terms = {
-        "1": np.ones_like(x), "x": x, "v": v, "x^2": x**2, "x^3": x**3, "v|v|": v * np.abs(v),
-        "sign v": np.sign(v), "x v": x * v, "x^2 v": x**2 * v, "v^3": v**3,
-    }  # fmt: skip
-    library = np.column_stack(list(terms.values()))[5:-5]
-    target, cut = a[5:-5, None], 2 * (len(x) - 10) // 3
-    best, chosen = np.inf, np.zeros(len(terms))
-    for threshold in np.geomspace(1e-5, 0.3, 12):
-        optimizer = ps.STLSQ(threshold=float(threshold), alpha=0.0, normalize_columns=False)
-        optimizer.fit(library[:cut], target[:cut])
-        weights = np.asarray(optimizer.coef_).ravel()
-        error = float(np.mean((target[cut:, 0] - library[cut:] @ weights) ** 2))
-        if error < best:
-            best, chosen = error, weights
-    extra = {n: abs(w) for n, w in zip(terms, chosen, strict=True) if n in SINDY and w != 0.0}
-    if not extra:
-        return Judgement(False, None)
-    return Judgement(True, SINDY[max(extra, key=lambda name: extra[name])])

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from benchmarks import peers_diagnosis as peers
 
+from pendpipe.challenge import sindy
 from pendpipe.challenge.motion import Motion
+from pendpipe.challenge.recordings import intervals_s, plain_text
+from pendpipe.challenge.solved import read_items
+
+from .test_scores import answer, opened, truth
 
 NOISE = 1e-4
 
@@ -49,3 +58,45 @@ def test_sindy_names_a_cubic_spring_and_shouts_at_nothing_too() -> None:
     assert peers.by_sindy(*swung("cubic", 3.0), 5.6) == cubic
     # What the proof compares with: derivatives of noise have no place for small terms.
     assert peers.by_sindy(*swung(), 5.6).missing
+
+
+def kept_set(folder: Path) -> Any:
+    """Two nulls, a cubic spring, and a single that only a viscous baseline lacks."""
+    cubic, viscous = truth("single", "cubic-stiffness"), truth("single", "quadratic-drag")
+    viscous["baseline"] = "viscous"
+    content = opened(*[(made, answer()) for made in (truth("null"), truth("null"), cubic, viscous)])
+    (folder / "recordings").mkdir()
+    for name, entry in content["items"].items():
+        known = entry["truth"]["nuisances"]
+        known |= {"judged_until_s": 100.0, "frequency_hz": 5.6 / 2.0 / np.pi}
+        more = ("cubic", 3.0) if entry["truth"]["effects"] else ()
+        text = plain_text(*swung(*more), {"volts_per_radian": "1"})
+        (folder / "recordings" / f"{name}.csv").write_text(text)
+    return content
+
+
+def test_the_peer_judges_the_first_nulls_and_singles_of_a_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pysindy", reason="pysindy is not installed (the bench extra)")
+    items = read_items(kept_set(tmp_path))
+    found = sindy.sindy_scores(items, tmp_path)
+    assert (found["false_alarms"]["of"], found["detected"]["of"]) == (2, 1)
+    assert found["top1"]["hits"] == 1
+    monkeypatch.setattr(sindy, "FIRST", 1)
+    assert sindy.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 1
+    monkeypatch.setattr(sindy, "PATIENCE_S", -1.0)
+    assert sindy.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 0
+
+
+def test_a_peer_that_is_not_installed_is_told_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    assert "pendpipe[bench]" in sindy.sindy_scores([], tmp_path)["install"]
+
+
+def test_the_sampling_is_read_off_the_recordings(tmp_path: Path) -> None:
+    content = kept_set(tmp_path)
+    found = intervals_s(tmp_path, [*content["items"], "item-9"])
+    assert found == pytest.approx(dict.fromkeys(content["items"], 0.05))

@@ -15,6 +15,7 @@ from pendpipe.challenge.cases import draw_cases
 from pendpipe.challenge.draw import draw
 from pendpipe.challenge.page import page
 from pendpipe.challenge.score import score
+from pendpipe.challenge.score_confidence import abstention
 from pendpipe.challenge.solved import read_items, six_cases
 
 
@@ -28,6 +29,7 @@ def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> di
     oracle = {
         "detected": size > 20 and bool(effect), "detected_by_effect": size > 15 and bool(effect),
         "named": effect, "top3": [effect], "class": [effect, "backlash"], "found_each": [True],
+        "largest_score": size, "threshold": 20.0,
         "scores": {"cubic-stiffness": size if effect else 1.0}, "whiteness_p": 0.5,
     }  # fmt: skip
     nuisances = {
@@ -159,6 +161,19 @@ def test_exact_intervals_are_clopper_and_pearsons() -> None:
     assert none[1] == pytest.approx(1 - 0.025 ** (1 / 300), rel=1e-9)
     half = intervals.rate(50, 100)["interval95"]
     assert half == pytest.approx([0.3983, 0.6017], abs=1e-4)
+
+
+@pytest.mark.parametrize("threshold", [0.0, 0.5, 0.9])
+def test_keeping_silent_withholds_what_is_less_probable(threshold: float) -> None:
+    """Of four names a half is right; of the two probable ones all are."""
+    content = opened(
+        *[(truth("single", K3), answer(K3, probability=0.9))] * 2,
+        *[(truth("single", K3), answer("jitter", probability=0.4))] * 2,
+    )
+    row = next(r for r in abstention(read_items(content)) if r["threshold"] == threshold)
+    expected = (4, 2) if threshold == 0.0 else (2, 2)
+    assert (row["accuracy"]["of"], row["accuracy"]["hits"]) == expected
+    assert (row["answered"]["hits"], row["answered"]["of"]) == (expected[0], 4)
 
 
 def test_the_page_says_yes_and_no() -> None:

@@ -27,6 +27,18 @@ def scored(tmp_path: Path) -> Path:
         "promises": [{"promise": f"promise {n}", "measured": f"{n} %", "kept": kept}
                      for n, kept in enumerate([True, False, None])],
         "families": {"null": 204, "single": 198}, "unsolved": [], "missed": [row],
+        "causes": {
+            "confident": {
+                "promise": "promise 1",
+                "rows": [{"hidden": "unnamed-damping", "law": "kink", "said": "damping-step",
+                          "count": 3, "of": 7, "largest": 90.0}],
+                "reasons": [{"of": "outside", "cause": "kink", "why": "Time & amplitude."}]},
+            "calibration": {
+                "promise": "promise 2", "rows": [], "reasons": [],
+                "bins": [{"edges": [0.9, 1.0], "met": 0.59, "of": 123, "boasts": True,
+                          "culprits": [{"hidden": "jitter", "law": "gaussian", "said": "glitches",
+                                        "count": 2}]}]},
+        },
         "six_cases": [{**row, "item": "item-0007", "law": "<b>", "figure": "case-1.svg",
                        "same_answer": True}],
     }  # fmt: skip
@@ -47,6 +59,8 @@ def test_a_scored_set_is_told_with_hashes_and_misses(example: Any, scored: Path)
     section = section[: section.index("</section>")]
     for word in ("600 recordings", "ab12", "cd34", "12345", "204 null, 198 single", "make proof",
                  "item-0003: jitter (gaussian), Δχ² = 51; the oracle detected it",
+                 "unnamed-damping (kink), answer damping-step: 3 of 7", "Time &amp; amplitude.",
+                 "stated 0.9 to 1.0, came true in 59 % of 123", "jitter (gaussian) → glitches 2",
                  "&lt;b&gt;", "kept", "not kept", "not judged"):  # fmt: skip
         assert word in section
     assert section.count("<svg") == 2

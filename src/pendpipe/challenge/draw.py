@@ -95,9 +95,29 @@ def _reliability(axes: Any, scores: dict[str, Any]) -> None:
     axes.set_ylabel("share that is right")
 
 
+def _abstention(axes: Any, scores: dict[str, Any]) -> None:
+    """Accuracy and the share that is answered, against the threshold."""
+    rows = [row for row in scores["abstention"] if row["accuracy"]["rate"] is not None]
+    at = [row["threshold"] for row in rows]
+    if rows:
+        low, high = np.array([row["accuracy"]["interval95"] for row in rows]).T
+        axes.fill_between(at, low, high, color=BLUE, alpha=0.18, linewidth=0)
+    met = [row["accuracy"]["rate"] for row in rows]
+    axes.plot(at, met, "o-", color=BLUE, markersize=4, label="right, of the names given")
+    given = [row["answered"]["rate"] for row in rows]
+    axes.plot(at, given, "s--", color=GREY, markersize=4, label="names given, of all")
+    axes.plot([0, 1], [0, 1], color="0.7", linewidth=0.8)
+    axes.set_xlim(-0.02, 1.02)
+    axes.set_ylim(-0.03, 1.03)
+    axes.set_xlabel("probability below which a first name is withheld")
+    axes.set_ylabel("share")
+    axes.legend(loc="lower right", frameon=False)
+
+
 FIGURES: Final = {
     "power": (_power, (6.0, 4.0)),
     "confusion": (_confusion, (9.0, 8.0)),
     "reliability": (_reliability, (6.0, 4.0)),
+    "abstention": (_abstention, (6.0, 4.0)),
 }
 """Each figure with what draws it and its size, inches."""

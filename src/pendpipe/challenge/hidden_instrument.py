@@ -273,8 +273,9 @@ def glitches(r: Random, s: Scenario) -> Hidden:
         )
         return base.with_chain(glitches=wild)
 
+    told = {f"sample_{i}": float(at) for i, at in enumerate(places, 1)}
     return Hidden("glitches", "single samples", build, 5.0 * volts, True, s,
-                  parameter="volts", details={"number": float(number)})  # fmt: skip
+                  parameter="volts", details={"number": float(number), **told})  # fmt: skip
 
 
 @law("coloured-noise")

@@ -125,9 +125,9 @@ def power_ratio(
     low, high = np.quantile(ratios, [0.025, 0.975], axis=0)
     return {
         "items": len(sizes),
-        "half": {"found": own[0], "oracle": best[0], "ratio": own[0] / best[0],
+        "half": {"found": own[0], "oracle": best[0], "ratio": own[0] / max(best[0], 1e-9),
                  "interval95": [low[0], high[0]]},
-        "nine_tenths": {"found": own[1], "oracle": best[1], "ratio": own[1] / best[1],
+        "nine_tenths": {"found": own[1], "oracle": best[1], "ratio": own[1] / max(best[1], 1e-9),
                         "interval95": [low[1], high[1]]},
     }  # fmt: skip
 
@@ -147,7 +147,10 @@ def calibration(
     for number in np.unique(place):
         here = place == number
         stated, met = float(probability[here].mean()), float(correct[here].mean())
-        rows.append({"stated": stated, "met": met, **of((correct[here] > 0).tolist())})
+        ends = [float(edges[number]), float(edges[number + 1])]
+        rows.append(
+            {"edges": ends, "stated": stated, "met": met, **of((correct[here] > 0).tolist())}
+        )
     count = len(probability)
     again = [random.integers(0, count, count) for _ in range(draws)] if count else []
     errors = [_error(probability[pick], correct[pick], place[pick], bins) for pick in again]

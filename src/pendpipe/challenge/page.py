@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pendpipe.challenge.wording import Score, number, percent, with_interval
+from pendpipe.challenge.page_more import peers, places, rest
+from pendpipe.challenge.page_why import why
+from pendpipe.challenge.wording import Score, cell, number, percent, with_interval
 
 FAMILIES = ("combinations", "ties", "outside", "withheld", "real")
 
@@ -20,7 +22,8 @@ def page(scores: Score, figures: list[str], folder: str) -> str:
         Names of the drawn figures, and where they lie beside the page.
     """
     parts = [_head(scores), _promises(scores), _rules(), _detection(scores), _naming(scores)]
-    parts += [_families(scores), _rest(scores), _missed(scores), _cases(scores, folder)]
+    parts += [_families(scores), places(scores), rest(scores), peers(scores)]
+    parts += [_missed(scores), why(scores), _cases(scores, folder)]
     lines = [line for part in parts for line in part]
     lines += ["## Figures", ""]
     lines += [f"![{name.removesuffix('.svg')}]({folder}/{name})" for name in figures]
@@ -169,38 +172,6 @@ def _families(scores: Score) -> Iterator[str]:
         yield ""
 
 
-def _rest(scores: Score) -> Iterator[str]:
-    pulls, held, known = scores["pulls"], scores["held_out"], scores["calibration"]
-    yield "## Parameters, prediction, probabilities, peers"
-    yield ""
-    yield f"Pulls of {pulls['parameters']} parameters of rightly named effects that act by the"
-    yield f"catalogue's own law: mean {_of(pulls['mean'])}, standard deviation {_of(pulls['sd'])}"
-    yield f"(robust {_of(pulls['robust_sd'])}); within one error {percent(pulls['coverage68'])},"
-    yield f"within the 95 % interval {percent(pulls['coverage95'])}."
-    yield ""
-    yield f"Held-out blocks are predicted better in {percent(held['improved'])}, worse by two"
-    yield f"standard errors in {percent(held['worse_by_two_errors'])}; median gain"
-    yield f"{number(held['median_gain'], '.1f')} in log density. Above Δχ² = 50 the median gain is"
-    yield f"{_of(held['share_of_the_expected'])} of Δχ²/2 - 1, which knowing the effect would gain."
-    yield ""
-    error = with_interval(known["expected_calibration_error"], known, ".3f")
-    yield f"Expected calibration error {error} over {known['items']} items; perfect probabilities"
-    yield f"would show {number(known['by_chance'], '.3f')} on as many."
-    yield ""
-    yield "Peers, flattered by the oracle's own residuals and scores:"
-    yield ""
-    yield "| peer | false alarms | detected | first name right |"
-    yield "|---|---|---|---|"
-    for name, found in scores["peers"].items():
-        cells = [percent(found[key]) for key in ("false_alarms", "detected", "top1")]
-        yield f"| {name} | {' | '.join(cells)} |"
-    yield ""
-
-
-def _of(score: Score) -> str:
-    return with_interval(score["value"], score)
-
-
 def _missed(scores: Score) -> Iterator[str]:
     yield "## What was missed"
     yield ""
@@ -211,7 +182,8 @@ def _missed(scores: Score) -> Iterator[str]:
     for row in scores["missed"]:
         seen = "yes" if row["oracle_detected"] else "no"
         yield (
-            f"| {row['item']} | {row['hidden']} | {row['law']} | {row['delta_chi2']:.0f} | {seen} |"
+            f"| {row['item']} | {row['hidden']} | {cell(row['law'])} |"
+            f" {row['delta_chi2']:.0f} | {seen} |"
         )
     yield ""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from pendpipe.challenge.wording import Score, percent, with_interval
 
@@ -11,14 +11,22 @@ from pendpipe.challenge.wording import Score, percent, with_interval
 def promises(scores: Score) -> list[dict[str, Any]]:
     """Promises with what was measured; ``kept`` is None where there was too little to judge.
 
+    ``key`` is what `causes.EXPLAINED` knows each by.
+
     A miss is called a miss: but for false alarms it is the measured value that counts, and
     not the end of its interval that would flatter us.
     """
     rows = [*_detection(scores), *_naming(scores), *_confidence(scores)]
-    return [{"promise": promise, "measured": text, "kept": kept} for promise, text, kept in rows]
+    return [
+        {"key": key, "promise": promise, "measured": text, "kept": kept}
+        for key, promise, text, kept in rows
+    ]
 
 
-Row = tuple[str, str, bool | None]
+PROMISED: Final = 1.3
+"""By how much a size or a class may be larger than the oracle's."""
+
+Row = tuple[str, str, str, bool | None]
 
 
 def _at_most(value: float | None, limit: float) -> bool | None:
@@ -28,6 +36,7 @@ def _at_most(value: float | None, limit: float) -> bool | None:
 def _detection(scores: Score) -> Iterator[Row]:
     alarm = scores["false_alarms"]
     yield (
+        "false alarms",
         "false alarms: interval contains 1 % or lies below", percent(alarm),
         _at_most(alarm["interval95"][0], 0.01),
     )  # fmt: skip
@@ -36,8 +45,9 @@ def _detection(scores: Score) -> Iterator[Row]:
         found = largest.get(key) or {}
         value = found.get("ratio")
         yield (
-            f"Δχ² at which {label} are detected, over the oracle's: at most 1.3",
-            with_interval(value, found), _at_most(value, 1.3),
+            label,
+            f"Δχ² at which {label} are detected, over the oracle's: at most {PROMISED}",
+            with_interval(value, found), _at_most(value, PROMISED),
         )  # fmt: skip
 
 
@@ -47,18 +57,21 @@ def _naming(scores: Score) -> Iterator[Row]:
         share, size = found["share_of_the_oracle"], found["class_size_ratio"]
         value = share["ratio"]
         yield (
+            f"class at {band}",
             f"class accuracy at {band} over the oracle's: at least 0.9",
             with_interval(value, share), None if value is None else value >= 0.9,
         )  # fmt: skip
         yield (
-            f"mean class size at {band} over the oracle's: at most 1.3",
-            with_interval(size["ratio"], size), _at_most(size["ratio"], 1.3),
+            f"size at {band}",
+            f"mean class size at {band} over the oracle's: at most {PROMISED}",
+            with_interval(size["ratio"], size), _at_most(size["ratio"], PROMISED),
         )  # fmt: skip
 
 
 def _confidence(scores: Score) -> Iterator[Row]:
     wrong = scores["outside"]["confident_wrong_names"]
     yield (
+        "confident",
         "confident wrong names outside the catalogue: at most 5 %", percent(wrong),
         _at_most(wrong["rate"], 0.05),
     )  # fmt: skip
@@ -67,4 +80,5 @@ def _confidence(scores: Score) -> Iterator[Row]:
     text = with_interval(error, found, ".3f")
     if error is not None:
         text += f"; perfect probabilities would show {found['by_chance']:.3f}"
-    yield "expected calibration error: at most 0.05", text, _at_most(error, 0.05)
+    promise = "expected calibration error: at most 0.05"
+    yield "calibration", promise, text, _at_most(error, 0.05)

@@ -149,7 +149,8 @@ def _conceal(
     wild = random.choice(np.arange(50, len(values) - 50), 3, replace=False)
     changed = values.copy()
     changed[wild] += sign * (8.0 * noise + 0.1 * top)
-    return changed, {"number": 3.0}
+    told = {f"sample_{i}": float(at) for i, at in enumerate(np.sort(wild), 1)}
+    return changed, {"number": 3.0, **told}
 
 
 def _also(effect: str) -> list[str]:

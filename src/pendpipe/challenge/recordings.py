@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -37,3 +39,16 @@ def write_recording(path: str | Path, scenario: Scenario, codes: IntArray) -> No
     """Write a recording in the plain form."""
     with replaced(path) as stream:
         stream.write(recording_text(scenario, codes))
+
+
+def intervals_s(folder: Path, names: Iterable[str]) -> dict[str, float]:
+    """Between the samples of a set's recordings, those that are there."""
+    found = {}
+    for name in names:
+        path = folder / "recordings" / f"{name}.csv"
+        if path.is_file():
+            with path.open(encoding="utf-8") as stream:
+                rows = [line for line in islice(stream, 40) if not line.startswith("#")][1:]
+            times = [float(row.split(",")[0]) for row in rows]
+            found[name] = (times[-1] - times[0]) / (len(times) - 1)
+    return found

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.challenge import intervals
-from pendpipe.challenge.answers import right
+from pendpipe.challenge.causes import causes
 from pendpipe.challenge.families import WITHOUT_STRENGTH
 from pendpipe.challenge.promises import promises
 from pendpipe.challenge.pulls import pulls_of
+from pendpipe.challenge.score_confidence import abstention, calibration
 from pendpipe.challenge.score_families import combinations, outside, real, ties, withheld
 from pendpipe.challenge.score_naming import confusion, dynamics_or_measurement, naming
+from pendpipe.challenge.score_nulls import false_alarms
 from pendpipe.challenge.score_peers import peers
+from pendpipe.challenge.score_places import places
 from pendpipe.challenge.solved import Solved, read_items, six_cases
 
 SEALS: Final = (
@@ -26,8 +30,17 @@ OBVIOUS: Final = 30.0
 """Delta chi^2 above which an effect that was not detected is listed."""
 
 
-def score(opened: dict[str, Any]) -> dict[str, Any]:
-    """All scores of an opened set."""
+def score(opened: dict[str, Any], interval_s: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """All scores of an opened set.
+
+    Parameters
+    ----------
+    opened
+        Truth and answers.
+    interval_s
+        Between the samples of each recording, where known: the truth tells the places of
+        lost and wild samples by their numbers.
+    """
     items = read_items(opened)
 
     def family(*names: str) -> list[Solved]:
@@ -52,12 +65,15 @@ def score(opened: dict[str, Any]) -> dict[str, Any]:
         "pulls": pulls_of([(item.truth, item.answer) for item in singles]),
         "held_out": held_out([item for item in singles if item.answer.detected]),
         "calibration": calibration(family("single", "tie", "outside")),
+        "abstention": abstention(family("single", "tie", "outside")),
+        "places": places(family("single", "tie", "combination", "real"), interval_s or {}),
         "peers": peers(nulls, singles),
         "confusion": confusion(named),
         "missed": [told(item) for item in family("single", "withheld") if missed(item)],
         "six_cases": [told(item) for item in six_cases(items)],
     }
-    return {**found, "promises": promises(found)}
+    judged = promises(found)
+    return {**found, "promises": judged, "causes": causes(items, judged)}
 
 
 def missed(item: Solved) -> bool:
@@ -77,41 +93,6 @@ def told(item: Solved) -> dict[str, Any]:
         "answer": item.answer.lead,
         "statement": statement or "(no statement)",
     }
-
-
-def alarmed(item: Solved) -> bool:
-    """A null called missing physics; the colour of noise that is red is no false alarm."""
-    if not item.answer.detected:
-        return False
-    red = item.truth["nuisances"]["alpha"] > 0.0
-    return not (red and set(item.answer.names) <= {"coloured-noise"})
-
-
-def false_alarms(nulls: list[Solved]) -> dict[str, Any]:
-    """How often nothing was called something, at the nominal 1 %."""
-    solved = [item for item in nulls if item.answer.solved]
-    hard = [item for item in solved if item.truth["nuisances"]["freedom"] > 0.0]
-    return {
-        **intervals.of([alarmed(item) for item in solved]),
-        "nominal": 0.01,
-        "at_five_percent": intervals.of([_doubted(i) for i in solved if not _coloured(i)]),
-        "named": dict(Counter(item.answer.lead for item in solved if alarmed(item))),
-        "rightly_called_coloured": sum(map(_coloured, solved)),
-        "heavy_tailed": intervals.of([alarmed(item) for item in hard]),
-        "stopped": intervals.of([alarmed(i) for i in solved if i.truth["nuisances"]["stops"]]),
-        "oracle": intervals.of([bool(item.oracle["detected"]) for item in nulls if item.oracle]),
-    }
-
-
-def _coloured(item: Solved) -> bool:
-    """Red noise rightly called coloured."""
-    return item.answer.detected and not alarmed(item)
-
-
-def _doubted(item: Solved) -> bool:
-    """Whether the answer's own p-value lies below 5 %."""
-    p_value = item.answer.content.get("p_value")
-    return p_value is not None and float(p_value) < 0.05
 
 
 def detection(singles: list[Solved]) -> dict[str, Any]:
@@ -159,18 +140,6 @@ def held_out(items: list[Solved]) -> dict[str, Any]:
         "median_gain": _median([gain for _, gain, _ in known]),
         "share_of_the_expected": intervals.median(shares),
     }
-
-
-def calibration(items: list[Solved]) -> dict[str, Any]:
-    """Compare stated probabilities of the first name with how often they come true.
-
-    It is true if it is the name of any effect that is there: of two, either may come first.
-    """
-    told = [i for i in items if i.answer.detected and np.isfinite(i.answer.probability)]
-    correct = [any(right(i.answer.lead, effect) for effect in i.truth["effects"]) for i in told]
-    return intervals.calibration(
-        np.array([i.answer.probability for i in told]), np.array(correct, dtype=float)
-    )
 
 
 def _median(values: list[float]) -> float | None:

@@ -32,16 +32,18 @@ def combinations(items: list[Solved]) -> dict[str, Any]:
     }
 
 
+def confident_and_wrong(item: Solved) -> bool:
+    """Whether what is outside the catalogue was given a name of it without doubt."""
+    named = item.answer.detected and not item.answer.lead.startswith("unnamed-")
+    return named and item.answer.probability > CONFIDENT
+
+
 def outside(items: list[Solved]) -> dict[str, Any]:
     """Effects outside the catalogue: unnamed, of the right kind, or confidently wrong."""
     large = [item for item in items if item.effect["left_by_catalogue"] > 70.0]
 
     def unnamed(item: Solved) -> bool:
         return item.effect["effect"] in item.answer.names
-
-    def wrong(item: Solved) -> bool:
-        named = item.answer.detected and not item.answer.lead.startswith("unnamed-")
-        return named and item.answer.probability > CONFIDENT
 
     return {
         "detected": intervals.of([item.answer.detected for item in items]),
@@ -50,8 +52,10 @@ def outside(items: list[Solved]) -> dict[str, Any]:
         "unnamed_of_any_kind": intervals.of(
             [any(n.startswith("unnamed-") for n in i.answer.names) for i in large]
         ),
-        "confident_wrong_names": intervals.of([wrong(i) for i in items]),
-        "confident_wrong_names_of_large_ones": intervals.of([wrong(i) for i in large]),
+        "confident_wrong_names": intervals.of([confident_and_wrong(i) for i in items]),
+        "confident_wrong_names_of_large_ones": intervals.of(
+            [confident_and_wrong(i) for i in large]
+        ),
         "named": dict(Counter(i.answer.lead for i in items if i.answer.detected)),
     }
 

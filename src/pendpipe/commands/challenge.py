@@ -89,7 +89,10 @@ def _score(arguments: argparse.Namespace) -> int:
     from pendpipe.challenge.cases import draw_cases
     from pendpipe.challenge.draw import draw
     from pendpipe.challenge.page import page
+    from pendpipe.challenge.recordings import intervals_s
     from pendpipe.challenge.score import score
+    from pendpipe.challenge.sindy import sindy_scores
+    from pendpipe.challenge.solved import read_items
     from pendpipe.errors import InputError
     from pendpipe.files import read_json, replaced, write_json
 
@@ -97,7 +100,8 @@ def _score(arguments: argparse.Namespace) -> int:
     if not path.exists():
         raise InputError(path, "this set is not opened", "run pendpipe challenge open first")
     opened = read_json(path)
-    scores = score(opened)
+    scores = score(opened, intervals_s(arguments.set, opened["items"]))
+    scores["peers"]["pysindy"] = sindy_scores(read_items(opened), arguments.set)
     place = arguments.out / "figures"
     cases = draw_cases(opened, arguments.set, place)
     for row, drawn in zip(scores["six_cases"], cases, strict=True):

@@ -117,5 +117,12 @@ PROOF_CAPTIONS: Final = {
         "How often the first name was right, against the probability that the answer stated.",
         "On the grey line probabilities mean what they say; below it the answers boast.",
     ),
+    "abstention": Caption(
+        "Keeping silent",
+        "How many first names are right if those below a probability are withheld, and how many"
+        " are then given at all.",
+        "Where the blue curve rises to the right, the probabilities are worth something: doubt"
+        " goes with mistakes. It should stay above the grey line; below it the answers boast.",
+    ),
 }
 """Words for the figures of a scored challenge."""
