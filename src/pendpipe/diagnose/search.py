@@ -26,6 +26,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.curves import CURVES
+from pendpipe.effects.soft_clipping import SoftClipping
 
 _MOST: Final = 6
 _NEEDED: Final = 9.0
@@ -107,9 +108,9 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
-    drawn = {effect.key for effect in fit.model.effects}
-    curves = [curve(fit.at.span) for curve in CURVES]
-    return [*named, *(curve for curve in curves if curve.key not in drawn)]
+    present_already = {effect.key for effect in fit.model.effects}
+    more = [SoftClipping(), *(curve(fit.at.span) for curve in CURVES)]
+    return [*named, *(effect for effect in more if effect.key not in present_already)]
 
 
 @dataclass(frozen=True)
