@@ -25,10 +25,8 @@ _FORM: Final = 3.0
 """Standard deviation of a difference of evidence for what a law's own form is worth, where
 little is gained: it grows with the gain by `_MISSHAPEN`."""
 _MISSHAPEN: Final = 0.03
-"""Part of a gain that a real law leaves to the catalogue's form of it: a flexure's sinh to its
-cubic term, a drag that follows C_D(Re) to a power."""
-_KNOTTED: Final = 0.02
-"""The same of a curve, which is straight between its knots."""
+"""Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
+term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 
@@ -71,8 +69,7 @@ def form_spread(best: Rival) -> float:
 
     The catalogue's forms are not quite those of real laws, and curves have knots.
     """
-    part = _KNOTTED if best.drawn else _MISSHAPEN
-    return math.hypot(_FORM, part * max(best.gain, 0.0))
+    return math.hypot(_FORM, _MISSHAPEN * max(best.gain, 0.0))
 
 
 def class_width(best: Rival) -> float:
