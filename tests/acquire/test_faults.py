@@ -18,11 +18,15 @@ from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
+from .stepped import STEP_S, recorded_in_steps
+
 FAMILIES = ["di154", "di149", "di245", "di2108"]
 SYNC_BIT = FAMILIES[:3]
 SCALE, RATE_HZ = 100.0, 100.0
 STAMP_S = 0.05 * SCALE
 """A twentieth of a second of a host that is busy with other tests."""
+POLL_S = pendpipe.acquire.session._LONGEST_POLL_S
+"""The recorder's pause between two looks at the line."""
 
 
 def slow(time_s: FloatArray) -> FloatArray:
@@ -112,8 +116,12 @@ def test_a_stale_stream_is_ended_before_the_recording(
 @pytest.mark.parametrize("kind", SYNC_BIT)
 @pytest.mark.parametrize("place", [1000, 1001])
 @pytest.mark.parametrize("name", ["drop", "duplicate", "flip"])
-def test_what_breaks_the_frame_mark_costs_one_scan(kind: str, name: str, place: int) -> None:
-    recording = recorded(kind, Fault(name, at=place), duration_s=15.0)
+def test_what_breaks_the_frame_mark_costs_one_scan(
+    kind: str, name: str, place: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = recorded_in_steps(
+        kind, slow, Fault(name, at=place), monkeypatch, rate_hz=RATE_HZ, duration_s=15.0
+    )
     assert missing(recording) == 1
     assert any("1 scans lost at 1 places" in note for note in recording.notes)
     assert recording.quality is not None
@@ -124,9 +132,13 @@ def test_what_breaks_the_frame_mark_costs_one_scan(kind: str, name: str, place: 
     assert error_steps(recording, late_s=1 / RATE_HZ) <= 0.51
 
 
-def test_a_lost_byte_of_the_unmarked_family_is_told_by_the_signal() -> None:
+def test_a_lost_byte_of_the_unmarked_family_is_told_by_the_signal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """No mark tells it; the words are cut across from there on, and are put into step again."""
-    recording = recorded("di2108", Fault("drop", at=1001), duration_s=15.0)
+    recording = recorded_in_steps(
+        "di2108", slow, Fault("drop", at=1001), monkeypatch, rate_hz=RATE_HZ, duration_s=15.0
+    )
     assert any("bytes slipped at 1 places" in note for note in recording.notes)
     assert recording.quality is not None
     gap = np.flatnonzero(recording.quality == MISSING)
@@ -183,13 +195,19 @@ def test_whole_scans_lost_on_a_line_are_told_by_the_clock() -> None:
 
 
 @pytest.mark.parametrize("code", [1, 2, 3])
-def test_a_stop_code_is_no_data_and_the_stream_resumes(code: int, impatient: None) -> None:
-    recording = recorded("di2108", Fault("overflow", at=4000, code=code))
+def test_a_stop_code_is_no_data_and_the_stream_resumes(
+    code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fault = Fault("overflow", at=4000, code=code)
+    recording = recorded_in_steps(
+        "di2108", slow, fault, monkeypatch, rate_hz=RATE_HZ, duration_s=60.0
+    )
     assert f"the device's buffer overflowed ('stop 0{code}')" in recording.notes
     assert any("broken off and resumed" in note for note in recording.notes)
     assert missing(recording) > 0
-    assert error_steps(recording, late_s=STAMP_S) <= 0.51
-    assert recording.time_s[-1] == pytest.approx(60.0, abs=STAMP_S)
+    # The next stream is placed by its arrivals: to a scan, and to the recorder's own pause.
+    assert error_steps(recording, late_s=1 / RATE_HZ + POLL_S) <= 0.51
+    assert recording.time_s[-1] == pytest.approx(60.0, abs=1 / RATE_HZ + POLL_S + STEP_S)
 
 
 @pytest.mark.parametrize("kind", ["di154", "di2108"])

@@ -9,7 +9,7 @@ from typing import Self
 
 from pendpipe.acquire.clock import SimulatedClock
 from pendpipe.acquire.devices.faults import Fault, FaultyPath
-from pendpipe.acquire.devices.links import open_link
+from pendpipe.acquire.devices.links import Link, open_link
 from pendpipe.acquire.devices.models import DEVICES
 from pendpipe.acquire.devices.stream import Signal, Stream
 from pendpipe.errors import InputError
@@ -19,6 +19,9 @@ __all__ = ["DEVICES", "Signal", "SimulatedDevice"]
 
 class SimulatedDevice:
     """An instrument behind a pseudo-terminal or socket: a context manager.
+
+    Within the context it lives in a thread of its own; who has its own link and clock may
+    call `step` instead.
 
     Parameters
     ----------
@@ -31,13 +34,15 @@ class SimulatedDevice:
     clock_scale
         How many seconds of the device pass in one of the wall's.
     link
-        ``"pty"``, ``"socket"``, or ``None`` for what the system has.
+        ``"pty"``, ``"socket"``, or ``None`` for what the system has; or a device's end itself.
     rate_error
         The device's clock is fast by this fraction: scans come ``1 + rate_error`` times as
         often as it says.
     faults
         What is to go wrong, see `faults.FAULTS`. With any, the signal runs on from the
         first stream to the next ones; else every start of a stream is its time 0.
+    clock
+        The clock of its world; by default one that follows the wall's by `clock_scale`.
 
     Examples
     --------
@@ -56,9 +61,10 @@ class SimulatedDevice:
         signal: Signal | Mapping[int, Signal],
         *,
         clock_scale: float = 1.0,
-        link: str | None = None,
+        link: str | Link | None = None,
         rate_error: float = 0.0,
         faults: Iterable[Fault] = (),
+        clock: SimulatedClock | None = None,
     ) -> None:
         if kind not in DEVICES:
             raise InputError(
@@ -68,17 +74,22 @@ class SimulatedDevice:
             )
         self._kind = kind
         self.dialect = DEVICES[kind]()
-        self.clock = SimulatedClock(clock_scale)
+        self.clock = clock or SimulatedClock(clock_scale)
         self.failure: BaseException | None = None
         self._signal = signal
         self._path = FaultyPath(faults := tuple(faults))
         self._runs_on = bool(faults)
         self._rate_error = (1.0 + rate_error) * self._path.rate_factor - 1.0
-        self._link = open_link(link, replaceable=self._path.may_unplug)
+        self._link = (
+            open_link(link, replaceable=self._path.may_unplug)
+            if link is None or isinstance(link, str)
+            else link
+        )
         self._stream: Stream | None = None
         self._first_start_s: float | None = None
         self._until_s = 0.0  # the end of a stall or a silence
         self._condition = ""
+        self._starts = self.dialect.starts  # of streams, that were seen
         self._ending = threading.Event()
         self._outbox = bytearray()
         self._thread = threading.Thread(target=self._live, name=f"simulated {kind}", daemon=True)
@@ -121,28 +132,31 @@ class SimulatedDevice:
             if self._path.stale:
                 self.dialect.streaming = True
                 self._begin()
-            starts = self.dialect.starts
             while not self._ending.is_set():
                 self._link.wait(self._rest_s(), sending=bool(self._outbox))
-                data = self._link.receive()
-                self._suffer()
-                if self._condition == "silence":
-                    continue
-                if data:
-                    reply = self.dialect.respond(data)
-                    self._outbox += self._path.answer(reply, self.clock.now())
-                self._outbox += self._path.due(self.clock.now())
-                if self.dialect.starts != starts:
-                    starts = self.dialect.starts
-                    self._begin()
-                if not self.dialect.streaming:
-                    self._stream = None
-                elif self._stream and not self._outbox and not self._condition:
-                    due = self._stream.due(self.clock)
-                    self._outbox += self._path.stream(due, self._stream.scan_bytes)
-                self._send()
+                self.step()
         except BaseException as fault:
             self.failure = fault
+
+    def step(self) -> None:
+        """Read what the host has sent, and send what is due by now."""
+        data = self._link.receive()
+        self._suffer()
+        if self._condition == "silence":
+            return
+        if data:
+            reply = self.dialect.respond(data)
+            self._outbox += self._path.answer(reply, self.clock.now())
+        self._outbox += self._path.due(self.clock.now())
+        if self.dialect.starts != self._starts:
+            self._starts = self.dialect.starts
+            self._begin()
+        if not self.dialect.streaming:
+            self._stream = None
+        elif self._stream and not self._outbox and not self._condition:
+            due = self._stream.due(self.clock)
+            self._outbox += self._path.stream(due, self._stream.scan_bytes)
+        self._send()
 
     def _begin(self) -> None:
         """Begin a stream."""
