@@ -268,3 +268,16 @@ def test_the_range_behind_means_of_readings_is_judged() -> None:
     assert clipping.mask is not None
     assert clipping.mask.shape == record.data.values.shape
     assert 20 < np.count_nonzero(clipping.mask) < 0.1 * len(record.data)
+
+
+def test_a_sensor_that_bends_at_its_end_makes_no_glitches(clean: FloatArray) -> None:
+    """Wrong readings at random places are masked; those at the tops are left to the sensor."""
+    bent = clean - 1e-3 * np.exp((clean - clean.max()) / 1e-3)
+    finding = found(fitted(AIR, bent + white(generator(), AIR.count))).get("glitches")
+    assert finding is None
+    where = np.array([700, 1501, 2600])
+    readings = clean + white(generator(), AIR.count)
+    readings[where] -= 12.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()

@@ -68,10 +68,15 @@ class Forensics:
 
     def after(self, state: State, progress: Progress) -> None:
         """Make the tests that need a clean residual; a misfit's squares look like any of them."""
-        if is_gross(state.fit, state.data) or state.fit.chi2 > _CLEAN * state.data.used:
-            return
+        clean = not is_gross(state.fit, state.data)
+        tests: tuple[str, ...]
+        if clean and state.fit.chi2 <= _CLEAN * state.data.used:
+            tests = _BEHIND
+        else:
+            # Bits that do not move show in the codes themselves, whatever the motion's model.
+            tests = ("coarse-quantisation",) if self.samples.promised_step is not None else ()
         known = [fault.finding.identifier for fault in state.faults]
-        for name in [name for name in _BEHIND if name not in known]:
+        for name in [name for name in tests if name not in known]:
             self._examine(name, state, progress)
 
     def _tested(self, name: str, state: State) -> tuple[Finding, float]:
@@ -89,7 +94,7 @@ class Forensics:
             return False
         progress(f"{name}: {finding.summary}")
         if not known:
-            state.faults.append(Fault(finding, p_value))
+            state.faults.append(Fault(finding, p_value, len(state.steps)))
         if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
             return False
         data = state.data.masked((state.data.weight == 0.0) | finding.mask)
@@ -138,7 +143,7 @@ class Forensics:
             Location(time_s=(lost[0].time_s, lost[-1].time_s)),
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )  # fmt: skip
-        state.faults.append(Fault(found, 0.0))
+        state.faults.append(Fault(found, 0.0, len(state.steps)))
         self.p_value = 0.0
         state.settle(fit, mended)
 
@@ -152,6 +157,6 @@ class Forensics:
         if equivalent(p_value, finding.delta_chi2) + lead < rival.evidence:
             return False
         progress(f"{name}: {finding.summary}")
-        state.faults.append(Fault(finding, p_value))
+        state.faults.append(Fault(finding, p_value, len(state.steps)))
         self.p_value = min(self.p_value, p_value)
         return True

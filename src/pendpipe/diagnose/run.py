@@ -12,12 +12,13 @@ import numpy as np
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.diagnose.begin import Beginning, begin
+from pendpipe.diagnose.forensics.lattice import with_true_step
 from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.freed import freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit
-from pendpipe.diagnose.result import Diagnosis, Judged
+from pendpipe.diagnose.result import Diagnosis, Judged, Named
 from pendpipe.diagnose.search import Search, search
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import parameters_of
@@ -93,16 +94,13 @@ def diagnose_decay(
     from pendpipe.effects.catalogue import CATALOGUE
 
     fixed = fixed or {}
-    samples = prepare(part, place)
+    samples = with_true_step(prepare(part, place))
     beginning = begin(samples, points, baseline=baseline, fixed=fixed)
     found = search(
         beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
         freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
-    named = (
-        *(fault_named(found, fault) for fault in found.faults),
-        *(effect_named(found, beginning, step) for step in found.steps),
-    )
+    named = _as_added(found, beginning)
     gap = gap_note(
         (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
     )  # fmt: skip
@@ -125,6 +123,15 @@ def diagnose_decay(
         warnings=notes, remainder=found.remainder, provenance=dict(provenance or {}),
     )  # fmt: skip
     return Outcome(diagnosis, found, beginning)
+
+
+def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:
+    """Name effects and faults in the order in which they were added."""
+    effects = [(place, effect_named(found, beginning, step)) for place, step in
+               enumerate(found.steps)]  # fmt: skip
+    faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
+    # Sorting keeps the order of equals: a fault goes before the effect that followed it.
+    return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))
 
 
 def _judged(fit: Fit, found: Search) -> Judged:

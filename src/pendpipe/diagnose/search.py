@@ -28,6 +28,7 @@ from pendpipe.effects.baseline import C
 from pendpipe.effects.closer_curves import CLOSER_CURVES
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.curves import CURVES
+from pendpipe.effects.soft_clipping import SoftClipping
 
 _MOST: Final = 6
 _NEEDED: Final = 9.0
@@ -109,7 +110,9 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
-    return [*named, *undrawn(CURVES, fit)]
+    bent = SoftClipping()
+    drawn = any(effect.key == bent.key for effect in fit.model.effects)
+    return [*named, *([] if drawn else [bent]), *undrawn(CURVES, fit)]
 
 
 def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:

@@ -54,10 +54,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Fault:
-    """A finding of the measurement's tests that counts, and its global p-value."""
+    """A finding of the measurement's tests that counts, and its global p-value.
+
+    `behind` is how many effects had been added before.
+    """
 
     finding: Finding
     p_value: float
+    behind: int = 0
 
 
 @dataclass

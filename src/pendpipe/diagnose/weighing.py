@@ -95,9 +95,12 @@ def fault_named(found: Search, fault: Fault) -> Named:
     finding = fault.finding
     effect = by_identifier(finding.identifier)
     doubt = math.exp(-0.5 * (_NONE + _misfit(found)))
+    # What would have given the very same codes is as likely.
+    each = 1.0 / (1.0 + len(finding.also) + doubt)
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation, finding.parameters,
-        finding.delta_chi2, fault.p_value, 1.0 / (1.0 + doubt), (), effect.deciding,
+        finding.delta_chi2, fault.p_value, each, tuple((name, each) for name in finding.also),
+        effect.deciding,
         replace(finding.location, summary=finding.summary),
     )  # fmt: skip
 

@@ -20,7 +20,11 @@ class BroadbandDrive(Effect):
 
 
 class Clipping(Effect):
-    """Readings beyond the range are cut off."""
+    """Readings beyond the range are cut off: sharply, or over a width w about the level.
+
+    With a width the upper end reads y = L - w ln(1 + e^((L - x)/w)). What is sharp is found
+    by the largest reading, what is soft by its shape.
+    """
 
     identifier = "clipping"
     name = "clipping"
@@ -29,6 +33,7 @@ class Clipping(Effect):
     parameters = (
         Parameter("lower_level", "rad", -math.inf, math.inf, -math.inf),
         Parameter("upper_level", "rad", -math.inf, math.inf, math.inf),
+        Parameter("width", "rad", 0.0, math.inf, 0.0),
     )
     template = False
     deciding = "widen the range, or release it with less amplitude"

@@ -82,7 +82,7 @@ class Instrument:
                 raise InputError(
                     self.place, "clipping: lower_level is not below upper_level", "swap them"
                 )
-            angle = np.clip(angle, levels["lower_level"], levels["upper_level"])
+            angle = _limited(angle, levels["lower_level"], levels["upper_level"], levels["width"])
         step = self.settings.get("coarse-quantisation", {}).get("step", 0.0)
         return step * np.round(angle / step) if step else angle
 
@@ -100,3 +100,14 @@ class Instrument:
         while np.any(lost := np.isin(codes, missing)):
             codes = np.where(lost, codes + self.random.choice([-1.0, 1.0], len(codes)), codes)
         return codes
+
+
+def _limited(angle: FloatArray, low: float, high: float, width: float) -> FloatArray:
+    """Cut off at two levels; smoothly over a width: y = L - w ln(1 + e^((L - x)/w))."""
+    if width == 0.0:
+        return np.clip(angle, low, high)
+    if np.isfinite(high):
+        angle = high - width * np.logaddexp(0.0, (high - angle) / width)
+    if np.isfinite(low):
+        angle = low + width * np.logaddexp(0.0, (angle - low) / width)
+    return angle

@@ -37,6 +37,9 @@ class Samples:
     counts
         Whether each row marks the passage of one count of an encoder: the angle is then
         exact, and the error is in the time.
+    promised_step
+        The converter's step, where only every so manieth of its codes comes and `step` is
+        as much larger; None elsewhere.
     """
 
     time_s: FloatArray
@@ -45,6 +48,7 @@ class Samples:
     step: float | None
     noise_rms: float
     counts: bool = False
+    promised_step: float | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -33,7 +33,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     inner product with it, and held against what a noise of a quarter step would leave: the
     null is any noise above that. Where the amplitude stays above twenty steps the errors are
     pseudo-random, do the fit no harm, and are a property of the record.
+
+    Where the codes that come are a multiple of the converter's step apart, its lowest bits
+    do not move, and nothing need be measured.
     """
+    if samples.promised_step is not None:
+        return _dead_bits(data, fit, samples)
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 60:
         return nothing("coarse-quantisation")
@@ -60,4 +65,33 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
         f" that errors follow the codes; the amplitude ends at {end / step:.2g} steps",
         kind="fault" if end < _RANDOM * step else "property",
+    )  # fmt: skip
+
+
+def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
+    """Codes that all lie on a coarser lattice; by chance one more would be with 1/times.
+
+    With a noise of more than half the converter's step every code is as likely as its
+    neighbours, so that each reading tells ln(times) of likelihood.
+    """
+    assert samples.step is not None
+    assert samples.promised_step is not None
+    times = round(samples.step / samples.promised_step)
+    levels = len(np.unique(np.rint(samples.values / samples.step)))
+    amplitude = fit.at.sampled.amplitude
+    every = "second" if times == 2 else f"{times}th"
+    return Finding(
+        "coarse-quantisation", float(times) ** (1 - levels), 2.0 * data.used * math.log(times),
+        {
+            "step": Estimate(samples.step, 0.0, data.unit),
+            "promised": Estimate(samples.promised_step, 0.0, data.unit),
+            "dead_bits": Estimate(math.log2(times), 0.0, ""),
+        },
+        Location(
+            (float(data.time_s[0]), float(data.time_s[-1])),
+            (float(amplitude.min()), float(amplitude.max())),
+        ),
+        summary=f"only every {every} code comes: the step is {samples.step:.3g} {data.unit},"
+        f" where the converter's bits promise {samples.promised_step:.3g}",
+        also=("missing-codes",) if times == 2 else (),
     )  # fmt: skip

@@ -39,6 +39,8 @@ class Finding:
     kind
         ``"fault"``: counts as missing physics where it is significant. ``"property"``: said
         and repaired, and nothing that a model could have left out (a gap in the stamps).
+    also
+        Identifiers of what would have given the very same codes.
     """
 
     identifier: str
@@ -51,6 +53,7 @@ class Finding:
     time_s: FloatArray | None = None
     summary: str = ""
     kind: Literal["fault", "property"] = "fault"
+    also: tuple[str, ...] = ()
 
 
 def nothing(identifier: str) -> Finding:

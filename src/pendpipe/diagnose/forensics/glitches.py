@@ -33,6 +33,7 @@ _SHARED: Final = 0.35
 _ROUNDS: Final = 4
 _NEAR: Final = 4
 _BLOCK: Final = 50
+_NO_CHANCE: Final = 1e-3
 _EXPECTED: Final = 0.05
 """A reading is left out where chance would make fewer than this in the whole record."""
 
@@ -46,7 +47,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
         p_k = P(at least k of n beyond the k-th largest).
 
-    The smallest p_k, half of the chance given to k = 1, is the test.
+    The smallest p_k, half of the chance given to k = 1, is the test. Readings that fall
+    behind at the very ends of the motion are left to what bends the ends.
     """
     if data.used < 60:
         return nothing("glitches")
@@ -71,10 +73,41 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
             break
         local, _ = _errors(data, fit, noise, residual, ~used | mask)
         error = own_error(local)
-    if not mask.any():
+    ends = bent_ends(data.values - residual, size, mask, used)
+    if ends.any():
+        mask &= ~ends
+        p_value = _smallest(np.sort(error[used & ~ends]))
+    if not mask.any() or p_value > _EXPECTED:
         quiet = "no reading stands out of the noise"
         return Finding("glitches", max(p_value, _EXPECTED), summary=quiet)
     return _described(data, fit, size, mask, p_value, tail)
+
+
+def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolArray) -> BoolArray:
+    """Which wrong readings lie so near an end of the motion that no chance put them there.
+
+    Of m readings at random places, k or more would all lie above a level, beyond which there
+    is the part f of all readings, with at most C(m, k) f^k. A sensor that saturates makes
+    its errors there, and inwards.
+
+    Parameters
+    ----------
+    angle, size
+        The motion's, and the readings' errors; shape (n,).
+    mask, used
+        Which are wrong, and which count; shape (n,).
+    """
+    found = np.zeros(len(angle), dtype=bool)
+    for sign in (1.0, -1.0):
+        wrong = np.flatnonzero(mask & (sign * size < 0.0))
+        wrong = wrong[np.argsort(-sign * angle[wrong])]
+        share = [float(np.mean(sign * angle[used] >= sign * angle[at])) for at in wrong]
+        chances = [
+            math.comb(int(np.count_nonzero(mask)), k) * part**k for k, part in enumerate(share, 1)
+        ]
+        if chances and min(chances) < _NO_CHANCE:
+            found[wrong[: int(np.argmin(chances)) + 1]] = True
+    return found
 
 
 def _errors(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
@@ -18,6 +19,9 @@ _RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38
 """Noise before rounding, in steps."""
 _PLAINLY: Final = 0.6
 """Rms of the readings' errors in steps, from which rounding is plainly dithered."""
+_LOOK: Final = 256
+_LEVELS: Final = 16
+"""Different codes from which chance (2^-16 at most) puts no more on a coarser lattice."""
 _OFF: Final = 0.05
 """Part of a step by which readings may be off their codes."""
 
@@ -66,6 +70,28 @@ def find_lattice(values: FloatArray, step: float | None) -> Lattice | None:
         return None
     shift = round(origin / refined)
     return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
+
+
+def with_true_step(samples: Samples) -> Samples:
+    """Take the step of the codes that come, where it is a multiple of the converter's.
+
+    A converter whose lowest k bits do not move gives every 2^k-th code: its step is 2^k
+    times what its bits promise.
+    """
+    if samples.counts or samples.step is None:
+        return samples
+    codes = (samples.values - samples.values[0]) / samples.step
+    whole = np.rint(codes)
+    if np.max(np.abs(codes[:_LOOK] - whole[:_LOOK])) > _OFF:
+        return samples
+    if np.gcd.reduce(whole[:_LOOK].astype(np.int64)) < 2:
+        return samples
+    times = int(np.gcd.reduce(whole.astype(np.int64)))
+    if times < 2 or len(np.unique(whole)) < _LEVELS:
+        return samples
+    step = times * samples.step
+    noise = max(samples.noise_rms, noise_rms(samples.values, step))
+    return replace(samples, step=step, noise_rms=noise, promised_step=samples.step)
 
 
 def whole_readings(data: Data, samples: Samples) -> slice | None:

@@ -12,6 +12,7 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.distributions import normal_below, poisson_from, poisson_up_to
 from pendpipe.diagnose.forensics.codes import Coded, read_codes
+from pendpipe.diagnose.forensics.combs import Comb, worst_comb
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.place import Location
@@ -42,38 +43,47 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
     Each code's number is held against Poisson's distribution about its expectation (readings
     are spread less than that, so the chance is never underestimated), which may lie anywhere
-    within what a small common error of the angles allows. Single codes and whole bits are
-    looked at; the chance counts how many.
+    within what a small common error of the angles allows. Single codes, whole bits, and codes
+    that are equal modulo a power of two are looked at; the chance counts how many.
     """
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 100:
         return nothing("missing-codes")
-    occupation = occupied(coded)
+    expected = _expectations(coded)
+    occupation = occupied(coded, expected)
+    comb = worst_comb(coded.code, expected)
     chance = _chances(occupation)
     looked = len(chance)
     single = min(1.0, looked * float(chance.min())) if looked else 1.0
     bit, bits = _stuck_bits(coded)
-    p_value = min(1.0, 2.0 * min(single, bits))
+    p_value = min(1.0, 3.0 * min(single, bits, comb.p_value))
     if p_value > 0.01:
         return Finding("missing-codes", p_value, summary="codes come as often as they should")
+    if comb.p_value < min(single, bits):
+        return _described_comb(data, coded, comb, p_value)
     bad = np.minimum(chance * looked, 1.0) < _FEW
     return _described(data, coded, occupation, bad, bit if bits <= single else None, p_value)
 
 
-def occupied(coded: Coded) -> Occupation:
-    """Count each code, and work out how often it should have come."""
+def _expectations(coded: Coded) -> FloatArray:
+    """How often each code is due, for angles too small, right and too large, (3, codes)."""
     first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
-    found = np.bincount(coded.code - first, minlength=last - first + 1).astype(np.float64)
     spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
     shift = _DOUBT + 2.0 * coded.blur
     size = last - first + 1
-    shapes = [
-        _expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)
-    ]
+    return np.stack(
+        [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
+    )
+
+
+def occupied(coded: Coded, expected: FloatArray) -> Occupation:
+    """Count each code beside how often it should have come."""
+    first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
+    found = np.bincount(coded.code - first, minlength=last - first + 1).astype(np.float64)
     inside = slice(2, -2)
     codes = np.arange(first, last + 1)
-    low, high = np.min(shapes, axis=0), np.max(shapes, axis=0)
-    return Occupation(codes[inside], found[inside], low[inside], high[inside], shapes[1][inside])
+    low, high = expected.min(axis=0), expected.max(axis=0)
+    return Occupation(codes[inside], found[inside], low[inside], high[inside], expected[1][inside])
 
 
 def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
@@ -176,4 +186,25 @@ def _described(
     return Finding(
         "missing-codes", p_value, gain, parameters,
         Location(adc_codes=tuple(int(code) for code in seldom[:_SHOWN])), summary=summary,
+    )  # fmt: skip
+
+
+def _described_comb(data: Data, coded: Coded, comb: Comb, p_value: float) -> Finding:
+    readings = len(coded.code)
+    codes = np.arange(int(coded.code.min()), int(coded.code.max()) + 1)
+    codes = codes[comb.holds(codes)]
+    due = max(comb.expected, 1.0)
+    return Finding(
+        "missing-codes", p_value, comb.gain,
+        {
+            "share": Estimate((due - comb.found) / readings, math.sqrt(due) / readings, ""),
+            "number": Estimate(float(len(codes)), 0.0, ""),
+            "found": Estimate(comb.found, math.sqrt(max(comb.found, 1.0)), ""),
+            "expected": Estimate(comb.expected, 0.0, ""),
+            "period": Estimate(float(comb.period), 0.0, ""),
+        },
+        Location(adc_codes=tuple(int(code) for code in codes[:_SHOWN])),
+        summary=f"every {comb.period}th code (from {codes[0]}, in steps of"
+        f" {coded.lattice.step:.4g} {data.unit}) came {comb.found:.0f} times where"
+        f" {comb.expected:.0f} were due",
     )  # fmt: skip
