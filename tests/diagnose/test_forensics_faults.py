@@ -11,6 +11,7 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import gather
 from pendpipe.diagnose.forensics import TESTS, Finding, find_lost_samples
+from pendpipe.diagnose.forensics.glitches import find_in_misfit
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.cubic_stiffness import CubicStiffness
@@ -281,3 +282,19 @@ def test_a_sensor_that_bends_at_its_end_makes_no_glitches(clean: FloatArray) -> 
     finding = found(fitted(AIR, readings))["glitches"]
     assert finding.mask is not None
     assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+
+
+def test_glitches_need_no_model(clean: FloatArray) -> None:
+    """The clock is wrong by a hundredth; single readings are found, a shifted stretch is none."""
+    noisy = clean + white(generator(), AIR.count)
+    right = fitted(AIR, noisy)
+    far = replace(right.fit, at=right.fit.model.evaluate(1.01 * right.fit.value))
+    where = np.array([420, 1501, 3300])
+    for wrong, expected in ((where, where.tolist()), (np.arange(1500, 1508), [])):
+        readings = noisy.copy()
+        readings[wrong] += 30.0 * NOISE
+        data = replace(right.data, values=readings)
+        finding = find_in_misfit(data, far, right.noise, right.samples)
+        found_at = [] if finding.mask is None else np.flatnonzero(finding.mask).tolist()
+        assert found_at == expected
+        assert (finding.p_value < 1e-3) == bool(expected)

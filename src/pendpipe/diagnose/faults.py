@@ -14,8 +14,9 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.data import at_even_times
 from pendpipe.diagnose.evidence import Rival, equivalent
-from pendpipe.diagnose.forensics import TESTS, find_lost_samples
+from pendpipe.diagnose.forensics import TESTS, Test, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
+from pendpipe.diagnose.forensics.glitches import find_in_misfit
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress
@@ -60,6 +61,7 @@ class Forensics:
         self._mend_stamps(state, progress)
         self._mend_clock(state, progress)
         if is_gross(state.fit, state.data):
+            self._examine("glitches", state, progress, find_in_misfit)
             return
         for name in _BEFORE:
             for _ in range(_ROUNDS):
@@ -79,23 +81,25 @@ class Forensics:
         for name in [name for name in tests if name not in known]:
             self._examine(name, state, progress)
 
-    def _tested(self, name: str, state: State) -> tuple[Finding, float]:
+    def _tested(self, name: str, state: State, test: Test | None = None) -> tuple[Finding, float]:
         """Make one test; its p-value is that of the test's share of the level."""
-        finding = TESTS[name](state.data, state.fit, state.noise, self.samples)
+        made = test or TESTS[name]
+        finding = made(state.data, state.fit, state.noise, self.samples)
         return finding, min(finding.p_value / _EACH, 1.0)
 
-    def _examine(self, name: str, state: State, progress: Progress) -> bool:
+    def _examine(
+        self, name: str, state: State, progress: Progress, test: Test | None = None
+    ) -> bool:
         """Make one test; keep what it finds; say whether to look again."""
-        finding, p_value = self._tested(name, state)
-        others = [fault for fault in state.faults if fault.finding.identifier != name]
-        earlier = [fault for fault in state.faults if fault.finding.identifier == name]
-        if not earlier:
+        finding, p_value = self._tested(name, state, test)
+        known = any(fault.finding.identifier == name for fault in state.faults)
+        if not known:
             self.p_value = min(self.p_value, p_value)
         if finding.kind != "fault" or p_value > self.level:
             return False
         progress(f"{name}: {finding.summary}")
-        kept = earlier[0] if earlier else Fault(finding, p_value, len(state.steps))
-        state.faults[:] = [*others, kept]
+        if not known:
+            state.faults.append(Fault(finding, p_value, len(state.steps)))
         if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
             return False
         data = state.data.masked((state.data.weight == 0.0) | finding.mask)

@@ -110,8 +110,9 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
-    soft = [] if SoftClipping.identifier in used else [SoftClipping()]
-    return [*named, *soft, *undrawn(CURVES, fit)]
+    bent = SoftClipping()
+    drawn = any(effect.key == bent.key for effect in fit.model.effects)
+    return [*named, *([] if drawn else [bent]), *undrawn(CURVES, fit)]
 
 
 def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:

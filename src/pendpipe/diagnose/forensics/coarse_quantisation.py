@@ -79,7 +79,6 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
     times = round(samples.step / samples.promised_step)
     levels = len(np.unique(np.rint(samples.values / samples.step)))
     amplitude = fit.at.sampled.amplitude
-    every = "second" if times == 2 else f"{times}th"
     return Finding(
         "coarse-quantisation", float(times) ** (1 - levels), 2.0 * data.used * math.log(times),
         {
@@ -91,7 +90,7 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(amplitude.min()), float(amplitude.max())),
         ),
-        summary=f"only every {every} code comes: the step is {samples.step:.3g} {data.unit},"
+        summary=f"only one code in {times} comes: the step is {samples.step:.3g} {data.unit},"
         f" where the converter's bits promise {samples.promised_step:.3g}",
         also=("missing-codes",) if times == 2 else (),
     )  # fmt: skip

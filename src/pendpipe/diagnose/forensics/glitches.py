@@ -33,6 +33,9 @@ _SHARED: Final = 0.35
 _ROUNDS: Final = 4
 _NEAR: Final = 4
 _BLOCK: Final = 50
+_MOST_ROUNDS: Final = 20
+_FAR_OFF: Final = 8.0
+_WINDOW_RAD: Final = 4.0 * math.pi
 _NO_CHANCE: Final = 1e-3
 _EXPECTED: Final = 0.05
 """A reading is left out where chance would make fewer than this in the whole record."""
@@ -80,7 +83,46 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if not mask.any() or p_value > _EXPECTED:
         quiet = "no reading stands out of the noise"
         return Finding("glitches", max(p_value, _EXPECTED), summary=quiet)
-    return _described(data, fit, size, mask, p_value, tail)
+    return _described(data, fit, residual, size, mask, p_value, tail)
+
+
+def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Look for single readings far off, where the model itself is far off.
+
+    No model is needed for that: the readings are freed, window by window, of what is smooth
+    from cycle to cycle. Only what is eight standard deviations off counts, and only where no
+    neighbour is off as well: lost samples, a jump, or a corner of the motion displace several.
+    """
+    if data.used < 60 or data.time_noise:
+        return nothing("glitches")
+    used, phase = data.weight > 0.0, fit.at.sampled.phase
+    values = data.values - float(np.median(data.values[used]))
+    mask = np.zeros(len(data), dtype=bool)
+    for _ in range(_MOST_ROUNDS):
+        # A wrong reading bends its window: the largest goes first.
+        local = local_residual(phase, values, used, leave_out=mask)
+        error = np.where(mask | ~used, 0.0, np.abs(local.scaled))
+        beyond = (error > _FAR_OFF) & (error == _largest_about(error))
+        if not beyond.any():
+            break
+        mask |= beyond
+    single = mask & (_largest_beside(np.abs(local.scaled)) < _LARGE)
+    # What displaces several bends its window, and makes further ones seem wrong.
+    bent = phase[mask & ~single]
+    single[single] = [np.all(np.abs(bent - at) > _WINDOW_RAD) for at in phase[single]]
+    single &= ~bent_ends(values - local.left, local.scaled, single, used)
+    if not single.any():
+        return nothing("glitches")
+    error = np.abs(local.scaled)[used & (single | ~mask)]
+    p_value, tail = _smallest(np.sort(error)), _others(np.sort(error))
+    return _described(data, fit, values, local.scaled, single, p_value, tail)
+
+
+def _largest_beside(error: FloatArray) -> FloatArray:
+    """The largest of each reading's neighbours, two to each side."""
+    left = np.pad(error, (2, 0))
+    right = np.pad(error, (0, 2))
+    return np.asarray(np.max([left[:-2], left[1:-1], right[1:-1], right[2:]], axis=0))
 
 
 def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolArray) -> BoolArray:
@@ -178,11 +220,12 @@ def _others(sorted_error: FloatArray) -> Tail:
 
 
 def _described(
-    data: Data, fit: Fit, sizes: FloatArray, mask: BoolArray, p_value: float, tail: Tail
-) -> Finding:
+    data: Data, fit: Fit, residual: FloatArray, sizes: FloatArray, mask: BoolArray,
+    p_value: float, tail: Tail,
+) -> Finding:  # fmt: skip
     sampled = fit.at.sampled
     size = sizes[mask]
-    residual, used = residual_of(data, fit), data.weight > 0.0
+    used = data.weight > 0.0
     local = local_residual(sampled.phase, residual, used, leave_out=mask)
     reading = local.left[mask]
     when = data.time_s[mask]
