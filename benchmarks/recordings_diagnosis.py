@@ -7,29 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks.recordings_known import KNOWN, KNOWN_VISCOUS, Known, cell
 from pendpipe.figures.units import compact, with_error
 from pendpipe.files import read_json
 
-KNOWN = {
-    "data32": "circular error; stiffer below 0.04 rad",
-    "data2_14": "circular error; stiffer below 0.04 rad",
-    "data2_20": "circular error; stiffer below 0.04 rad",
-    "data2_12": "a gap of 13 s in the time column",
-    "adip": "circular error",
-    "AAAtAmp3": "circular error, slow wander of the level",
-    "8050": "circular error, slow wander of the level",
-    "8055": "circular error, slow wander of the level",
-    "1.3_100mA": "spring-type period change, no circular error",
-    "1.3_200mA": "spring-type period change, no circular error",
-    "21337": "hardening moment, dT/T = -0.27 A^2",
-    "test1pend1": "circular error, presliding at the end",
-    "filo0509": "a 9 s beat with a second mode",
-    "lab1_data": "circular error",
-    "real_pend_h_1": "circular error",
-    "real_linear_h_1": "isochronous",
-    "damping_angle": "circular error, one tracking error",
-}
-"""What the recordings' own README knows beside a, b and c."""
 SHOWN = (
     ("adip", "frequency", "Frequency against amplitude"),
     ("data2_14", "frequency", "Frequency against amplitude"),
@@ -53,6 +34,11 @@ explains three quarters of the misfit and stands out against the rest (not again
 is believed no more than the part that it explains; and all errors are widened by the excess
 per independent number of the rest. What is left has no name: it is drawn as a curve where
 one describes most of it, and *remainder* says in which parts of the motion it lies.
+
+What the recordings' README knows was told to nobody: the last column says which of it was
+found, and by what. The beat of filo0509, which the README gives as 9 s, is a line at 1.006 Hz
+beside the motion's 1.345 Hz: the beats come every 2.95 s. Amplitudes taken every 12 half cycles
+(4.46 s) go up and down in turns, every 8.9 s.
 """
 
 VISCOUS_HEAD = """### From the viscous baseline
@@ -63,7 +49,8 @@ law that was not found (a step of the damping, a drift) are the tool's errors.
 """
 
 COLUMNS = [
-    "| record | left out | residual (before, after) | over noise | open | remainder | known |",
+    "| record | left out | residual (before, after) | over noise | open | remainder"
+    " | known, and what was found of it |",
     "|---|---|---|---|---|---|---|",
 ]
 
@@ -71,9 +58,9 @@ COLUMNS = [
 def section(results: Path, names: list[str], images: Path) -> list[str]:
     """The section's lines; figures are copied to the documentation's images."""
     lines = [*HEAD.splitlines(), "", *COLUMNS]
-    lines += table(results, names, "diagnosis")
+    lines += table(results, names, "diagnosis", KNOWN)
     lines += ["", *VISCOUS_HEAD.splitlines(), "", *COLUMNS]
-    lines += [*table(results, list(VISCOUS), "viscous"), ""]
+    lines += [*table(results, list(VISCOUS), "viscous", KNOWN_VISCOUS), ""]
     for name, figure, words in SHOWN:
         drawn = results / name / f"diagnosis/{figure}.svg"
         if drawn.is_file():
@@ -83,10 +70,14 @@ def section(results: Path, names: list[str], images: Path) -> list[str]:
     return lines
 
 
-def table(results: Path, names: list[str], folder: str) -> list[str]:
+def table(
+    results: Path, names: list[str], folder: str, known: Mapping[str, tuple[Known, ...]]
+) -> list[str]:
     """A row for each recording that has been diagnosed."""
     found = [(name, results / name / folder / "diagnosis.json") for name in names]
-    return [row(name, read_json(path)) for name, path in found if path.is_file()]
+    return [
+        row(name, read_json(path), known.get(name, ())) for name, path in found if path.is_file()
+    ]
 
 
 def diagnose_viscous(root: Path, results: Path) -> None:
@@ -107,14 +98,15 @@ def diagnose_viscous(root: Path, results: Path) -> None:
             )  # fmt: skip
 
 
-def row(name: str, content: Mapping[str, Any]) -> str:
+def row(name: str, content: Mapping[str, Any], items: tuple[Known, ...]) -> str:
     """One line of the table."""
-    known = KNOWN.get(name, "")
     if content["verdict"] == "not-analysable":
+        known = "; ".join(item.words for item in items)
         return f"| {name} | not analysable: {content['reason']} ||||| {known} |"
     unit = content["baseline"]["parameters"]["amplitude"]["unit"]
     before, after = (content[key]["residual_rms_rad"] for key in ("baseline", "improved"))
     found = "; ".join(effect(each) for each in content["effects"]) or "nothing"
+    known = cell(items, content)
     sizes = f"{compact(before, unit)}, {compact(after, unit)}"
     left = content["unexplained"] | (content["remainder"] or {})
     p_value = left["p_value"]
@@ -151,7 +143,7 @@ def main() -> None:
     import sys
 
     for path in sorted(Path(sys.argv[1]).glob("*/diagnosis.json")):
-        print(row(path.parent.name, read_json(path)))
+        print(row(path.parent.name, read_json(path), KNOWN.get(path.parent.name, ())))
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
+from pendpipe.effects.tones import PlaneCoupling
 
 _MOST: Final = 0.9
 """Part of what an effect explains that its interval holds."""
@@ -45,7 +46,11 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     if tone is not None:
         lines, harmonics = (tone,), ()
     found = Location(time, amplitude, phase, lines, harmonics)
-    return replace(found, summary=_summary(found, data, sampled.amplitude))
+    summary = _summary(found, data, sampled.amplitude)
+    beat = beat_of(after, effect)
+    if beat is not None:
+        summary += f", beating with the motion every {beat:.3g} s"
+    return replace(found, summary=summary)
 
 
 def _along(before: Fit, after: Fit) -> FloatArray:
@@ -126,6 +131,25 @@ def tone_of(fit: Fit, effect: Effect) -> float | None:
     """The frequency of a tone, Hz."""
     interval = _interval_of(fit, effect, "Hz") if effect.spectral else None
     return None if interval is None else 0.5 * (interval[0] + interval[1])
+
+
+def beat_of(fit: Fit, effect: Effect) -> float | None:
+    """The period in s of a tone's beats with the motion; None where it is no neighbour.
+
+    A tone of frequency f beats |f - f_0| times a second with a motion of frequency f_0; farther
+    off than half of f_0 the eye sees no beat.
+    """
+    phase, time = fit.at.sampled.phase, fit.at.sampled.time_s
+    own = float(phase[-1] - phase[0]) / float(time[-1] - time[0]) / (2.0 * math.pi)
+    tone = tone_of(fit, effect)
+    if tone is not None:
+        off = abs(tone - own)
+    elif isinstance(effect, PlaneCoupling):
+        detuning = _interval_of(fit, effect, "Hz")
+        off = 0.0 if detuning is None else 0.5 * abs(detuning[0] + detuning[1])
+    else:
+        return None
+    return 1.0 / off if 0.0 < off < 0.5 * own else None
 
 
 def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | None:

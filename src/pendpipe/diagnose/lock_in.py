@@ -13,6 +13,9 @@ from pendpipe.dynamics.sampling import Sampled
 
 _FEWEST: Final = 5
 """Readings in a cycle that three numbers are fitted to."""
+_NEIGHBOURS: Final = 9
+"""Cycles over which the usual number of readings is taken: an encoder that writes its counts
+writes fewer, the smaller the swing."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,7 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
         return sums.astype(np.float64)
 
     size = total(columns[0])
-    usual = float(np.median(size[size > 0.0])) if size.any() else 0.0
-    good = size >= max(float(_FEWEST), part * usual)
+    good = size >= np.maximum(float(_FEWEST), part * _usual(size))
     normal = np.array([[total(one * other) for one in columns] for other in columns])[..., good]
     right = np.array([total(one * readings) for one in columns])[..., good]
     solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
@@ -79,3 +81,14 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
         np.flatnonzero(good) + first, size[good], solved[:, 1], solved[:, 2], normal[1, 1],
         total(sampled.phase)[good] / size[good],
     )  # fmt: skip
+
+
+def _usual(size: FloatArray) -> FloatArray:
+    """The median over each cycle and its neighbours, those left out that have no readings."""
+    seen = np.flatnonzero(size > 0.0)
+    width = min(_NEIGHBOURS, len(seen))
+    if not width:
+        return np.zeros(len(size))
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(size[seen], width), axis=1)
+    middle = seen[width // 2 : width // 2 + len(medians)]
+    return np.asarray(np.interp(np.arange(len(size)), middle, medians))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pendpipe.diagnose.held_out import HeldOut
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.remainder import Remainder
+from pendpipe.diagnose.small_swings import SmallSwings
 from pendpipe.estimate import Estimate
 
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
@@ -113,6 +114,8 @@ class Diagnosis:
         What is left at the end.
     remainder
         The same taken apart: its size over the noise, and where it lies.
+    small_swings
+        How the frequency differs from the named model's at the smallest amplitudes, if it does.
     statement
         One paragraph.
     """
@@ -131,6 +134,7 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
     remainder: Remainder | None = None
+    small_swings: SmallSwings | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
@@ -155,6 +159,7 @@ class Diagnosis:
                 "p_value": self.unexplained_p_value,
             },
             "remainder": None if self.remainder is None else self.remainder.as_json(),
+            "small_amplitudes": None if self.small_swings is None else self.small_swings.as_json(),
             "statement": self.statement,
             "figures": list(self.figures),
             "warnings": list(self.warnings),

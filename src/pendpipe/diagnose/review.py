@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.distributions import chi2_beyond
+from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import tone_of
 from pendpipe.diagnose.naming import refit_leads
@@ -20,11 +21,14 @@ from pendpipe.diagnose.state import State, Step, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.curve import Curve
 
 _MOST: Final = 0.75
 """Part of the misfit that a name must explain where the model leaves more than noise."""
 _OFF: Final = 0.1
 """Of the motion's frequency: how far from a harmonic a line must be."""
+_AS_WELL: Final = 0.99
+"""Part of the largest gain from which a curve describes a record as well."""
 _DESCRIBES: Final = 0.5
 """Part of the excess that a curve must take away to be drawn on top of names."""
 
@@ -150,7 +154,7 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
     )  # fmt: skip
     if not rivals:
         return False
-    best = max(rivals, key=lambda rival: rival.gain)
+    best = _of_the_motion(rivals)
     excess = remainder_of(state.fit, state.data, state.noise).excess
     if best.gain < (_DESCRIBES * excess if state.steps else 0.0):
         return False
@@ -158,3 +162,15 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
     state.steps.append(Step((best, *others), p_value, state.fit))
     state.settle(best.fit)
     return True
+
+
+def _of_the_motion(rivals: list[Rival]) -> Rival:
+    """The curve of the largest gain; before one in time, one of the motion that does as well.
+
+    A curve in time follows whatever happens once; where a law of the angle or the amplitude,
+    that must repeat itself each cycle, leaves as little, it is the law that is drawn.
+    """
+    largest = max(rival.gain for rival in rivals)
+    near = [rival for rival in rivals if rival.gain > _AS_WELL * largest]
+    return min(near, key=lambda rival: (isinstance(rival.lead.effect, Curve)
+                                        and rival.lead.effect.in_time, -rival.gain))  # fmt: skip

@@ -20,6 +20,7 @@ from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Diagnosis, Judged, Named
 from pendpipe.diagnose.search import Search, search
+from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import parameters_of
 from pendpipe.diagnose.weighing import effect_named, fault_named
@@ -113,15 +114,18 @@ def diagnose_decay(
     if named:
         progress("predicting held-out blocks")
     held = _held_out(found, beginning) if named else None
+    swings = _small_swings(found)
     diagnosis = Diagnosis(
         baseline, before, after, rms,
         "missing-physics" if named else "consistent", found.p_value, named, held,
         after.residual_rms_rad, found.unexplained,
         statement(
             baseline, before, after, named, held, rms, found.unexplained, level,
-            unit=found.data.unit, remainder=found.remainder, notes=stamps,
+            unit=found.data.unit, remainder=found.remainder, swings=swings,
+            notes=stamps,
         ),
-        warnings=notes, remainder=found.remainder, provenance=dict(provenance or {}),
+        warnings=notes, remainder=found.remainder, small_swings=swings,
+        provenance=dict(provenance or {}),
     )  # fmt: skip
     return Outcome(diagnosis, found, beginning)
 
@@ -133,6 +137,14 @@ def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:
     faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.
     return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))
+
+
+def _small_swings(found: Search) -> SmallSwings | None:
+    """What the names leave open there; a curve that is drawn over it would hide it."""
+    if not found.named.remainder.systematic:
+        return None
+    swings = small_swings(found.named.fit, found.data, found.noise)
+    return swings if swings is not None and swings.sure else None
 
 
 def _judged(fit: Fit, found: Search) -> Judged:

@@ -8,6 +8,7 @@ from typing import Final
 from pendpipe.diagnose.held_out import HeldOut
 from pendpipe.diagnose.remainder import Remainder
 from pendpipe.diagnose.result import Judged, Named
+from pendpipe.diagnose.small_swings import SmallSwings
 from pendpipe.estimate import Estimate
 
 _SURE: Final = 0.5
@@ -20,7 +21,8 @@ _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 def statement(
     baseline: str, before: Judged, after: Judged, effects: Sequence[Named],
     held: HeldOut | None, noise_rms: float, unexplained: float, level: float, *,
-    unit: str = "rad", remainder: Remainder | None = None, notes: Sequence[str] = (),
+    unit: str = "rad", remainder: Remainder | None = None,
+    swings: SmallSwings | None = None, notes: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """Say where it differs, what was left out, how much better the fit is, what is open."""
     model = _NAMES.get(baseline, baseline)
@@ -41,7 +43,10 @@ def statement(
     moved = _moved(before.parameters, after.parameters)
     if moved:
         said.append(f"The omission had falsified {moved}.")
-    return " ".join([*said, _open(unexplained, level, remainder), *stamps])
+    said.append(_open(unexplained, level, remainder))
+    if swings is not None:
+        said.append(swings.said(unit))
+    return " ".join([*said, *stamps])
 
 
 def _improvement(

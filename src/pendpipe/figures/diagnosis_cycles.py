@@ -103,8 +103,11 @@ def _amplitude_axis(axes: Axes, x: FloatArray, unit: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set_xscale("log")
-    wide = float(np.max(x)) > 100.0 * float(np.min(x))
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if wide else (1.0, 2.0, 5.0)))
+    decades = math.log10(float(np.max(x)) / float(np.min(x)))
+    between = (1.0, 3.0) if decades > 2.0 else (1.0, 2.0, 5.0)
+    axes.xaxis.set_major_locator(
+        LogLocator(subs=between if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0))
+    )
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.tick_params(which="minor", length=0)

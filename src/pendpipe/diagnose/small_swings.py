@@ -1,0 +1,77 @@
+"""How a model's frequency differs from the readings' at the smallest amplitudes.
+
+Contacts that stick, and a bearing's elastic deflection, show there alone, in a few cycles that
+weigh little in a sum of squares. So these are looked at by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.cycles import between, cycles, span_ends
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.refine import Fit
+
+_FEWEST: Final = 8
+"""Spans of cycles, from which the scatter of the others is known."""
+_SURE: Final = 5.0
+"""Standard deviations, the scatter of all other spans being one of them."""
+
+
+@dataclass(frozen=True)
+class SmallSwings:
+    """Frequency of the readings over the model's, less 1, in the last span of cycles.
+
+    Parameters
+    ----------
+    amplitude
+        In the middle of that span, rad (or m).
+    excess, excess_sd
+        (f - f_model)/f_model, and its error: that of reading, and the scatter of the others.
+    """
+
+    amplitude: float
+    excess: float
+    excess_sd: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is more than the scatter."""
+        return abs(self.excess) > _SURE * self.excess_sd
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its part of ``diagnosis.json``."""
+        return {
+            "amplitude_rad": self.amplitude, "frequency_excess": self.excess,
+            "frequency_excess_sd": self.excess_sd,
+        }  # fmt: skip
+
+    def said(self, unit: str) -> str:
+        """Return it as a sentence."""
+        way, torque = ("above", "stiffer") if self.excess > 0.0 else ("below", "softer")
+        return (
+            f"At the smallest amplitudes ({self.amplitude:.3g} {unit}) the frequency is"
+            f" {100.0 * abs(self.excess):.2g} +- {100.0 * self.excess_sd:.1g} % {way} the"
+            f" model's: the restoring torque is {torque} there."
+        )
+
+
+def small_swings(fit: Fit, data: Data, noise: Noise) -> SmallSwings | None:
+    """Compare the last span of cycles with a model; None where there are too few to judge."""
+    measured = cycles(data.values, data.weight, fit.at, noise.white_rms)
+    if len(measured.time_s) < _FEWEST:
+        return None
+    ends = span_ends(measured)
+    if len(ends) <= _FEWEST:
+        return None
+    own = cycles(fit.at.reading, data.weight, fit.at, 0.0).at(measured.time_s)
+    one, other = between(measured, ends), between(own, ends)
+    off: FloatArray = one.frequency_hz / other.frequency_hz - 1.0
+    scatter = float(np.sqrt(np.mean(off[:-1] ** 2)))
+    sd = float(np.hypot(one.frequency_sd_hz[-1] / other.frequency_hz[-1], scatter))
+    return SmallSwings(float(one.amplitude[-1]), float(off[-1]), sd)
