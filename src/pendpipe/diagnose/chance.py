@@ -12,7 +12,9 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.scores import Bank, local_p_values
 from pendpipe.diagnose.spectrum import ToneScans
 
-_DRAWS: Final = 256
+DRAWS: Final = 256
+FEW_DRAWS: Final = 64
+"""They tell the number of trials to a fifth: enough where chance is plainly enough."""
 _AT_ONCE: Final = 32
 """Draws that are worked on together: few enough to stay in the processor's cache."""
 _TAIL: Final = 0.4
@@ -55,13 +57,16 @@ class Chance:
         Trials of the whole catalogue.
     own
         Trials of each effect by itself, by identifier.
+    draws
+        From how many these were counted.
     """
 
     everywhere: Trials
     own: dict[str, Trials]
+    draws: int = DRAWS
 
 
-def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = _DRAWS) -> Chance:
+def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = DRAWS) -> Chance:
     """Draw white residuals, project them as the fit does, and see what the scans make of them.
 
     The tail of the smallest p-value is extrapolated with a slowly growing number of trials,
@@ -71,25 +76,28 @@ def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = _DR
     rows = bank.rows()
     # All shapes of one effect have the same degrees of freedom.
     freedom = {name: bank.freedom[indices[:1]] for name, indices in rows.items()}
-    found: dict[str, list[FloatArray]] = {name: [] for name in rows}
-    smallest: list[FloatArray] = []
+    largest: dict[str, list[FloatArray]] = {name: [] for name in rows}
+    loudest: list[FloatArray] = []
     for _ in range(math.ceil(draws / _AT_ONCE)):
         white = generator.standard_normal((_AT_ONCE, len(bank.basis))).T
         white -= bank.basis @ (bank.basis.T @ white)
-        least = np.ones(_AT_ONCE)
         scores = bank.scores(white) if rows else np.zeros((0, _AT_ONCE))
         for name, indices in rows.items():
-            local = local_p_values(scores[indices].max(axis=0)[None], freedom[name])[0]
-            least = np.minimum(least, local)
-            found[name].append(local)
+            largest[name].append(scores[indices].max(axis=0))
+        tone = np.zeros(_AT_ONCE)
         for scores in tones.scores(white) if tones else []:
-            least = np.minimum(least, np.exp(-0.5 * scores.max(axis=0)))
-        smallest.append(least)
-    own = {
-        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(np.concatenate(parts), _GROWTH)
-        for name, parts in found.items()
+            tone = np.maximum(tone, scores.max(axis=0))
+        loudest.append(tone)
+    found = {
+        name: local_p_values(np.concatenate(parts)[None], freedom[name])[0]
+        for name, parts in largest.items()
     }
-    return Chance(_trials(np.concatenate(smallest), _GROWTH), own)
+    own = {
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local, _GROWTH)
+        for name, local in found.items()
+    }
+    smallest = np.min([np.exp(-0.5 * np.concatenate(loudest)), *found.values()], axis=0)
+    return Chance(_trials(smallest, _GROWTH), own, draws)
 
 
 def _trials(smallest: FloatArray, growth: float) -> Trials:

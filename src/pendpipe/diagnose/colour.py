@@ -18,7 +18,7 @@ _WORTH: Final = (2.5, 12.0)
 """Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
 is missed accuses drifts and slow tones of the noise; a needless one costs little."""
 _STEEPEST: Final = 1.6
-_SETTLED: Final = 1e-4
+_SETTLED: Final = 1e-2
 """Of -2 ln L: a step that promises less is the last."""
 _OUTLIER: Final = 12.0
 """Power over the spectrum beyond which a cosine holds no noise but a line."""

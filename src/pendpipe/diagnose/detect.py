@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.chance import Chance, Trials, draw_chance
+from pendpipe.diagnose.chance import DRAWS, FEW_DRAWS, Chance, Trials, draw_chance
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
@@ -23,6 +23,8 @@ from pendpipe.effects.tones import plane_band_hz
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""
 
+_PLAINLY: Final = 0.2
+"""Global p-value from which no more draws are made: far above any level that is asked for."""
 _TURNS: Final = 3.0
 """Cycles in the record that make a tone; what is slower is a drift."""
 _ABOVE: Final = 1.3
@@ -113,14 +115,18 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     """
     bank = scanner.bank
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    chance = draw_chance(bank, scanner.tones, seed) if known is None else known.chance
-    leads = _bank_leads(bank, residual, chance.own)
     smallest = 1.0
+    scores = bank.scores(residual)
     if bank.candidates:
-        smallest = float(local_p_values(bank.scores(residual), bank.freedom).min())
+        smallest = float(local_p_values(scores, bank.freedom).min())
     tones = scanner.tones.scores(residual)
-    for scores in tones:
-        smallest = min(smallest, math.exp(-0.5 * float(scores.max())))
+    for scan in tones:
+        smallest = min(smallest, math.exp(-0.5 * float(scan.max())))
+    few = None if known is None else known.chance
+    chance = few or draw_chance(bank, scanner.tones, seed, FEW_DRAWS)
+    if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _PLAINLY:
+        chance = draw_chance(bank, scanner.tones, seed)
+    leads = _bank_leads(bank, scores, chance.own)
     leads += _tone_leads(scanner, tones)
     leads.sort(key=lambda lead: (lead.p_value, -lead.score))
     return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
@@ -130,13 +136,10 @@ def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
     """Score effects that were not scanned, on what a fit leaves."""
     bank = build_bank(fit, noise, effects)
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    return _bank_leads(bank, residual, {})
+    return _bank_leads(bank, bank.scores(residual), {}) if bank.candidates else []
 
 
-def _bank_leads(bank: Bank, residual: FloatArray, own: dict[str, Trials]) -> list[Lead]:
-    if not bank.candidates:
-        return []
-    scores = bank.scores(residual)
+def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[Lead]:
     leads = []
     for name, rows in bank.rows().items():
         index = rows[int(np.argmax(scores[rows]))]

@@ -71,7 +71,7 @@ class Fit:
         part = self.jacobian[:, self.free]
         scale = np.linalg.norm(part, axis=0)
         scale[scale == 0.0] = 1.0
-        inverse = np.linalg.pinv(part / scale, rcond=1e-12)
+        inverse = np.linalg.pinv(np.linalg.qr(part / scale, mode="r"), rcond=1e-12)
         matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
         return self.spread**2 * matrix
 

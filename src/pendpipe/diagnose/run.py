@@ -110,7 +110,8 @@ def diagnose_decay(
     notes = (*points.notes, *stamps)
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
-    after = _judged(found.improved, found)
+    same = found.improved.value is found.baseline.value and found.improved.spread == 1.0
+    after = before if same else _judged(found.improved, found)
     if named:
         progress("predicting held-out blocks")
     held = _held_out(found, beginning) if named else None

@@ -10,18 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.distributions import chi2_beyond
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
 from pendpipe.effects import Effect
 from pendpipe.effects.curve import Curve
+from pendpipe.effects.effect import Span
 from pendpipe.effects.responses import responses
 
 _SEEN = 1e-4
@@ -100,8 +101,9 @@ def tangent_basis(fit: Fit) -> FloatArray:
     part = fit.jacobian[:, [index for index in fit.free if index not in known]]
     scale = np.linalg.norm(part, axis=0)
     scale[scale == 0.0] = 1.0
-    left, sizes, _ = np.linalg.svd(part / scale, full_matrices=False)
-    return np.asarray(left[:, sizes > 1e-9 * sizes[0]])
+    left, small = np.linalg.qr(part / scale)
+    mixing, sizes, _ = np.linalg.svd(small)
+    return np.asarray(left @ mixing[:, sizes > 1e-9 * sizes[0]])
 
 
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
@@ -110,17 +112,24 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     A few shapes at a time, and kept in single precision: the whole in double precision would
     be a hundred megabytes for a long record, and memory is what this costs.
     """
-    kept = _Kept(tangent_basis(fit), [], [], [])
-    for effect in effects:
+    shapes = [_shapes(effect, fit.at.span) for effect in effects]
+    most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
+    kept = _Kept(tangent_basis(fit), most)
+    for effect, rows in zip(effects, shapes, strict=True):
         if isinstance(effect, FreedParameter):
-            kept.add(effect, [()], fit.jacobian[:, [effect.index]].T)
+            kept.add(effect, rows, fit.jacobian[:, [effect.index]].T)
             continue
-        shapes = [tuple(float(number) for number in row) for row in effect.shapes(fit.at.span)]
         some = max(_AT_ONCE // effect.sizes, 1)
-        for first in range(0, len(shapes), some):
-            part = shapes[first : first + some]
+        for first in range(0, len(rows), some):
+            part = rows[first : first + some]
             kept.add(effect, part, _whitened(fit, noise, effect, part))
     return kept.bank()
+
+
+def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
+    if isinstance(effect, FreedParameter):
+        return [()]
+    return [tuple(float(number) for number in row) for row in effect.shapes(span)]
 
 
 def _whitened(
@@ -131,51 +140,83 @@ def _whitened(
     changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
     raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
     raw /= small
-    raw[~np.all(np.isfinite(raw), axis=1)] = 0.0
+    raw[~np.isfinite(raw.sum(axis=1))] = 0.0
     rows = np.zeros((len(raw), len(fit.jacobian)))
     rows[:, :-1] = noise.whiten(raw.T).T
     return rows
 
 
-class _Kept(NamedTuple):
+class _Kept:
     """Unit columns that can be told from the model's own, as they are found."""
 
-    basis: FloatArray
-    rows: list[NDArray[np.float32]]
-    candidates: list[Candidate]
-    lengths: list[float]
+    def __init__(self, basis: FloatArray, most: int) -> None:
+        self.basis = basis
+        self._single = basis.astype(np.float32)
+        self._rows = np.empty((most, len(basis)), dtype=np.float32)
+        self._filled = 0
+        self._candidates: list[Candidate] = []
+        self._lengths: list[float] = []
 
     def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
         """Project off the model's tangent space, and keep what is left at unit length."""
-        before = np.linalg.norm(columns, axis=1)
+        if isinstance(effect, Curve):
+            self._add_curve(effect, shapes[0], columns)
+            return
+        before = np.sqrt(np.einsum("kn,kn->k", columns, columns))
+        before[before == 0.0] = np.inf
+        unit = (columns / before[:, None]).astype(np.float32)
+        length = self._project(unit)
+        # What single precision has left of the basis is small beside what is left at all.
+        self._project(unit)
+        width = len(columns) // len(shapes)
+        seen = (length > _SEEN).reshape(-1, width).all(axis=1)
+        for second in range(1, width):
+            for first in range(second):
+                seen &= _orthogonal(unit[first::width], unit[second::width])
+        for index in np.flatnonzero(seen).tolist():
+            own = slice(index * width, (index + 1) * width)
+            size = float(length[own][0] * before[own][0])
+            self._keep(effect, shapes[index], unit[own], size)
+
+    def _project(self, unit: NDArray[np.float32]) -> FloatArray:
+        """Take the basis off in place, at unit length again; return what length was left."""
+        unit -= (unit @ self._single) @ self._single.T
+        left = np.sqrt(np.einsum("kn,kn->k", unit, unit))
+        unit /= np.where(left > 0.0, left, 1.0)[:, None]
+        return left.astype(np.float64)
+
+    def _add_curve(self, curve: Curve, shape: tuple[float, ...], columns: FloatArray) -> None:
         left = columns - (columns @ self.basis) @ self.basis.T
         left -= (left @ self.basis) @ self.basis.T
-        width = len(columns) // len(shapes)
-        for index, shape in enumerate(shapes):
-            own = slice(index * width, (index + 1) * width)
-            self._add_one(effect, shape, left[own], before[own])
+        curve, part = _visible(curve, left)
+        if len(part):
+            unit = np.linalg.qr(part.T)[0].T
+            self._keep(curve, shape, unit, float(np.linalg.norm(part[0])))
 
-    def _add_one(
-        self, effect: Effect, shape: tuple[float, ...], part: FloatArray, before: FloatArray
+    def _keep(
+        self, effect: Effect, shape: tuple[float, ...], unit: NDArray[Any], length: float
     ) -> None:
-        if isinstance(effect, Curve):
-            effect, part = _visible(effect, part)
-            before = np.zeros(len(part))
-        length = np.linalg.norm(part, axis=1)
-        if not len(part) or not np.all(length > np.maximum(_SEEN * before, 1e-300)):
-            return
-        unit = np.linalg.qr(part.T)[0].T if len(part) > 1 else part / length[:, None]
-        first = sum(self.candidates[-1][2:]) if self.candidates else 0
-        self.rows.append(unit.astype(np.float32))
-        self.candidates.append(Candidate(effect, shape, first, len(unit)))
-        self.lengths.append(float(length[0]))
+        first, last = self._filled, self._filled + len(unit)
+        self._rows[first:last] = unit
+        self._filled = last
+        self._candidates.append(Candidate(effect, shape, first, len(unit)))
+        self._lengths.append(length)
 
     def bank(self) -> Bank:
         """Everything that was kept."""
-        rows = self.rows or [np.zeros((0, len(self.basis)), dtype=np.float32)]
-        return Bank(
-            self.basis, np.concatenate(rows).T, tuple(self.candidates), np.array(self.lengths)
-        )
+        columns = self._rows[: self._filled].T
+        return Bank(self.basis, columns, tuple(self._candidates), np.array(self._lengths))
+
+
+def _orthogonal(first: NDArray[np.float32], second: NDArray[np.float32]) -> BoolArray:
+    """Take unit rows off others in place; return where something is left."""
+    apart = np.ones(len(first), dtype=bool)
+    for _ in range(2):
+        second -= np.einsum("kn,kn->k", first, second)[:, None] * first
+        left = np.sqrt(np.einsum("kn,kn->k", second, second))
+        apart &= left > _SEEN
+        second /= np.where(left > 0.0, left, 1.0)[:, None]
+    return apart
 
 
 def _sizes(
@@ -189,7 +230,7 @@ def _sizes(
 
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     """Keep the mixtures of a curve's hats that would stand out if they were of reasonable size."""
-    mixtures, lengths, _ = np.linalg.svd(part, full_matrices=False)
+    mixtures, lengths, _ = np.linalg.svd(np.linalg.qr(part.T, mode="r").T)
     mixing = mixtures[:, lengths > _STANDS_OUT]
     return curve.reduced(mixing), mixing.T @ part
 

@@ -215,6 +215,8 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were mended."""
+    if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
+        return state.fit
     model = state.fit.model.bare()
     starts = [state.bare, beginning.value]
     for share in _LESS_FRICTION:

@@ -14,9 +14,13 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OFFSET, OMEGA, A, B, C
+from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
+from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Model
 from pendpipe.estimate import Estimate
 
+_CYCLES: Final = 4.0
+_FEWEST: Final = 16
 _STEP: Final = 1e-3
 """Of a standard deviation, for derivatives of what is derived from the values."""
 
@@ -28,13 +32,14 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     that at the first reading.
     """
     covariance = fit.covariance()
-    numbers = _numbers(fit, fit.value)
+    numbers = _numbers(fit.model, fit.at)
+    early = _early(fit)
     jacobian = np.zeros((2, len(fit.value)))
     for index in fit.free:
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))
         if sd == 0.0 or index in (A, B, C, OFFSET):
             continue
-        jacobian[:, index] = _slope(fit, index, _STEP * sd / fit.spread, numbers)
+        jacobian[:, index] = _slope(fit, early, index, _STEP * sd / fit.spread)
     spread = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
     intervals = _intervals(fit)
     dress = units(unit)
@@ -51,28 +56,33 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     return {name: found[name] for name in PARAMETERS}
 
 
-def _numbers(fit: Fit, value: FloatArray) -> FloatArray:
+def _early(fit: Fit) -> Model:
+    """The model of the first few cycles' readings, which is all that derivatives ask for."""
+    time = fit.model.time_s
+    last = max(time[0], float(fit.value[TIME])) + _CYCLES * fit.at.span.period_s
+    return fit.model.at_times(time[: max(int(np.searchsorted(time, last)), _FEWEST)])
+
+
+def _numbers(model: Model, at: Evaluated) -> FloatArray:
     """Amplitude of the first turning point in the readings, and phase of the first reading."""
-    if np.array_equal(value, fit.value):
-        motion, sampled = fit.at.tangent.motion, fit.at.sampled
-    else:
-        at = fit.model.evaluate(value)
-        motion, sampled = at.tangent.motion, at.sampled
-    first = int(np.searchsorted(motion.time_s[:, 0], fit.model.time_s[0] - 1e-9))
+    motion, sampled = at.tangent.motion, at.sampled
+    first = int(np.searchsorted(motion.time_s[:, 0], model.time_s[0] - 1e-9))
     first = min(first, len(motion.time_s) - 1)
     turned = math.pi if motion.upwards < 0.0 else 0.0
     return np.array([motion.amplitude[first, 0], sampled.phase[0] + turned])
 
 
-def _slope(fit: Fit, index: int, step: float, numbers: FloatArray) -> FloatArray:
+def _slope(fit: Fit, early: Model, index: int, step: float) -> FloatArray:
     """Derivatives by one value; backwards where more of it stops the pendulum too early."""
+    numbers = _numbers(early, early.evaluate(fit.value))
     for signed in (step, -step):
         moved = fit.value.copy()
         moved[index] += signed
         try:
-            return np.asarray((_numbers(fit, moved) - numbers) / signed)
+            there = _numbers(early, early.evaluate(moved))
         except NoMotionError:
             continue
+        return np.asarray((there - numbers) / signed)
     return np.zeros(2)
 
 
