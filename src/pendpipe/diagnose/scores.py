@@ -183,7 +183,7 @@ class _Kept:
         unit -= (unit @ self._single) @ self._single.T
         left = np.sqrt(np.einsum("kn,kn->k", unit, unit))
         unit /= np.where(left > 0.0, left, 1.0)[:, None]
-        return left.astype(np.float64)
+        return np.asarray(left, dtype=np.float64)
 
     def _add_curve(self, curve: Curve, shape: tuple[float, ...], columns: FloatArray) -> None:
         left = columns - (columns @ self.basis) @ self.basis.T
@@ -230,7 +230,7 @@ def _sizes(
 
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     """Keep the mixtures of a curve's hats that would stand out if they were of reasonable size."""
-    mixtures, lengths, _ = np.linalg.svd(np.linalg.qr(part.T, mode="r").T)
+    mixtures, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
     mixing = mixtures[:, lengths > _STANDS_OUT]
     return curve.reduced(mixing), mixing.T @ part
 
