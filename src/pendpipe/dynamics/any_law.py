@@ -80,7 +80,7 @@ class Clock:
 @lru_cache(maxsize=8)
 def _phases(count: int, order: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Phase, cosine and sine of each node, and the sign of each half cycle; not to be written."""
-    sign: FloatArray = 1.0 - 2.0 * (np.arange(count) % 2)[:, None]
+    sign = np.asarray(1.0 - 2.0 * (np.arange(count) % 2)[:, None], dtype=np.float64)
     psi: FloatArray = math.pi * (np.arange(count)[:, None] + _nodes(order))
     cosine: FloatArray = sign * np.cos(math.pi * _nodes(order))
     sine = np.sin(math.pi * _nodes(order))
