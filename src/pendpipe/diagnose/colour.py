@@ -20,6 +20,8 @@ is missed accuses drifts and slow tones of the noise; a needless one costs littl
 _STEEPEST: Final = 1.6
 _SETTLED: Final = 1e-2
 """Of -2 ln L: a step that promises less is the last."""
+_MOST: Final = 25
+"""Looks at the likelihood from one start."""
 _OUTLIER: Final = 12.0
 """Power over the spectrum beyond which a cosine holds no noise but a line."""
 
@@ -108,6 +110,17 @@ def _whittle(power: FloatArray, spectrum: FloatArray, slopes: FloatArray) -> Qua
     return Quadratic(total, 0.5 * slopes @ pull, 0.5 * slopes @ slopes.T)
 
 
+def _with_white(found: Quadratic, power: FloatArray, white: float) -> Quadratic:
+    """Add cosines of white noise alone, whose variance is the first value's exponential."""
+    ratio = power / white
+    inside = ratio < _OUTLIER
+    total = len(power) * math.log(white) + float(np.sum(np.minimum(ratio, _OUTLIER)))
+    gradient, normal = found.gradient.copy(), found.normal.copy()
+    gradient[0] += 0.5 * (float(np.sum(ratio[inside])) - len(power))
+    normal[0, 0] += 0.5 * len(power)
+    return Quadratic(found.chi2 + total, gradient, normal)
+
+
 def _red(
     power: FloatArray, frequency: FloatArray, level: float, ends: float
 ) -> tuple[Colour, float]:
@@ -115,14 +128,16 @@ def _red(
     inside = frequency <= ends
     if np.count_nonzero(inside) < 3:
         return Colour(level), math.inf
-    # Above its end there is white noise alone.
-    logs = np.where(inside, np.log(REFERENCE_HZ / np.maximum(frequency, 1e-12)), 0.0)
+    near, beyond = power[inside], power[~inside]
+    logs = np.log(REFERENCE_HZ / np.maximum(frequency[inside], 1e-12))
 
     def cost(values: FloatArray) -> Quadratic:
-        rise = np.exp(values[1] + values[2] * logs) * inside
+        white = math.exp(values[0])
+        rise = np.exp(values[1] + values[2] * logs)
         by_rise = rise / (1.0 + rise)
         slopes = np.stack([np.ones_like(rise), by_rise, by_rise * logs])
-        return _whittle(power, math.exp(values[0]) * (1.0 + rise), slopes)
+        found = _whittle(near, white * (1.0 + rise), slopes)
+        return _with_white(found, beyond, white) if len(beyond) else found
 
     # Far below the powers all of them are clipped, and the cost would fall without end.
     middle = math.log(level)
@@ -130,9 +145,13 @@ def _red(
     bounds = Bounds(
         np.array([middle - 8.0, -12.0, flattest]), np.array([middle + 4.0, 8.0, _STEEPEST])
     )
-    starts = [np.array([middle, 0.0, 1.0]), _red_throughout(power[inside], logs[inside], bounds)]
-    start = min(starts, key=lambda values: cost(values).chi2)
-    found = minimise(cost, start, bounds, tolerance=_SETTLED)
+    # What is clipped makes several minima.
+    starts = [
+        np.array([middle, 0.0, 1.0]), np.array([middle, 0.0, _STEEPEST]),
+        _red_throughout(near, logs, bounds),
+    ]  # fmt: skip
+    ends_at = [minimise(cost, start, bounds, tolerance=_SETTLED, most=_MOST) for start in starts]
+    found = min(ends_at, key=lambda minimum: minimum.quadratic.chi2)
     white, red, slope = found.value.tolist()
     return Colour(math.exp(white), math.exp(red), slope, 0.0, ends), found.quadratic.chi2
 

@@ -136,7 +136,7 @@ def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
     """Score effects that were not scanned, on what a fit leaves."""
     bank = build_bank(fit, noise, effects)
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    return _bank_leads(bank, bank.scores(residual), {})
+    return _bank_leads(bank, bank.scores(residual), {}) if bank.candidates else []
 
 
 def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[Lead]:

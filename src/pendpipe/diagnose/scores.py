@@ -173,6 +173,9 @@ class _Kept:
         for second in range(1, width):
             for first in range(second):
                 seen &= _orthogonal(unit[first::width], unit[second::width])
+        if width > 1:
+            # What two almost parallel rows differ by is small, and the basis in it not.
+            self._project(unit)
         for index in np.flatnonzero(seen).tolist():
             own = slice(index * width, (index + 1) * width)
             size = float(length[own][0] * before[own][0])

@@ -30,6 +30,10 @@ _NONE: Final = 4.0
 """Evidence (in chi^2) that it is none of the class's, where the model leaves nothing."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
+_FAR: Final = 100.0
+"""In chi^2: who is so far behind has no probability."""
+_PART: Final = 0.1
+"""Part of the gain that no fit which merely stopped early is behind."""
 _SAME: Final = 0.02
 """Part by which a gain may change in the end for its rivals not to be refitted."""
 
@@ -127,11 +131,22 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
+        if _far_behind(rival, step.winner):
+            # It stays as far behind.
+            more = gain - step.winner.gain
+            rivals.append(replace(rival, gain=rival.gain + more, evidence=rival.evidence + more))
+            continue
         fit = found.improved if own else _refitted(without, found, held, rival)
         if fit is not None:
-            gain = without.chi2 - fit.chi2
-            rivals.append(Rival(rival.lead, fit, gain, rival.evidence + gain - rival.gain))
+            reached = without.chi2 - fit.chi2
+            rivals.append(Rival(rival.lead, fit, reached, rival.evidence + reached - rival.gain))
     return without, rivals
+
+
+def _far_behind(rival: Rival, winner: Rival) -> bool:
+    """Whether no better fit could bring a rival near the winner."""
+    behind = winner.gain - rival.gain
+    return behind > _FAR and (rival.fit.converged or behind > _PART * winner.gain)
 
 
 def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArray) -> Fit | None:

@@ -54,29 +54,41 @@ class Clock:
     @property
     def psi(self) -> FloatArray:
         """Phase of each node, shape (count, order + 1)."""
-        return np.asarray(math.pi * (np.arange(self.count)[:, None] + _nodes(self.order)))
+        return _phases(self.count, self.order)[0]
 
     @property
     def cosine(self) -> FloatArray:
         """cos(psi), shape (count, order + 1)."""
-        return np.asarray(self._sign * np.cos(math.pi * _nodes(self.order)))
+        return _phases(self.count, self.order)[1]
 
     @property
     def sine(self) -> FloatArray:
         """sin(psi), shape (count, order + 1); exactly zero at the turning points."""
-        one = np.sin(math.pi * _nodes(self.order))
-        one[[0, -1]] = 0.0
-        return np.asarray(self._sign * one)
+        return _phases(self.count, self.order)[2]
 
     @property
     def _sign(self) -> FloatArray:
-        return np.asarray(1.0 - 2.0 * (np.arange(self.count) % 2))[:, None]
+        return _phases(self.count, self.order)[3]
 
     def integral(self, rate: FloatArray) -> FloatArray:
         """Integrate over the phase from psi = 0; shape (..., count, order + 1) as `rate`."""
         parts = rate @ _integration(self.order).T
         parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1], axis=-1)[..., None]
         return np.asarray(parts)
+
+
+@lru_cache(maxsize=8)
+def _phases(count: int, order: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Phase, cosine and sine of each node, and the sign of each half cycle; not to be written."""
+    sign = np.asarray(1.0 - 2.0 * (np.arange(count) % 2)[:, None], dtype=np.float64)
+    psi: FloatArray = math.pi * (np.arange(count)[:, None] + _nodes(order))
+    cosine: FloatArray = sign * np.cos(math.pi * _nodes(order))
+    sine = np.sin(math.pi * _nodes(order))
+    sine[[0, -1]] = 0.0
+    sine = np.asarray(sign * sine)
+    for each in (psi, cosine, sine, sign):
+        each.flags.writeable = False
+    return psi, cosine, sine, sign
 
 
 @lru_cache
@@ -267,27 +279,30 @@ class Tangent:
         other = rates(law, moved)
         self._steepness = (other.loss - self.rates.loss) / _STEP
         self._pace = (other.pace - self.rates.pace) / _STEP
-        self._growth = motion.clock.integral(self._steepness)
+        growth = motion.clock.integral(self._steepness)
+        self._grown, self._shrunk = np.exp(growth), np.exp(-growth)
 
     def of_start(self) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t by ln r at the start."""
-        by_log = np.exp(self._growth)
+        by_log = self._grown.copy()
         return by_log, self.motion.clock.integral(self._pace * by_log)
 
     def of_rates(self, loss: FloatArray, pace: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t at fixed phase by a change of the rates."""
         clock = self.motion.clock
-        by_log = np.exp(self._growth) * clock.integral(np.exp(-self._growth) * loss)
-        return by_log, clock.integral(self._pace * by_log + pace)
+        by_log = clock.integral(self._shrunk * loss)
+        by_log *= self._grown
+        by_time = self._pace * by_log
+        by_time += pace
+        return by_log, clock.integral(by_time)
 
     def of_force(self, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t at fixed phase by a small extra acceleration (rad/s^2)."""
         motion = self.motion
         omega = motion.angular_frequency
-        free = 1.0 / (omega * self.rates.pace)
-        g = motion.upwards * acceleration / (omega * omega * motion.amplitude)
-        scaled = g / (free * free)
-        return self.of_rates(-motion.clock.sine * scaled, motion.clock.cosine * scaled / omega)
+        # g/(1 - g0 cos psi)^2, by psi and by t; the pace is 1/(omega (1 - g0 cos psi)).
+        scaled = acceleration * (motion.upwards * self.rates.pace**2 / motion.amplitude)
+        return self.of_rates(-motion.clock.sine * scaled, (motion.clock.cosine / omega) * scaled)
 
     def of_reset(self, by_log: FloatArray, by_time: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t by sudden changes of them, given as what they add up to."""

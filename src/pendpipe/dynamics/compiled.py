@@ -10,8 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pendpipe.dynamics import machine_code
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -35,6 +33,8 @@ def file_name() -> str:
 
 def name_of(stem: str, paths: Iterable[Path]) -> str:
     """Return a name that changes with these sources and with the machine."""
+    from pendpipe.dynamics import machine_code
+
     text = b"".join(path.read_bytes() for path in paths)
     sources = hashlib.blake2b(text, digest_size=8).hexdigest()
     machine = hashlib.blake2b(machine_code.platform().encode(), digest_size=8).hexdigest()
@@ -65,6 +65,9 @@ def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int]
     compile_all
         Makes Numba's cfuncs, if the file is not there.
     """
+    # It brings llvmlite, which who calls nothing compiled can do without.
+    from pendpipe.dynamics import machine_code
+
     for folder in folders():
         loaded = machine_code.load(folder / name)
         if loaded is not None:

@@ -17,7 +17,13 @@ if TYPE_CHECKING:
 
 
 def _tone(values: FloatArray, phase: FloatArray) -> FloatArray:
-    return np.asarray(values[0] * np.cos(phase) + values[1] * np.sin(phase))
+    total = np.zeros_like(phase)
+    # A scan asks for one quadrature at a time.
+    if values[0] != 0.0:
+        total += values[0] * np.cos(phase)
+    if values[1] != 0.0:
+        total += values[1] * np.sin(phase)
+    return total
 
 
 def _frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
