@@ -116,7 +116,7 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     bank = scanner.bank
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
     smallest = 1.0
-    scores = bank.scores(residual)
+    scores = bank.scores(residual) if bank.candidates else np.zeros(0)
     if bank.candidates:
         smallest = float(local_p_values(scores, bank.freedom).min())
     tones = scanner.tones.scores(residual)
