@@ -10,9 +10,10 @@ import numpy as np
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.distributions import chi2_beyond
+from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import tone_of
-from pendpipe.diagnose.naming import Rival, refit_leads
+from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.remainder import Remainder, remainder_of
@@ -20,7 +21,7 @@ from pendpipe.diagnose.state import State, Step, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.curves import Curve
+from pendpipe.effects.curve import Curve
 
 _MOST: Final = 0.75
 """Part of the misfit that a name must explain where the model leaves more than noise."""
