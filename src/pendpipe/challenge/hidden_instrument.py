@@ -100,7 +100,7 @@ def gain_relaxing(r: Random, s: Scenario) -> Hidden:
     """With the amplifier's temperature."""
     tau = float(r.uniform(0.15, 0.5)) * s.span_s
     found = reading(s, "gain-drift", "relaxing", "gain_drift", either_sign(r) * 1e-2 / tau,
-                    own=False, gain_drift_s=tau)  # fmt: skip
+                    gain_drift_s=tau)  # fmt: skip
     return replace(found, largest=0.5 / tau)
 
 
@@ -234,7 +234,7 @@ def clock_relaxing(r: Random, s: Scenario) -> Hidden:
     """A crystal that warms up."""
     tau = float(r.uniform(0.15, 0.5)) * s.span_s
     return reading(s, "clock-drift", "relaxing", "clock_drift", either_sign(r) * 1e-4 / tau,
-                   own=False, clock_drift_s=tau)  # fmt: skip
+                   clock_drift_s=tau)  # fmt: skip
 
 
 @law("jitter")

@@ -122,7 +122,7 @@ def _drift_time(r: Random, s: Scenario, straight: bool) -> float:
 
 def _frequency_drift(r: Random, s: Scenario, straight: bool) -> Hidden:
     return torque(s, "frequency-drift", "straight" if straight else "relaxing", "omega_drift",
-                  either_sign(r) * 1e-4 / s.span_s, own=straight,
+                  either_sign(r) * 1e-4 / s.span_s,
                   omega_drift_time=_drift_time(r, s, straight))  # fmt: skip
 
 
@@ -141,7 +141,7 @@ def frequency_relaxing(r: Random, s: Scenario) -> Hidden:
 def _damping_drift(r: Random, s: Scenario, straight: bool) -> Hidden:
     loss = s.motion.value("gamma") + s.motion.value("hysteretic") + 1e-5 * s.omega
     return torque(s, "damping-drift", "straight" if straight else "relaxing", "gamma_drift",
-                  either_sign(r) * 0.05 * loss / s.span_s, own=straight,
+                  either_sign(r) * 0.05 * loss / s.span_s,
                   gamma_drift_time=_drift_time(r, s, straight))  # fmt: skip
 
 
