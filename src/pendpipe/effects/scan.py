@@ -57,8 +57,7 @@ def relaxed(time_s: FloatArray, tau: float) -> FloatArray:
 def relaxation_times(span: Span) -> list[tuple[float]]:
     """Return rows for a scan: straight, and over two fifths and a sixth of the record.
 
-    Between them no exponential is told from the next: 0.4 and 1/6 of the record, fitted with
-    what a baseline can do, overlap by more than 0.9.
+    The time that is fitted afterwards starts from the best of them.
     """
     return [(STRAIGHT_S,), (0.4 * span.duration_s,), (span.duration_s / 6.0,)]
 
