@@ -163,6 +163,16 @@ def test_the_scatter_of_the_last_half_cycles_is_no_drive() -> None:
         assert "driven: the amplitude is held up" not in reasons(found)
 
 
+@pytest.mark.parametrize("beats", [1.5, 3.2, 5.7])
+def test_a_swing_that_wavers_and_does_not_fall_is_no_decay(beats: float) -> None:
+    """A slow waver is higher in one third than in another, however still each half cycle is."""
+    time = np.arange(6000) / RATE
+    waver = 1.0 + 0.02 * np.cos(2.0 * np.pi * beats * time / time[-1] + 0.4)
+    angle = 0.1 * waver * np.cos(OMEGA * time)
+    with pytest.raises(NotAnalysableError, match="the amplitude does not fall"):
+        find_free_decay(Recording(time, angle, "angle_rad"))
+
+
 def test_a_beat_is_physics_and_stays() -> None:
     # Two modes that exchange energy: the amplitude is flat at first, and rises again.
     time = np.arange(int(80 * RATE)) / RATE

@@ -163,8 +163,10 @@ def _undriven(cycles: HalfCycles, run: Run) -> Run:
     expected = k * falls / ahead
     lost = smooth[0] - smooth[k]
     held = (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * cycles.step))
-    # Near the end a small scatter of few half cycles would stand for the loss of hundreds.
-    held &= falls > np.maximum(lost, 3.0 * cycles.step)
+    # Near the end a small scatter of few half cycles would stand for the loss of hundreds, and
+    # the last fall of an amplitude that wavers all along for the end of its drive.
+    waver = np.maximum.accumulate(np.maximum.accumulate(smooth) - smooth)[k]
+    held &= falls > np.maximum(2.0 * waver, 3.0 * cycles.step)
     gain = np.where(held, expected - lost, 0.0)
     best = int(np.argmax(gain))
     if gain[best] <= 0:

@@ -22,6 +22,7 @@ from pendpipe.recording import Recording
 
 __all__ = ["Cut", "FreeDecay", "find_free_decay"]
 
+_BLOCKS: Final = 9
 _LEAST_HALF_CYCLES: Final = 3
 
 
@@ -134,6 +135,14 @@ def _pieces(time: FloatArray, longest_s: float) -> list[tuple[int, int]]:
     return list(zip([0, *edges], [*edges, len(time)], strict=True))
 
 
+def _rise(swing: FloatArray) -> float:
+    """The most that swings grow again after having been smaller, over blocks that calm noise."""
+    if len(swing) < 2 * _BLOCKS:
+        return 0.0
+    means = np.array([float(np.mean(part)) for part in np.array_split(swing, _BLOCKS)])
+    return float(np.max(means - np.minimum.accumulate(means)))
+
+
 def _refuse_without_fall(place: str, cycles: HalfCycles, run: Run, least: float) -> None:
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
     swing = cycles.swing[run.first : run.last + 1]
@@ -147,7 +156,8 @@ def _refuse_without_fall(place: str, cycles: HalfCycles, run: Run, least: float)
     third = max(1, len(swing) // 3)
     fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
     scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
-    if fall <= max(3.0 * scatter / np.sqrt(third), 0.3 * least, 1e-4 * float(swing[0])):
+    few = max(3.0 * scatter / np.sqrt(third), _rise(swing), 0.3 * least, 1e-4 * float(swing[0]))
+    if fall <= few:
         raise NotAnalysableError(
             place,
             f"the amplitude does not fall over {len(swing)} half cycles",

@@ -55,7 +55,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     chance = _chances(occupation)
     looked = len(chance)
     single = min(1.0, looked * float(chance.min())) if looked else 1.0
-    bit, bits = _stuck_bits(coded)
+    bit, bits = _stuck_bits(coded, expected)
     p_value = min(1.0, 3.0 * min(single, bits, comb.p_value))
     if p_value > 0.01:
         return Finding("missing-codes", p_value, summary="codes come as often as they should")
@@ -114,24 +114,24 @@ def _chances(occupation: Occupation) -> FloatArray:
     return np.asarray(np.minimum(chance, 1.0)) if looked.any() else np.zeros(0)
 
 
-def _stuck_bits(coded: Coded) -> tuple[tuple[int, float], float]:
+def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[tuple[int, float], float]:
     """The bit that is set far too often or seldom, and the chance of that.
 
     Where code 0 of the converter lies is not known: a bit of weight 2^b splits the codes
-    into runs of 2^b, and every place of the runs is tried.
+    into runs of 2^b, and every place of the runs is tried. What is due is worked out with the
+    noise: where the motion turns, many readings lie about one code.
     """
     best, chance, tried = (0, 0.5), 1.0, 0
     span = int(np.ptp(coded.code))
+    codes = np.arange(expected.shape[1]) + int(coded.code.min()) - 1
     for bit in range(_BITS):
         run = 2**bit
         if 4 * run > span:
             break
         residue = np.bincount(coded.code % (2 * run), minlength=2 * run).astype(np.float64)
-        wanted = np.bincount(
-            np.floor(coded.position + 0.5).astype(np.int64) % (2 * run), minlength=2 * run
-        ).astype(np.float64)
         found = _halves(residue, run)
-        should = np.clip(_halves(wanted, run), 0.05, 0.95)
+        due = np.stack([_halves(_residues(codes, row, run), run) for row in expected])
+        should = np.clip(found, due.min(axis=0), due.max(axis=0)).clip(0.05, 0.95)
         tried += 2 * run
         # Neighbouring readings share their half: as if there were fewer.
         effective = len(coded.code) / max(1.0, _in_a_half(coded, run))
@@ -141,6 +141,11 @@ def _stuck_bits(coded: Coded) -> tuple[tuple[int, float], float]:
         if p_value < chance:
             best, chance = (bit, float(found[worst])), p_value
     return best, min(1.0, tried * chance)
+
+
+def _residues(codes: IntArray, numbers: FloatArray, run: int) -> FloatArray:
+    """Sum numbers of codes over what is left when they are divided by two runs."""
+    return np.asarray(np.bincount(codes % (2 * run), numbers, 2 * run), dtype=np.float64)
 
 
 def _halves(residue: FloatArray, run: int) -> FloatArray:
