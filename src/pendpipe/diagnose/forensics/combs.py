@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnose.distributions import poisson_from, poisson_up_to
 
 _BITS: Final = 7
 _LEAST: Final = 6.0
@@ -57,8 +58,6 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
         How often each code from ``code.min() - 1`` on is due, a row for each error that all
         angles may have in common; shape (errors, codes), the middle row without.
     """
-    from scipy.special import gammainc, gammaincc
-
     first, size = int(code.min()) - 1, expected.shape[1]
     codes = np.arange(first, first + size)
     best, tried = Comb(1, 0, 0.0, 0.0, 1.0), 0
@@ -71,8 +70,7 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
         found = np.bincount(code % period, minlength=period).astype(np.float64)
         looked = low > _LEAST
         tried += int(np.count_nonzero(looked))
-        fewer = gammaincc(found + 1.0, np.maximum(low, 1e-12))
-        more = np.where(found > 0.0, gammainc(np.maximum(found, 1.0), high), 1.0)
+        fewer, more = poisson_up_to(found, low), poisson_from(found, high)
         chance = np.where(looked, 2.0 * np.minimum(fewer, more), 1.0)
         at = int(np.argmin(chance))
         if chance[at] < best.p_value:
