@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -44,16 +45,18 @@ def code_version(module: str) -> str:
     return digest.hexdigest()[:12]
 
 
-def _data_of(module: str) -> list[Path]:
+@cache
+def _data_of(module: str) -> tuple[Path, ...]:
     """The data files (templates) beside a package's ``__init__``, in a folder of their own."""
     path = _file(module)
     assert path is not None
     if path.name != "__init__.py":
-        return []
+        return ()
     kept = path.parent.glob("templates/*")
-    return sorted(file for file in kept if file.is_file())
+    return tuple(sorted(file for file in kept if file.is_file()))
 
 
+@cache
 def _file(module: str) -> Path | None:
     """The source file of one of our modules."""
     parts = module.split(".")
@@ -77,17 +80,32 @@ def _content(module: str) -> bytes:
 def _imports(module: str) -> frozenset[str]:
     """The modules of ours that a module names in its import statements."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(_content(module))):
-        if isinstance(node, ast.Import):
-            found.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found.add(node.module)
-            found.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Call):
-            found.update(_imported_by_name(node))
+    content = _content(module)
+    tree = ast.parse(content)
+    for statement in _statements(tree.body):
+        if isinstance(statement, ast.Import):
+            found.update(alias.name for alias in statement.names)
+        elif isinstance(statement, ast.ImportFrom) and statement.module and not statement.level:
+            found.add(statement.module)
+            found.update(f"{statement.module}.{alias.name}" for alias in statement.names)
+    if b"import_module" in content:
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call):
+                found.update(_imported_by_name(node))
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
+
+
+def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """All statements, however deep; an import is none of an expression's many parts."""
+    for statement in body:
+        yield statement
+        for part in ("body", "orelse", "finalbody"):
+            yield from _statements(getattr(statement, part, []))
+        for part in ("handlers", "cases"):
+            for block in getattr(statement, part, []):
+                yield from _statements(block.body)
 
 
 def _imported_by_name(call: ast.Call) -> set[str]:

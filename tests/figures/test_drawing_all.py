@@ -40,7 +40,17 @@ def test_every_figure_is_there_as_svg_and_png(small: tuple[dict[str, Any], Path]
         assert (folder / f"figures/{name}.png").read_bytes().startswith(b"\x89PNG")
     for entry in content["records"]:
         assert (folder / entry["record"] / "figures/decay.svg").is_file()
-        assert (folder / entry["record"] / "figures/decay.png").is_file()
+
+
+def test_several_processes_draw_what_one_draws(
+    small: tuple[dict[str, Any], Path], tmp_path: Path
+) -> None:
+    content, folder = small
+    alone = draw_all(content, folder, tmp_path / "one")
+    bytes_alone = [file.read_bytes() for file in alone.files]
+    together = draw_all(content, folder, tmp_path / "two", processes=2)
+    assert [file.name for file in together.files] == [file.name for file in alone.files]
+    assert [file.read_bytes() for file in together.files] == bytes_alone
 
 
 def test_the_same_data_give_the_same_bytes(example: Any, tmp_path: Path) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from itertools import repeat
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,7 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
     out
         Where the campaign's figures go; a record's go to its own folder.
     processes
-        With more than one, the records' figures are drawn beside the campaign's.
+        How many draw at once.
 
     Returns
     -------
@@ -66,33 +66,34 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         A campaign with theory leaves a file for each of figures 3 to 10, with the reason
         in it where there was nothing to draw; one without leaves them out.
     """
-    folders, entries = repeat(folder), comparison["records"]
+    names = list(_campaign_figures(comparison, folder))
+    tasks = [
+        *(partial(draw_figure, comparison, folder, out, name) for name in names),
+        *(partial(draw_record, folder, entry) for entry in comparison["records"]),
+    ]
     if processes < 2:
-        of_records = list(map(draw_record, folders, entries))
-        return _together([_draw_campaign(comparison, folder, out), *of_records])
-    with ProcessPoolExecutor(processes - 1) as pool:
-        of_the_others = pool.map(draw_record, folders, entries)
-        of_the_campaign = _draw_campaign(comparison, folder, out)
-        return _together([of_the_campaign, *of_the_others])
+        return _together([task() for task in tasks])
+    with ProcessPoolExecutor(processes) as pool:
+        return _together([draw.result() for draw in [pool.submit(task) for task in tasks]])
 
 
 def draw_record(folder: Path, entry: Entry) -> Drawn:
-    """Draw one record's decay."""
+    """Draw one record's decay (for the page: a drawing in pixels would take as long again)."""
     drawn, name = Drawn(), entry["record"]
     if entry.get("refused"):
         drawn.left_out[f"{name}, decay"] = "the record was refused"
         return drawn
     stem = folder / name / "figures" / "decay"
-    _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, dpi=150)
+    _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, forms=("svg",))
     return drawn
 
 
-def _draw_campaign(comparison: Comparison, folder: Path, out: Path) -> Drawn:
-    """Draw figures 3 to 10 and the tail figure."""
+def draw_figure(comparison: Comparison, folder: Path, out: Path, name: str) -> Drawn:
+    """Draw one of figures 3 to 10, or the tail figure."""
     drawn = Drawn()
-    keep_places = bool(comparison.get("has_theory"))
-    for name, draw in _campaign_figures(comparison, folder).items():
-        _draw(drawn, name, draw, out / name, keep_place=keep_places and name.startswith("fig"))
+    keep_place = bool(comparison.get("has_theory")) and name.startswith("fig")
+    draw = _campaign_figures(comparison, folder)[name]
+    _draw(drawn, name, draw, out / name, keep_place=keep_place)
     return drawn
 
 
@@ -156,7 +157,7 @@ def _draw(
     stem: Path,
     *,
     keep_place: bool = False,
-    dpi: int = 200,
+    forms: Sequence[str] = ("svg", "png"),
 ) -> None:
     """Draw and save one figure, or note why not (and say it in the figure's place)."""
     try:
@@ -166,4 +167,4 @@ def _draw(
         if not keep_place:
             return
         figure = placeholder(str(reason))
-    drawn.files += save(figure, stem, dpi=dpi)
+    drawn.files += save(figure, stem, forms=forms)

@@ -6,7 +6,7 @@ dashes. Vermilion is kept for what goes wrong when something is left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any, Final, NamedTuple, ParamSpec
@@ -135,9 +135,11 @@ def plain_text(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def save(figure: Figure, stem: Path, *, dpi: int = 200) -> list[Path]:
+def save(
+    figure: Figure, stem: Path, *, dpi: int = 200, forms: Sequence[str] = ("svg", "png")
+) -> list[Path]:
     """Write a figure as SVG and PNG, the same bytes whenever the same data are drawn."""
-    written = [stem.with_name(f"{stem.name}.{form}") for form in ("svg", "png")]
+    written = [stem.with_name(f"{stem.name}.{form}") for form in forms]
     # A salt for each figure, so that two of them in one page do not share identifiers.
     saving: dict[Any, Any] = {
         **_LOOK,
