@@ -14,11 +14,13 @@ import json
 import os
 import time
 from collections.abc import Iterator
-from multiprocessing import Pool
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+
+from pendpipe.challenge.workers import workers
 
 JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
 PAGE: Final = Path("docs/diagnosis.md")
@@ -89,15 +91,16 @@ def made(case: Case) -> Any:
 
 def diagnosed(case: Case) -> dict[str, Any]:
     """Make and diagnose one recording."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     import tempfile
 
     from pendpipe.challenge.recordings import write_recording
     from pendpipe.diagnose.run import diagnose_recording
     from pendpipe.dynamics.any_law import NoMotionError
     from pendpipe.errors import InputError
+    from pendpipe.process import keep_memory
     from pendpipe.recording import read_plain
 
+    keep_memory()  # as the command does
     entry: dict[str, Any] = {"key": case.key, "family": case.family, "names": case.names,
                              "size": case.size}  # fmt: skip
     try:
@@ -189,8 +192,10 @@ def run(part: float, processes: int, nulls: int | None = None) -> list[dict[str,
             known[entry["key"]] = entry
     wanted = list(cases(part, nulls))
     todo = [case for case in wanted if case.key not in known]
-    with Pool(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
-        for done, entry in enumerate(pool.imap_unordered(diagnosed, todo), start=1):
+    with workers(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
+        made_by = [pool.submit(diagnosed, case) for case in todo]
+        for done, outcome in enumerate(as_completed(made_by), start=1):
+            entry = outcome.result()
             known[entry["key"]] = entry
             journal.write(json.dumps(entry, default=float) + "\n")
             journal.flush()

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from pendpipe.errors import InputError
+from pendpipe.process import one_thread
 from pendpipe.version import __version__
 
 COMMANDS: Final = {
@@ -80,6 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without Greek letters
+    one_thread()
     arguments = _parse(sys.argv[1:] if argv is None else argv)
     try:
         return int(arguments.run(arguments))

@@ -23,8 +23,8 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def version() -> str:
-    provenance._content.cache_clear()
-    provenance._imports.cache_clear()
+    for kept in (provenance._content, provenance._imports, provenance._file, provenance._data_of):
+        kept.cache_clear()
     return provenance.code_version("pendpipe.stage")
 
 

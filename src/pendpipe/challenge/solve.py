@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.challenge import sealing
-from pendpipe.challenge.workers import ONE_THREAD
 from pendpipe.errors import InputError
 from pendpipe.files import read_json, write_json
+from pendpipe.process import ONE_THREAD
 
 SOLVER: Final = (sys.executable, "-m", "pendpipe.cli", "diagnose", "--figures", "none")
 PATIENCE_S: Final = 600.0

@@ -65,8 +65,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, write, and say it."""
     from pendpipe.analysis.fit.fixed import parse_fixed
+    from pendpipe.process import keep_memory
     from pendpipe.stages.diagnose import Question, refused_before
 
+    keep_memory()
     question = Question(
         arguments.baseline, parse_fixed(arguments.fix), arguments.seed, arguments.level,
         arguments.figures, arguments.record is not None,

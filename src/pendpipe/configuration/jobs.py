@@ -12,6 +12,7 @@ from typing import Any
 
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import replaced
+from pendpipe.process import one_thread
 
 
 def prepare_environment() -> None:
@@ -22,8 +23,7 @@ def prepare_environment() -> None:
     """
     folder = str(Path(sys.executable).parent)
     os.environ["PATH"] = os.pathsep.join([folder, os.environ.get("PATH", "")])
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
+    one_thread()
 
 
 def digest(content: Any) -> str:

@@ -70,8 +70,12 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
         found = np.bincount(code % period, minlength=period).astype(np.float64)
         looked = low > _LEAST
         tried += int(np.count_nonzero(looked))
-        fewer, more = poisson_up_to(found, low), poisson_from(found, high)
-        chance = np.where(looked, 2.0 * np.minimum(fewer, more), 1.0)
+        # What is within two sigma is by no count of residues improbable.
+        odd = looked & ((found < low - 2.0 * np.sqrt(low)) | (found > high + 2.0 * np.sqrt(high)))
+        chance = np.ones(period)
+        if odd.any():
+            fewer, more = poisson_up_to(found[odd], low[odd]), poisson_from(found[odd], high[odd])
+            chance[odd] = 2.0 * np.minimum(fewer, more)
         at = int(np.argmin(chance))
         if chance[at] < best.p_value:
             middle = float(due[len(expected) // 2, at])

@@ -12,9 +12,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.distributions import each, student_beyond
 
 _INVERSE_FREEDOM: Final = (
-    1e-6, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,
+    1e-4, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,
 )  # fmt: skip
-"""1/nu: from the normal distribution to tails as heavy as any."""
+"""1/nu: from a normal distribution (but for 1 % of what is beyond 5 sigma) to tails as heavy
+as any."""
 _BINS: Final = 200
 _ROUNDS: Final = 8
 
