@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import chi2_beyond, chi2_of_one
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.distributions import chi2_beyond, chi2_of_one
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
 from pendpipe.effects.curve import Curve

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
-from pendpipe.diagnose.distributions import chi2_beyond
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import tone_of

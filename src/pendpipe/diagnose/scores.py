@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnose.distributions import chi2_beyond
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled

@@ -7,10 +7,10 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.distributions import log_normal_below
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.distributions import log_normal_below
 from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import (

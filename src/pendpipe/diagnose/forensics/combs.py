@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.distributions import poisson_from, poisson_up_to
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnose.distributions import poisson_from, poisson_up_to
 
 _BITS: Final = 7
 _LEAST: Final = 6.0

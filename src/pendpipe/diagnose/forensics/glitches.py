@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import binomial_at_least
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.distributions import binomial_at_least
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import (
     Local,

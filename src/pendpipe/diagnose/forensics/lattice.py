@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import normal_below
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.distributions import normal_below
 from pendpipe.diagnose.forensics.local import Local
 
 _RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56)

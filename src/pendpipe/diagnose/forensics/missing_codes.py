@@ -7,10 +7,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.distributions import normal_below, poisson_from, poisson_up_to
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.distributions import normal_below, poisson_from, poisson_up_to
 from pendpipe.diagnose.forensics.codes import Coded, read_codes
 from pendpipe.diagnose.forensics.combs import Comb, worst_comb
 from pendpipe.diagnose.forensics.finding import Finding, nothing

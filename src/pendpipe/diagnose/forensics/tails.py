@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import each, student_beyond
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.distributions import each, student_beyond
 
 _INVERSE_FREEDOM: Final = (
     1e-4, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,

@@ -84,7 +84,7 @@ def chi2_of_one(p_value: float) -> float:
 
 
 def poisson_up_to(count: Any, mean: Any) -> FloatArray:
-    """Return P(N <= count) of Poisson's distribution: Q(count + 1, mean)."""
+    """Return P(N <= count) of Poisson's distribution: Q(count + 1, mean), for any count > -1."""
     order, at = np.broadcast_arrays(np.asarray(count, dtype=np.float64) + 1.0, mean)
     at = np.maximum(at, _TINY)
     front = np.exp(order * np.log(at) - at - each(math.lgamma, order))
