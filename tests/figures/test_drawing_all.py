@@ -90,7 +90,7 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
     }  # fmt: skip
     drawn = draw_all(bare, folder, folder / "figures")
     assert not (folder / "figures").exists()
-    assert len(drawn.files) == 2 * len(content["records"])
+    assert len(drawn.files) == len(content["records"])
     assert "refused" in drawn.left_out["gone, decay"]
 
 
