@@ -54,7 +54,7 @@ def calls_of(output: str) -> list[list[str]]:
     """The command line's calls in the order in which Snakemake made them."""
     found = re.findall(r"^Shell command:\s*(pendpipe [^\n]*)$", output, flags=re.MULTILINE)
     parts = [part for line in found for part in line.split("&&")]
-    return [shlex.split(re.sub(r"2>>? \S+", "", part))[1:] for part in parts]
+    return [shlex.split(re.sub(r"\s\d?>>?\s?\S+", "", part))[1:] for part in parts]
 
 
 def elsewhere(calls: list[list[str]], results: Path, bare: Path) -> list[list[str]]:
