@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pendpipe.challenge.chain import Chain
-from pendpipe.challenge.filters import high_pass, play
+from pendpipe.challenge.filters import high_pass, play, with_turns
 from pendpipe.challenge.motion import Motion, Track
 
 TIME = 0.02 * np.arange(3000)
@@ -71,6 +71,25 @@ def test_play_holds_the_reading_back_by_half_its_width() -> None:
     moving[:100] = False
     lag = (angle - found)[moving] * np.sign(np.cos(OMEGA * TIME))[moving]
     assert np.allclose(lag, 0.005, atol=1e-12)
+
+
+def test_a_coupling_turns_where_the_pendulum_does_and_not_where_it_is_sampled() -> None:
+    """Ten samples a cycle: after the turn between two of them the reading lags the other way."""
+    time = np.arange(0.0, 60.0, 0.1 * 2.0 * np.pi / OMEGA) + 0.03
+    track = Track(time, 0.3 * np.sin(OMEGA * time), 0.3 * OMEGA * np.cos(OMEGA * time), 0 * time)
+    found = Chain(play_rad=1e-4, volts_per_radian=1.0).volts(track, len(time))
+    away = np.abs(track.angle_rad) < 0.3 - 1e-4
+    away[:10] = False
+    lag = (track.angle_rad - found) * np.sign(track.rate_rad_s)
+    assert np.allclose(lag[away], 5e-5, atol=1e-12)
+
+
+def test_turns_between_samples_are_found() -> None:
+    time = np.arange(0.0, 30.0, 0.2)
+    angle, sampled = with_turns(time, np.sin(time + 0.1), np.cos(time + 0.1))
+    assert np.array_equal(angle[sampled], np.sin(time + 0.1))
+    assert np.allclose(np.abs(angle[~sampled]), 1.0, atol=1e-5)
+    assert np.count_nonzero(~sampled) == 10
 
 
 def test_ac_coupling_is_a_first_order_high_pass() -> None:

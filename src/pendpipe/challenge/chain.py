@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.challenge.filters import bristle_coupling, high_pass, play
+from pendpipe.challenge.filters import bristle_coupling, high_pass, play, with_turns
 from pendpipe.challenge.motion import Track
 
 
@@ -114,7 +114,7 @@ class Chain:
             early = self.jitter_s * random.standard_normal(len(time))
             bend = np.gradient(rate, time)
             angle = angle + rate * early + 0.5 * bend * early**2
-        reading = self._sensed(angle + self.second_share * track.second_rad)
+        reading = self._sensed(self._coupled(track, angle + self.second_share * track.second_rad))
         volts = self._gain(time, track) * self.volts_per_radian * reading + self.offset_volts
         volts = volts + self._drift(time)
         if self.tone_volts != 0.0:
@@ -146,11 +146,17 @@ class Chain:
             code = np.where(np.isin(code, self.missing_codes), code + 1, code)
         return np.asarray(code)
 
-    def _sensed(self, angle: FloatArray) -> FloatArray:
+    def _coupled(self, track: Track, angle: FloatArray) -> FloatArray:
+        if self.play_rad <= 0.0 and self.elastic_play_rad <= 0.0:
+            return angle
+        angle, sampled = with_turns(track.time_s, angle, track.rate_rad_s)
         if self.play_rad > 0.0:
             angle = play(angle, self.play_rad)
         if self.elastic_play_rad > 0.0:
             angle = bristle_coupling(angle, self.elastic_play_rad)
+        return np.asarray(angle[sampled])
+
+    def _sensed(self, angle: FloatArray) -> FloatArray:
         curved = angle + self.square * angle**2 + self.cubic * angle**3
         if self.plates != 0.0 or self.lean != 0.0:
             # Differential capacitor with gaps d(1 + l) -+ angle: (C1 - C2)/(C1 + C2 + stray).

@@ -6,8 +6,37 @@ import math
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.challenge.torques import compiled
+
+
+def with_turns(
+    time: FloatArray, angle: FloatArray, rate: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Put the turning angles between the samples, by the cubic through angles and rates.
+
+    A coupling has turned round where the pendulum did, not where it was sampled last.
+
+    Returns
+    -------
+    angle
+        Shape (n + turns,).
+    sampled
+        Which of them are the samples, same shape.
+    """
+    step, fall = np.diff(time), angle[:-1] - angle[1:]
+    before, after = step * rate[:-1], step * rate[1:]
+    # The cubic's slope: square s^2 + linear s + before, for s from 0 to 1.
+    square, linear = 6.0 * fall + 3.0 * (before + after), -6.0 * fall - 4.0 * before - 2.0 * after
+    turns = np.flatnonzero(before * after < 0.0)
+    square, linear, before, after = square[turns], linear[turns], before[turns], after[turns]
+    root = np.sqrt(np.maximum(linear**2 - 4.0 * square * before, 0.0))
+    # Of the two roots, the one at which the slope crosses from the first rate to the second.
+    s = np.clip(2.0 * before / (-linear + np.sign(before) * root), 0.0, 1.0)
+    turned = angle[turns] + s * (before + s * (0.5 * linear + s * square / 3.0))
+    sampled = np.ones(len(angle) + len(turns), dtype=np.bool_)
+    sampled[turns + 1 + np.arange(len(turns))] = False
+    return np.insert(angle, turns + 1, turned), sampled
 
 
 @compiled

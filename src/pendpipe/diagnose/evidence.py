@@ -23,8 +23,8 @@ _SHAPE: Final = 2.0
 """What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
 _FORM: Final = 3.0
 """Standard deviation of a difference of evidence for what a law's own form is worth, where
-little is gained: it grows with the gain by `_MISSHAPEN`."""
-_MISSHAPEN: Final = 0.03
+little is gained: it grows with the gain by `MISSHAPEN`."""
+MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
 term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
 _SIZE: Final = 6.0
@@ -69,7 +69,7 @@ def form_spread(best: Rival) -> float:
 
     The catalogue's forms are not quite those of real laws, and curves have knots.
     """
-    return math.hypot(_FORM, _MISSHAPEN * max(best.gain, 0.0))
+    return math.hypot(_FORM, MISSHAPEN * max(best.gain, 0.0))
 
 
 def class_width(best: Rival) -> float:

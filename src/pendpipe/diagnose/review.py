@@ -96,7 +96,7 @@ def withdraw_doubtful(state: State, level: float, progress: Progress) -> None:
     if not remainder_of(state.fit, state.data, state.noise).systematic:
         return
     for step in [step for step in state.steps if step.winner.lead.effect.kind == "unnamed"]:
-        without = _without(state, step)
+        without = fit_without(state, step)
         if without is not None:
             state.fit = without
             state.steps.remove(step)
@@ -119,14 +119,14 @@ def _least_credible(state: State, remainder: Remainder) -> tuple[Step, Fit, floa
         effect = step.winner.lead.effect
         if isinstance(effect, FreedParameter) or stands_apart(effect, state.fit):
             continue
-        without = _without(state, step)
+        without = fit_without(state, step)
         if without is not None:
             gain = without.chi2 - state.fit.chi2
             found.append((step, without, credibility(step, remainder, gain)))
     return max(found, key=lambda each: each[2], default=None)
 
 
-def _without(state: State, step: Step) -> Fit | None:
+def fit_without(state: State, step: Step) -> Fit | None:
     """The model without one effect; None where it can't move so: then it is needed."""
     effect: Effect = step.winner.lead.effect
     model, value = state.fit.model.dropping(effect, state.fit.value)

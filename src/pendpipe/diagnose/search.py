@@ -10,6 +10,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, detect, more_leads, prepare
+from pendpipe.diagnose.evidence import MISSHAPEN
 from pendpipe.diagnose.faults import CATALOGUE_SHARE, Forensics
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.large_first import large_first
@@ -20,7 +21,13 @@ from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.redness import doubt_redness
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.remainder import Remainder, remainder_of
-from pendpipe.diagnose.review import credible, describe_rest, withdraw_doubtful
+from pendpipe.diagnose.review import (
+    credible,
+    describe_rest,
+    fit_without,
+    stands_apart,
+    withdraw_doubtful,
+)
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
@@ -272,19 +279,24 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
 
 
 def _prune(state: State, progress: Progress) -> None:
-    """Drop what later effects have made needless; a curve in time, that follows any, drops none."""
+    """Drop what later effects have made needless; a curve in time, that follows any, drops none.
+
+    A curve leaves a part of what it describes between its knots: a name that explains no more
+    than that may be made of it.
+    """
     if _drawn(state) and state.steps[-1].winner.lead.effect.in_time:
         return
+    between = 0.0
+    if _drawn(state) and len(state.steps) > 1:
+        without = fit_without(state, state.steps[-1])
+        between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
     for step in list(state.steps[:-1]):
         effect = step.winner.lead.effect
-        if isinstance(effect, FreedParameter):
+        without = None if isinstance(effect, FreedParameter) else fit_without(state, step)
+        if without is None:
             continue
-        model, value = state.fit.model.dropping(effect, state.fit.value)
-        try:
-            without = refine(model, state.data, state.noise, value, held=state.holding)
-        except NoMotionError:
-            continue
-        if without.chi2 - state.fit.chi2 < _NEEDED:
+        needed = _NEEDED if stands_apart(effect, state.fit) else max(_NEEDED, between)
+        if without.chi2 - state.fit.chi2 < needed:
             progress(f"{effect.identifier} is needless now")
             state.fit = without
             state.steps.remove(step)
