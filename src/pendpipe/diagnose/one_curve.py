@@ -7,6 +7,7 @@ That both should be there by chance is improbable; that one unknown thing is, is
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,9 +15,10 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import Rival, evidence, form_spread, needed_sizes, ranked
+from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, form_spread, needed_sizes, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.scores import build_bank
 from pendpipe.diagnose.state import State, Step
 from pendpipe.dynamics.any_law import NoMotionError
@@ -28,16 +30,28 @@ _BETTER: Final = 40.0
 """By how much (in chi^2, two a free value counted) several names must be better than one
 curve: each name is one of some forty (2 ln 40 = 7), and to need two at once is rare."""
 _EACH: Final = 2.0
+_REST: Final = 0.1 * MISSHAPEN
+"""Part of the gain that further names must add to be more than a correction of the first."""
 _NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
 """A curve has no shapes to try."""
 
 
 def prefer_one_curve(state: State, progress: Progress) -> None:
-    """Put one curve in the place of several names, where it does as well."""
-    names = [step for step in state.steps if step.winner.lead.effect.kind != "unnamed"]
+    """Put one curve in the place of several names, where it does as well.
+
+    What every pendulum has, and a line of its own in the spectrum, stay where they are; and a
+    name to which the others add next to nothing is not one of several.
+    """
+    kept = [step for step in state.steps if stands_apart(step.winner.lead.effect, state.fit)]
+    names = [
+        step for step in state.steps
+        if step not in kept and step.winner.lead.effect.kind != "unnamed"
+    ]  # fmt: skip
     if len(names) < 2 or any(not step.winner.lead.effect.count for step in names):
         return
-    bare = _bare(state)
+    if _one_alone(names):
+        return
+    bare = _bare(state, kept)
     if bare is None:
         return
     fits = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
@@ -48,8 +62,14 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     if _cost(best.fit) > _cost(state.fit) + math.hypot(_BETTER, form_spread(best)):
         return
     progress(f"{best.identifier} alone does as well as {len(names)} names")
-    state.steps[:] = [Step(tuple(rivals), names[0].p_value, bare)]
+    state.steps[:] = [*kept, Step(tuple(rivals), names[0].p_value, bare)]
     state.settle(best.fit)
+
+
+def _one_alone(names: Sequence[Step]) -> bool:
+    """Whether one name explains so much that the others may be its own form."""
+    gains = [step.winner.gain for step in names]
+    return sum(gains) - max(gains) < _REST * sum(gains)
 
 
 def _rival(bare: Fit, fit: Fit) -> Rival:
@@ -63,11 +83,15 @@ def _cost(fit: Fit) -> float:
     return fit.chi2 + _EACH * len(fit.free)
 
 
-def _bare(state: State) -> Fit | None:
-    """The baseline alone, as the readings and their noise are judged now."""
-    model = state.fit.model.bare()
+def _bare(state: State, kept: Sequence[Step]) -> Fit | None:
+    """The baseline and what is kept, as the readings and their noise are judged now."""
+    model, value = state.fit.model, state.fit.value
+    for step in state.steps:
+        if step not in kept:
+            model, value = model.dropping(step.winner.lead.effect, value)
+    start = np.concatenate([state.bare, value[len(state.bare) :]])
     try:
-        return refine(model, state.data, state.noise, state.bare, held=state.holding)
+        return refine(model, state.data, state.noise, start, held=state.holding)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
 

@@ -12,7 +12,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.curve_values import curve_values
-from pendpipe.diagnose.evidence import Rival, of_one_class, probabilities
+from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabilities
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.refine import Fit, refine
@@ -79,9 +79,10 @@ def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
     """A rival as its gain counts beside the best, where much is left that no model explains."""
     if not found.remainder.systematic:
         return rival
-    # Relative to what the best leaves: m ln(excess) counts, for m independent numbers.
-    behind = max(best - gain, 0.0)
-    worth = -found.remainder.numbers * math.log1p(behind / max(found.remainder.excess, 1.0))
+    # Relative to what the best leaves: m ln(excess) counts, for m independent numbers. As much
+    # as real laws leave to the catalogue's forms is no distance either.
+    behind, left = max(best - gain, 0.0), found.remainder.excess + MISSHAPEN * max(best, 0.0)
+    worth = -found.remainder.numbers * math.log1p(behind / max(left, 1.0))
     return replace(rival, gain=worth, evidence=worth + rival.lead.effect.prior)
 
 
