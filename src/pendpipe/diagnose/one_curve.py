@@ -39,10 +39,12 @@ _NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
 def prefer_one_curve(state: State, progress: Progress) -> None:
     """Put one curve in the place of several names, where it does as well.
 
-    What every pendulum has, and a line of its own in the spectrum, stay where they are; and a
-    name to which the others add next to nothing is not one of several.
+    What every pendulum has, and a line of its own in the spectrum that is more than what a curve
+    leaves, stay where they are; and a name to which the others add next to nothing is not one
+    of several.
     """
-    kept = [step for step in state.steps if stands_apart(step.winner.lead.effect, state.fit)]
+    total = sum(step.winner.gain for step in state.steps)
+    kept = [step for step in state.steps if _stays(step, state, MISSHAPEN * total)]
     names = [
         step for step in state.steps
         if step not in kept and step.winner.lead.effect.kind != "unnamed"
@@ -64,6 +66,13 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     progress(f"{best.identifier} alone does as well as {len(names)} names")
     state.steps[:] = [*kept, Step(tuple(rivals), names[0].p_value, bare)]
     state.settle(best.fit)
+
+
+def _stays(step: Step, state: State, left: float) -> bool:
+    effect = step.winner.lead.effect
+    if effect.expected:
+        return True
+    return stands_apart(effect, state.fit) and step.winner.gain > left
 
 
 def _one_alone(names: Sequence[Step]) -> bool:
