@@ -30,7 +30,7 @@ _BETTER: Final = 40.0
 """By how much (in chi^2, two a free value counted) several names must be better than one
 curve: each name is one of some forty (2 ln 40 = 7), and to need two at once is rare."""
 _EACH: Final = 2.0
-_REST: Final = 0.1 * MISSHAPEN
+_REST: Final = 1e-4
 """Part of the gain that further names must add to be more than a correction of the first."""
 _NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
 """A curve has no shapes to try."""
