@@ -40,4 +40,6 @@ def test_memory_that_is_kept_is_not_mapped_again() -> None:
                            capture_output=True, text=True).stdout)
         for words in ([], ["keep"])
     )  # fmt: skip
-    assert kept < 0.2 * mapped or mapped < 100
+    if mapped < 100:
+        pytest.skip("this system's library keeps memory by itself")
+    assert kept < 0.2 * mapped

@@ -14,7 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Trials, draw_chance
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.scores import Bank, Candidate, local_p_values
-from pendpipe.diagnose.search import applicable
+from pendpipe.diagnose.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 
 from .records import null_fit

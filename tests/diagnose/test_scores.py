@@ -13,7 +13,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.scores import Bank, build_bank, local_p_values, tangent_basis
-from pendpipe.diagnose.search import applicable
+from pendpipe.diagnose.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.model import Model
 

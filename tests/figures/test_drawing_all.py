@@ -111,6 +111,11 @@ def test_the_command_draws_and_says_what_it_left_out(
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
     assert {path.stem for path in out.glob("*.svg")} == set(PAPER)
     assert "no calibration" in "".join(ET.parse(out / "fig03.svg").getroot().itertext())
+    elsewhere = folder.parent / "elsewhere"
+    comparison = str(folder / "comparison.json")
+    assert main(["figures", *words, comparison, "--out", str(elsewhere)]) == 0
+    assert (elsewhere / "fig04.svg").as_posix() in (elsewhere / "drawn.json").read_text()
+    capsys.readouterr()
     assert main(["figures", *words, str(folder / "nowhere.json"), "--out", str(out)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 

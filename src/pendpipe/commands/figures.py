@@ -7,7 +7,6 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
@@ -43,7 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for name, reason in drawn.left_out.items():
         print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
-    names = [Path(os.path.relpath(file, folder)).as_posix() for file in drawn.files]
+    names = [
+        (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
+        for file in drawn.files
+    ]
     write_json(
         arguments.out / "drawn.json",
         {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curve import AmplitudeCurve, Curve
 from pendpipe.effects.curves import FrictionCurve, usual_loss_rate
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class DampingInTimeCurve(Curve):
         return usual_loss_rate(pendulum, self.span)
 
 
-class GainCurve(Curve):
+class GainCurve(AmplitudeCurve):
     """A sensor whose gain is any function of the swing."""
 
     identifier = "unnamed-measurement"
@@ -87,18 +87,9 @@ class GainCurve(Curve):
     equation = r"y = x\,[1 + g(y)]"
     argument, ordinate = "amplitude, rad", "gain less 1"
     flavour = "gain"
+    number = 13
     prior = -5.0
     deciding = "film the swing: a second sensor must see the same amplitudes"
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the amplitude, in equal ratios."""
-        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
-        ends = (0.95 * last, 1.05 * span.first_amplitude)
-        return np.asarray(np.geomspace(*ends, 13))
-
-    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
-        """Return g: straight between the knots over ln y."""
-        return np.asarray(np.interp(np.log(at), np.log(self.knots), self.mixing @ values))
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return g(r) x."""

@@ -85,3 +85,20 @@ class Curve(Effect, ABC):
     def small(self, span: Span) -> float:
         """A thousandth of what is reasonable."""
         return 1e-3
+
+
+class AmplitudeCurve(Curve, ABC):
+    """A curve over the amplitude, straight between knots that stand in equal ratios."""
+
+    number: ClassVar[int]
+    """Of knots."""
+
+    def make_knots(self, span: Span) -> FloatArray:
+        """Knots over the amplitude, in equal ratios."""
+        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
+        ends = (0.95 * last, 1.05 * span.first_amplitude)
+        return np.asarray(np.geomspace(*ends, self.number))
+
+    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return the curve's value: straight between the knots over ln y."""
+        return np.asarray(np.interp(np.log(at), np.log(self.knots), self.mixing @ values))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curve import AmplitudeCurve, Curve
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -46,7 +46,7 @@ class RestoringCurve(Curve):
         return 0.1 * self.span.first_amplitude
 
 
-class DampingCurve(Curve):
+class DampingCurve(AmplitudeCurve):
     """A loss that is any function of the amplitude."""
 
     identifier = "unnamed-damping"
@@ -54,24 +54,15 @@ class DampingCurve(Curve):
     equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
     argument, ordinate = "amplitude, rad", "extra loss rate, 1/s"
     flavour = "amplitude"
+    number = 15
     deciding = (
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
     )
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the amplitude, in equal ratios."""
-        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
-        ends = (0.95 * last, 1.05 * span.first_amplitude)
-        return np.asarray(np.geomspace(*ends, 15))
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 beta(r) v."""
         beta = self.scale(pendulum) * self.curve(values, motion.amplitude)
         return np.asarray(-2.0 * beta * motion.velocity)
-
-    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
-        """Return beta: straight between the knots over ln y."""
-        return np.asarray(np.interp(np.log(at), np.log(self.knots), self.mixing @ values))
 
     def scale(self, pendulum: Pendulum) -> float:
         """The usual loss rate."""
