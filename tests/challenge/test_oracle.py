@@ -127,6 +127,19 @@ def test_a_cancelling_pair_hides_itself() -> None:
     assert all(e["marginal_delta_chi2"] < 100.0 for e in item.truth["effects"])
 
 
+@pytest.mark.parametrize(
+    "names", [("sensor-cubic", "circular-error"), ("circular-error", "tone-pickup")]
+)
+def test_both_of_a_pair_are_as_large_as_told(names: tuple[str, str]) -> None:
+    """The amplitude is sin x's strength: what is beside it is sized on the swing that is made."""
+    item = make_pair(np.random.default_rng(3), *names, (400.0, 400.0))
+    cosine = item.truth["cosine"]
+    alone = sum(e["delta_chi2"] for e in item.truth["effects"])
+    assert alone == pytest.approx(800.0, rel=0.05)
+    assert item.truth["total_delta_chi2"] == pytest.approx(alone, rel=0.1 + abs(cosine))
+    assert item.truth["oracle"]["found_each"] == [True, True]
+
+
 def test_what_is_outside_leaves_something_to_every_catalogue_entry() -> None:
     item = make_outside(np.random.default_rng(1), "cogging-torque", 100.0)
     effect = item.truth["effects"][0]

@@ -63,6 +63,19 @@ def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
     assert finding.location.time_s == (AIR.times()[5], AIR.times()[3998])
 
 
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
+def test_few_glitches_of_one_size_do_not_pass_for_each_others_tail(
+    number: int, clean: FloatArray
+) -> None:
+    """Seven standard deviations: one is as rare as 3e-12, and two make no tail."""
+    where = np.linspace(300, AIR.count - 300, number).astype(int)
+    readings = clean + white(generator(3), AIR.count)
+    readings[where] = clean[where] + 7.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+
+
 def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:
     noisy, where = FAULTS["memory 0.5"].make(clean, generator()), [300, 2500]
     readings = noisy.data.values.copy()

@@ -146,3 +146,17 @@ def test_history_starts_from_rest() -> None:
 
 def test_broadband_drive_has_no_template() -> None:
     assert not by_identifier("broadband-drive").template
+
+
+@pytest.mark.parametrize("name", ["clock-drift", "frequency-drift"])
+def test_a_drift_is_the_less_likely_the_larger_beyond_a_thousandth(name: str) -> None:
+    """Twice the logarithm of a density that falls with the square of the change."""
+    effect = by_identifier(name)
+    span = evaluated(name, (0.0, STRAIGHT_S), baseline(b=0.01), TIME).span
+    usual = np.array([1e-3 / span.duration_s, 1e7])
+    assert effect.improbable(0.9 * usual, span) == 0.0
+    double = effect.improbable(2.0 * usual, span) - effect.improbable(usual, span)
+    assert double == pytest.approx(2.0 * math.log(2.0), rel=1e-3)
+    # One that has long relaxed has changed by rate tau, however long the record.
+    relaxed = np.array([-1e-2, 1.0])
+    assert effect.improbable(relaxed, span) == pytest.approx(2.0 * math.log(10.0), rel=1e-3)

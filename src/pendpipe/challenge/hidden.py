@@ -68,6 +68,11 @@ class Hidden:
         """The scenario without it."""
         return self.base(self.prepared, strength)
 
+    @property
+    def moves(self) -> bool:
+        """Whether the scenario without the effect depends on its strength."""
+        return self.base(self.prepared, 2.0) is not self.prepared
+
     def truth(self, strength: float) -> dict[str, float]:
         """The effect's numbers."""
         return {self.parameter: strength, **self.details}

@@ -41,7 +41,7 @@ def make_pair(
         found = _draw(random, first, second, delta_chi2, easier(scenario_options))
         if found is None:
             continue
-        a, b, inner = found
+        prepared, a, b, inner = found
         cosine = inner / np.sqrt(a.delta_chi2 * b.delta_chi2)
         if marginal:
             share = 1.0 - min(cosine**2, 0.999)
@@ -51,7 +51,6 @@ def make_pair(
                 continue
             a, b = more, other
         strength = -b.strength if cancelling and inner > 0 else b.strength
-        prepared = b.hidden.prepared
         scenario = b.hidden.build(a.hidden.build(prepared, a.strength), strength)
         bench = a.bench if a.bench.count <= b.bench.count else b.bench
         point, _, total = bench.refit(scenario.reading_rad(np.random.default_rng(0)))
@@ -62,7 +61,7 @@ def make_pair(
         effects[1]["parameters"] = b.hidden.truth(strength)
         for entry in effects:
             entry["marginal_delta_chi2"] = entry["delta_chi2"] * (1.0 - cosine**2)
-        truth = truth_of("combination", prepared, effects, bench)
+        truth = truth_of("combination", bench.scenario, effects, bench)
         truth |= {"cosine": cosine, "total_delta_chi2": total, "cancelling": cancelling}
         if oracle:
             truth["oracle"] = oracle_truth(judge(bench, point, scenario, codes), first)
@@ -75,18 +74,30 @@ def make_pair(
 def _draw(
     random: np.random.Generator, first: str, second: str, wanted: tuple[float, float],
     options: dict[str, Any],
-) -> tuple[Sized, Sized, float] | None:  # fmt: skip
-    """Size each alone on the same pendulum; the third number is their inner product."""
+) -> tuple[Scenario, Sized, Sized, float] | None:  # fmt: skip
+    """Size each alone on the same pendulum.
+
+    Returns
+    -------
+    prepared, first, second, product
+        What both need, each at its strength, and the inner product of what they leave.
+    """
     drawn: Scenario = draw_scenario(random, **options)
     one = hide(random, first, drawn)
     two = hide(random, second, one.prepared)
     # What the second needs (a release from rest, say) holds for the first as well.
-    a = size(replace(one, prepared=two.prepared), wanted[0])
-    b = size(two, wanted[1]) if a is not None else None
+    one = replace(one, prepared=two.prepared)
+    if one.moves and two.moves:
+        return None
+    # An effect whose strength is the amplitude itself decides where the other one is sized.
+    a = None if two.moves else size(one, wanted[0])
+    b = size(replace(two, prepared=a.without) if a and one.moves else two, wanted[1])
+    if two.moves and b is not None:
+        a = size(replace(one, prepared=b.without), wanted[0])
     if a is None or b is None:
         return None
     count = min(len(a.residual), len(b.residual))
-    return a, b, float(a.residual[:count] @ b.residual[:count])
+    return two.prepared, a, b, float(a.residual[:count] @ b.residual[:count])
 
 
 def _found(bench: Bench, point: Point, angle: FloatArray, a: Sized, b: Sized) -> list[bool]:

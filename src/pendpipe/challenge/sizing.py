@@ -79,7 +79,7 @@ def _by_shape(hidden: Hidden, wanted: float) -> Sized | None:
     strength = abs(hidden.scale)
     bench: Bench | None = None
     growth, tried = hidden.growth, dict[float, float]()
-    moving = hidden.base(hidden.prepared, 2.0) is not hidden.prepared
+    moving = hidden.moves
     start: Point | None = None
     for turn in range(16):
         if not 0.0 < strength <= hidden.largest:

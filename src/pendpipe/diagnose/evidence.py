@@ -27,6 +27,9 @@ little is gained: it grows with the gain by `MISSHAPEN`."""
 MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
 term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
+_UNSURE: Final = 2.0
+"""By how much wider than `form_spread` differences of evidence scatter: on opened challenges, half
+the log odds came true."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 
@@ -57,6 +60,15 @@ class Rival:
     def identifier(self) -> str:
         """The effect's."""
         return self.lead.effect.identifier
+
+    @property
+    def prior(self) -> float:
+        """Twice the logarithm of how much likelier it is beforehand, its size included."""
+        effect = self.lead.effect
+        place = next((place for each, place in self.fit.model.places() if each is effect), None)
+        if place is None:
+            return effect.prior
+        return effect.prior - effect.improbable(self.fit.value[place], self.fit.at.span)
 
     @property
     def drawn(self) -> bool:
@@ -95,7 +107,9 @@ def equivalent(p_value: float, score: float) -> float:
     return chi2_of_one(p_value)
 
 
-def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int]) -> float:
+def evidence(
+    lead: Lead, gain: float, chance: Chance, needed: tuple[float, int], unlikely: float = 0.0
+) -> float:
     """What a gain is worth, beside effects with more or fewer free values and shapes.
 
     Parameters
@@ -108,6 +122,8 @@ def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int])
         What its own scan amounts to.
     needed
         Of the gain, what needless sizes make up; and how many are needed (`needed_sizes`).
+    unlikely
+        What so large values cost (`Effect.improbable`).
     """
     gain, sizes = gain - needed[0], needed[1]
     if gain <= 0.0:
@@ -124,7 +140,7 @@ def evidence(lead: Lead, gain: float, chance: Chance, needed: tuple[float, int])
         # Too large for p-values: what trials and further sizes take off a large gain.
         worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (sizes - 1)
     fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
-    return worth - _SHAPE * max(fitted, 0) + effect.prior
+    return worth - _SHAPE * max(fitted, 0) + effect.prior - unlikely
 
 
 def needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
@@ -158,7 +174,7 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
         if best.evidence - rival.evidence >= within:
             return 3, 0.0, -rival.evidence
         freedom = int(rival.drawn) + int(rival.lead.effect.in_time)
-        return freedom, -rival.lead.effect.prior if rival.drawn else 0.0, -rival.evidence
+        return freedom, -rival.prior if rival.drawn else 0.0, -rival.evidence
 
     return sorted(rivals, key=order)
 
@@ -169,9 +185,9 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     Real laws differ a little from the catalogue's forms, so that differences of evidence
     are uncertain (`form_spread`); log odds are averaged over that (MacKay's approximation).
     """
-    spread = form_spread(max(rivals, key=lambda rival: rival.evidence))
+    spread = _UNSURE * form_spread(max(rivals, key=lambda rival: rival.evidence))
     shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
-    prior = np.array([rival.lead.effect.prior for rival in rivals])
+    prior = np.array([rival.prior for rival in rivals])
     likelihood = np.array([rival.evidence for rival in rivals]) - prior
     best = float(likelihood.max())
     logs = np.append(0.5 * (shrunk * (likelihood - best) + prior), 0.5 * (none - best))

@@ -156,10 +156,15 @@ class Forensics:
         """Ask whether random kicks explain more than the best effect of the catalogue does."""
         name = "broadband-drive"
         finding, p_value = self._tested(name, state)
-        lead = _BEFORE_CURVES if rival.lead.effect.kind == "unnamed" else 0.0
         if p_value > self.level:
             return False
-        if equivalent(p_value, finding.delta_chi2) + lead < rival.evidence:
+        worth = equivalent(p_value, finding.delta_chi2)
+        if rival.lead.effect.kind == "unnamed":
+            worth += _BEFORE_CURVES
+            if not state.steps:
+                # A square's chance says little of much, and a curve follows any walk by its knots.
+                worth = max(worth, finding.delta_chi2 + _BEFORE_CURVES)
+        if worth < rival.evidence:
             return False
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))

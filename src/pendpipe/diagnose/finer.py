@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.scores import tangent_basis
+from pendpipe.effects import Effect
 from pendpipe.effects.responses import responses
 
 
@@ -22,14 +26,33 @@ def finer_shape(base: Fit, noise: Noise, lead: Lead) -> tuple[float, ...]:
     if not shapes:
         return lead.shape
     shapes.append(lead.shape)
+    products, length = products_and_lengths(base, noise, effect, shapes)
+    length[length == 0.0] = np.inf
+    return shapes[int(np.argmax(np.abs(products) / length))]
+
+
+def products_and_lengths(
+    base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Score shapes of an effect's first size on what a fit leaves.
+
+    Returns
+    -------
+    products, lengths
+        Inner products with the residual of what a unit of the size does beyond the model's own
+        values, and the lengths of that; shape (shapes,). The size is product/length^2, and
+        takes (product/length)^2 off chi^2.
+    """
+    span = base.at.span
     small = effect.small(span)
-    changes = [(np.array([0.0, *shape]), np.array([small, *shape])) for shape in shapes]
+    sizes = np.zeros(effect.sizes)
+    changed = sizes.copy()
+    changed[0] = small
+    changes = [(np.append(sizes, shape), np.append(changed, shape)) for shape in shapes]
     pendulum = base.model.pendulum(base.value)
     raw = responses(effect, changes, base.at, pendulum).T / small
     columns = np.zeros((len(raw) + 1, len(shapes)))
     columns[:-1] = noise.whiten(raw)
     basis = tangent_basis(base)
     columns -= basis @ (basis.T @ columns)
-    length = np.linalg.norm(columns, axis=0)
-    length[length == 0.0] = np.inf
-    return shapes[int(np.argmax(np.abs(columns.T @ base.residual) / length))]
+    return columns.T @ base.residual, np.linalg.norm(columns, axis=0)

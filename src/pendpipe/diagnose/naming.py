@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -57,12 +58,13 @@ def refit_leads(
         return []
     # What is still left makes differences of chi^2 mean less.
     left = max(min(fit.chi2 for _, fit in fits) / max(data.used, 1), 1.0)
-    rivals = [
-        Rival(lead, fit, base.chi2 - fit.chi2,
-              evidence(lead, (base.chi2 - fit.chi2) / left, detection.chance,
-                       needed_sizes(fit, lead.effect)))
-        for lead, fit in fits
-    ]  # fmt: skip
+    rivals = []
+    for lead, fit in fits:
+        gain = base.chi2 - fit.chi2
+        rival = Rival(lead, fit, gain, 0.0)
+        needed, unlikely = needed_sizes(fit, lead.effect), lead.effect.prior - rival.prior
+        worth = evidence(lead, gain / left, detection.chance, needed, unlikely)
+        rivals.append(replace(rival, evidence=worth))
     return _named_first(rivals) if gross else ranked(rivals)
 
 

@@ -26,9 +26,11 @@ from pendpipe.effects.closer_curves import CLOSER_CURVES
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.curves import CURVES
 
-_BETTER: Final = 40.0
-"""By how much (in chi^2, two a free value counted) several names must be better than one
-curve: each name is one of some forty (2 ln 40 = 7), and to need two at once is rare."""
+BETTER: Final = 22.0
+"""By how much (in chi^2, two a free value counted) two names must be better than one curve: each
+is one of some forty (2 ln 40 = 7.4), and to need two at once is as rare."""
+_PART: Final = 0.5
+"""Of its gain beside other names: what something sudden must keep beside a curve."""
 _EACH: Final = 2.0
 _REST: Final = 1e-4
 """Part of the gain that further names must add to be more than a correction of the first."""
@@ -40,11 +42,16 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
     """Put one curve in the place of several names, where it does as well.
 
     What every pendulum has, and a line of its own in the spectrum that is more than what a curve
-    leaves, stay where they are; and a name to which the others add next to nothing is not one
-    of several.
+    leaves, stay where they are, and so does what happened at an instant and is as needed beside
+    the curve; and a name to which the others add next to nothing is not one of several.
     """
     total = sum(step.winner.gain for step in state.steps)
-    kept = [step for step in state.steps if _stays(step, state, MISSHAPEN * total)]
+    _prefer(
+        state, [step for step in state.steps if _stays(step, state, MISSHAPEN * total)], progress
+    )
+
+
+def _prefer(state: State, kept: Sequence[Step], progress: Progress) -> None:
     names = [
         step for step in state.steps
         if step not in kept and step.winner.lead.effect.kind != "unnamed"
@@ -61,11 +68,31 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
         return
     rivals = ranked([_rival(bare, fit) for fit in fits])
     best = rivals[0]
-    if _cost(best.fit) > _cost(state.fit) + math.hypot(_BETTER, form_spread(best)):
+    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, form_spread(best)):
+        return
+    sudden = [step for step in names if _lasts(step, best.fit, state)]
+    if sudden:
+        _prefer(state, [*kept, *sudden], progress)
         return
     progress(f"{best.identifier} alone does as well as {len(names)} names")
     state.steps[:] = [*kept, Step(tuple(rivals), names[0].p_value, bare)]
     state.settle(best.fit)
+
+
+def _lasts(step: Step, drawn: Fit, state: State) -> bool:
+    """Whether what happened at an instant is needed beside a curve, which has no instants."""
+    effect = step.winner.lead.effect
+    if not effect.local:
+        return False
+    place = next(place for other, place in state.fit.model.places() if other is effect)
+    start = np.concatenate([drawn.value, state.fit.value[place]])
+    try:
+        both = refine(
+            drawn.model.adding(effect), state.data, state.noise, start, held=state.holding
+        )
+    except (NoMotionError, np.linalg.LinAlgError):
+        return False
+    return cost(drawn) - cost(both) > max(BETTER, _PART * step.winner.gain)
 
 
 def _stays(step: Step, state: State, left: float) -> bool:
@@ -88,7 +115,8 @@ def _rival(bare: Fit, fit: Fit) -> Rival:
     return Rival(lead, fit, gain, evidence(lead, gain, _NO_SCAN, needed_sizes(fit, curve)))
 
 
-def _cost(fit: Fit) -> float:
+def cost(fit: Fit) -> float:
+    """Return chi^2, with two for each free value (Akaike)."""
     return fit.chi2 + _EACH * len(fit.free)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
 from pendpipe.diagnose.chance import Trials
+from pendpipe.diagnose.colour import REFERENCE_HZ
+from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.naming import refit_leads
@@ -18,9 +19,6 @@ from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, settled
 from pendpipe.effects import Effect
 
-_DOUBT: Final = 14.0
-"""By how much (in -2 ln L) an effect must be better than red noise to be preferred."""
-
 
 def doubt_redness(
     state: State, effects: Sequence[Effect], threshold: float, seed: int, progress: Progress
@@ -28,7 +26,8 @@ def doubt_redness(
     """Ask whether what passes for red noise is an effect: a step or a drift is red as well.
 
     The noise is judged again by what the best effect leaves, were the noise not red; that
-    judgement is taken where effect and noise together are clearly likelier.
+    judgement is taken where effect and noise together are likelier by 1/threshold: what is
+    normalised beats the true model by so much no more often than `threshold` (Markov).
     """
     progress("the noise is red: is it an effect?")
     effects = [effect for effect in effects if effect.kind != "unnamed"]
@@ -43,7 +42,9 @@ def doubt_redness(
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
-    if _badness(extended, noise) + _cost(state, rivals[0]) > _badness(state.fit, state.noise):
+    needed = _cost(state, rivals[0]) - 2.0 * math.log(threshold)
+    gained = _badness(state.fit, state.data, state.noise) - _badness(extended, data, noise)
+    if gained < needed:
         return
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
     state.fit, state.data, state.noise = fit, data, noise
@@ -52,16 +53,26 @@ def doubt_redness(
 
 
 def _cost(state: State, rival: Rival) -> float:
-    """What must be gained: the doubt, the shapes tried, and how finely its size is told.
+    """What must be gained: the shapes that were tried, and how finely its size is told.
 
-    A size that is known to one part in gain^(1/2) was one among as many (Laplace).
+    A size that is known to one part in gain^(1/2) was one among as many (Laplace). A tone was
+    looked for in every second cosine.
     """
     assert state.now is not None
     effect = rival.lead.effect
-    tried = state.now.chance.own.get(effect.key, Trials(1.0, 0.0)).first
-    return _DOUBT + 2.0 * math.log(tried) + effect.sizes * math.log(max(rival.gain, 1.0))
+    by_frequency = Trials(0.5 * len(state.data), 0.0)
+    own = state.now.chance.own.get(effect.key)
+    tried = (own or (by_frequency if effect.spectral else Trials(1.0, 0.0))).first
+    return 2.0 * math.log(tried) + effect.sizes * math.log(max(rival.gain, 1.0))
 
 
-def _badness(fit: Fit, noise: Noise) -> float:
-    """Minus twice the log-likelihood, the noise's part included."""
-    return fit.chi2 + float(np.sum(np.log(noise.variance)))
+def _badness(fit: Fit, data: Data, noise: Noise) -> float:
+    """Minus twice the log-likelihood, the noise's part included, and what its colour costs.
+
+    Strength and slope are told by the cosines below the reference (Schwarz).
+    """
+    found = fit.chi2 + float(np.sum(np.log(noise.variance)))
+    if noise.red <= 0.0:
+        return found
+    slow = 2.0 * REFERENCE_HZ * float(data.time_s[-1] - data.time_s[0])
+    return found + 2.0 * math.log(max(slow, 1.0))

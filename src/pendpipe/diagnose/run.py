@@ -16,6 +16,7 @@ from pendpipe.diagnose.forensics.lattice import with_true_step
 from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.freed import freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
+from pendpipe.diagnose.likeliest import with_likeliest
 from pendpipe.diagnose.progress import Progress, silent
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Diagnosis, Judged, Named
@@ -101,6 +102,7 @@ def diagnose_decay(
         beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
         freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
+    found = with_likeliest(found, beginning)
     named = _as_added(found, beginning)
     gap = gap_note(
         (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data
@@ -30,6 +32,7 @@ from pendpipe.diagnose.review import (
 )
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.diagnose.task import Task, undrawn
+from pendpipe.diagnose.two_names import prefer_two_names
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
@@ -154,10 +157,14 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
-    """The baseline under the noise that was judged last, at the times that were mended."""
-    if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
-        return state.fit
-    model = state.fit.model.bare()
+    """The baseline under the noise that was judged last, at the times that were recorded."""
+    model, data, read = state.fit.model.bare(), state.data, beginning.data
+    if np.array_equal(data.time_s, read.time_s):
+        if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
+            return state.fit
+    else:
+        model = model.at_times(read.time_s)
+        data = replace(data, time_s=read.time_s, uniform=read.uniform)
     starts = [state.bare, beginning.value]
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())
@@ -165,7 +172,7 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     fault = NoMotionError("it stops")
     for start in starts:
         try:
-            return refine(model, state.data, state.noise, start, held=beginning.held)
+            return refine(model, data, state.noise, start, held=beginning.held)
         except NoMotionError as found:
             fault = found
     raise fault
@@ -190,6 +197,8 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
         state.fit, state.data, state.noise, found, held=state.holding, gross=gross,
         origin=state.origin,
     )  # fmt: skip
+    if not gross and rivals:
+        rivals = prefer_two_names(state, rivals, task)
     if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
         return False
     if not rivals or rivals[0].gain <= max(_NEEDED, share * state.fit.chi2 if gross else 0.0):

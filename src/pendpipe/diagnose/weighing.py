@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabilities
 from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
@@ -22,28 +23,50 @@ from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
 from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
-_NONE: Final = 4.0
-"""Evidence (in chi^2) that it is none of the class's, where the model leaves nothing."""
+_NONE: Final = 1.0
+"""Evidence (in chi^2) that it is none of the class's, where the model leaves nothing; with what
+`_misfit` adds, one lone name in twelve is wrong, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
 _FAR: Final = 100.0
 """In chi^2: who is so far behind has no probability."""
 _PART: Final = 0.1
 """Part of the gain that no fit which merely stopped early is behind."""
+_OF_THE_REST: Final = ("jitter", "broadband-drive", "coloured-noise")
+"""Faults that are seen in what a model leaves: a curve's own misfit looks like any of them."""
 _SAME: Final = 0.02
 """Part by which a gain may change in the end for its rivals not to be refitted."""
 
 
-def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
-    """One effect, weighed against its rivals with all the others in the model."""
+class Weighed(NamedTuple):
+    """An effect and its rivals, with all the others in the model.
+
+    Parameters
+    ----------
+    without
+        The model without it, fitted.
+    gain
+        Delta chi^2 of the effect beside all others.
+    mates
+        What the recording cannot tell from it, the best of each identifier.
+    weights
+        Probabilities of the effect, of its mates, and of none of them.
+    """
+
+    without: Fit
+    gain: float
+    mates: tuple[Rival, ...]
+    weights: FloatArray
+
+
+def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
+    """Weigh one effect against its rivals with all the others in the model."""
     effect = step.winner.lead.effect
-    if effect.kind != "unnamed":
-        # A curve drawn over what the names leave could imitate any of them.
-        found = replace(found, improved=found.named.fit, remainder=found.named.remainder)
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
@@ -54,10 +77,25 @@ def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
     ]  # fmt: skip
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
-    weights = weights * (1.0 if stands_apart(effect, found.improved) else _explained(found, gain))
+    if not stands_apart(effect, found.improved):
+        weights = weights * _explained(found, effect, gain)
+    return Weighed(without, gain, tuple(mates), weights)
+
+
+def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
+    """One effect, with what is said of it in the end."""
+    effect = step.winner.lead.effect
+    if effect.kind != "unnamed":
+        # A curve drawn over what the names leave could imitate any of them.
+        found = replace(found, improved=found.named.fit, remainder=found.named.remainder)
+    without, gain, mates, weights = weigh(found, beginning, step)
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
-        effect_parameters(found.improved, effect, found.data.unit), gain, step.p_value,
+        with_instants(
+            effect_parameters(found.improved, effect, found.data.unit), effect, without,
+            found.noise, found.improved.spread,
+        ),
+        gain, step.p_value,
         float(weights[0]),
         tuple((mate.identifier, float(weight)) for mate, weight in
               zip(mates, weights[1:], strict=False) if weight > _LISTED or not mate.drawn),
@@ -83,14 +121,19 @@ def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
     # as real laws leave to the catalogue's forms is no distance either.
     behind, left = max(best - gain, 0.0), found.remainder.excess + MISSHAPEN * max(best, 0.0)
     worth = -found.remainder.numbers * math.log1p(behind / max(left, 1.0))
-    return replace(rival, gain=worth, evidence=worth + rival.lead.effect.prior)
+    return replace(rival, gain=worth, evidence=worth + rival.prior)
 
 
-def _explained(found: Search, gain: float) -> float:
-    """The part of the misfit that a name explains: it is believed no more than that."""
-    if not found.remainder.systematic:
-        return 1.0
-    return max(gain, 0.0) / max(max(gain, 0.0) + found.remainder.excess, 1.0)
+def _explained(found: Search, effect: Effect, gain: float) -> float:
+    """The part of the misfit that an effect explains: it is believed no more than that.
+
+    What a curve without a name describes beside it is not explained.
+    """
+    curves = [step.winner for step in found.steps if step.winner.drawn]
+    open_still = sum(each.gain for each in curves if each.lead.effect is not effect)
+    if found.remainder.systematic:
+        open_still += found.remainder.excess
+    return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
 def fault_named(found: Search, fault: Fault) -> Named:
@@ -102,6 +145,8 @@ def fault_named(found: Search, fault: Fault) -> Named:
     doubt = math.exp(-0.5 * (_NONE + _misfit(found)))
     # What would have given the very same codes is as likely.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
+    if finding.identifier in _OF_THE_REST:
+        each *= _explained(found, effect, finding.delta_chi2)
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation, finding.parameters,
         finding.delta_chi2, fault.p_value, each, tuple((name, each) for name in finding.also),
@@ -137,7 +182,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
             more = gain - step.winner.gain
             rivals.append(replace(rival, gain=rival.gain + more, evidence=rival.evidence + more))
             continue
-        fit = found.improved if own else _refitted(without, found, held, rival)
+        fit = found.improved if own else refitted(without, found, held, rival)
         if fit is not None:
             reached = without.chi2 - fit.chi2
             rivals.append(Rival(rival.lead, fit, reached, rival.evidence + reached - rival.gain))
@@ -165,7 +210,7 @@ def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArr
     return min(fits, key=lambda fit: fit.chi2, default=None)
 
 
-def _refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> Fit | None:
+def refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> Fit | None:
     """Refit a rival in the final model, from where it ended before."""
     effect = rival.lead.effect
     if isinstance(effect, FreedParameter):

@@ -88,7 +88,6 @@ class GainCurve(AmplitudeCurve):
     argument, ordinate = "amplitude, rad", "gain less 1"
     flavour = "gain"
     number = 13
-    prior = -5.0
     deciding = "film the swing: a second sensor must see the same amplitudes"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import RELAXATION, relaxation_times, relaxed, rows, since_start
+from pendpipe.effects.scan import (
+    RELAXATION,
+    relaxation_times,
+    relaxed,
+    rows,
+    since_start,
+    unusual_drift,
+)
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -29,6 +36,10 @@ class FrequencyDrift(Effect):
         rate, tau = values
         change = rate * relaxed(since_start(motion), tau)
         return np.asarray(-2.0 * change * pendulum.angular_frequency**2 * motion.angle)
+
+    def improbable(self, values: FloatArray, span: Span) -> float:
+        """Return what a change beyond the usual part costs."""
+        return unusual_drift(span, *values.tolist())
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Straight, and relaxing."""

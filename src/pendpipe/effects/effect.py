@@ -195,6 +195,10 @@ class Effect:
         """Whether fitted values are those of the thing that is named."""
         return True
 
+    def improbable(self, values: FloatArray, span: Span) -> float:
+        """Return twice the logarithm by which so large values are less likely beforehand."""
+        return 0.0
+
     def kick(self, values: FloatArray) -> Kick | None:
         """Return the sudden change of the motion."""
         return None

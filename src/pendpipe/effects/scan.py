@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
@@ -60,6 +61,20 @@ def relaxation_times(span: Span) -> list[tuple[float]]:
     The time that is fitted afterwards starts from the best of them.
     """
     return [(STRAIGHT_S,), (0.4 * span.duration_s,), (span.duration_s / 6.0,)]
+
+
+USUAL_DRIFT: Final = 1e-3
+"""Part by which a frequency or a clock may well change within a record: steel's modulus changes
+so in a few kelvin, the clock of a program that times itself so at the worst."""
+
+
+def unusual_drift(span: Span, rate: float, tau: float) -> float:
+    """Return twice the logarithm by which a drift is larger than usual ones; 0 where it is not.
+
+    A density that falls as 1/change^2 beyond the usual, and is flat in the logarithm within.
+    """
+    change = abs(rate) * float(relaxed(np.asarray(span.duration_s), tau))
+    return 2.0 * math.log(max(change / USUAL_DRIFT, 1.0))
 
 
 def since_start(motion: Motion) -> FloatArray:

@@ -15,6 +15,7 @@ from pendpipe.effects.scan import (
     reading_step,
     relaxation_times,
     relaxed,
+    unusual_drift,
 )
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ class ClockDrift(Effect):
         rate, tau = values
         late = time_s - time_s[0]
         return np.asarray(rate * tau * (late - relaxed(late, tau)))
+
+    def improbable(self, values: FloatArray, span: Span) -> float:
+        """Return what a change beyond the usual part costs."""
+        return unusual_drift(span, *values.tolist())
 
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Straight, and relaxing."""

@@ -25,7 +25,7 @@ from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
 from pendpipe.estimate import Estimate
 
-_NUMBERS: Final = (1, 3, 10, 30, 100)
+_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
 _SURELY: Final = 4.5
 _LARGE: Final = 3.0
 _SHARED: Final = 0.35
@@ -44,7 +44,7 @@ _EXPECTED: Final = 0.05
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Look for readings that neither normal nor heavy-tailed noise explains.
 
-    Each error is compared with its window and its neighbours. For k = 1, 2, 4, ... the
+    Each error is compared with its window and its neighbours. For k = 1, 2, 3, 5, 10 ... the
     noise's tail (Student's distribution, its nu averaged over what the record allows) is
     fitted with the k largest unknown, and the k-th largest of n judged by it:
 
