@@ -76,7 +76,9 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
         if rival.identifier != effect.identifier
     ]  # fmt: skip
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
-    weights = probabilities([own, *mates], own.evidence - _NONE - _misfit(found))
+    # What every pendulum has is likelier than its rivals beforehand, and than none of them.
+    none = own.evidence - max(own.prior, 0.0) - _NONE - _misfit(found)
+    weights = probabilities([own, *mates], none)
     if not stands_apart(effect, found.improved):
         weights = weights * _explained(found, effect, gain)
     return Weighed(without, gain, tuple(mates), weights)
