@@ -1,7 +1,7 @@
 """What is known of recordings that others made stands in them, though nobody tells it.
 
-They are read where they lie (``../shared/recordings``). Here single laws are fitted, which is
-quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found of it.
+They are read where they lie (``../shared/recordings``). Here mostly single laws are fitted, which
+is quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found of it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import pytest
 from pendpipe.analysis.turning_points.recorded import measure_recording
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.begin import Beginning, begin
 from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.growing import grown
@@ -83,6 +84,16 @@ def test_a_ships_righting_moment_hardens() -> None:
     k3 = values(fit, "cubic-stiffness")[0]
     assert k3 > 0.0
     assert -0.375 * k3 == pytest.approx(-0.27, abs=0.08)
+
+
+def test_a_ship_hardens_rather_than_drifts() -> None:
+    """A clock that runs off by 0.7 % would fit as well, and is less likely beforehand."""
+    named = diagnose_recording(whole(SHIP)).diagnosis.effects
+    assert named[0].identifier == "cubic-stiffness"
+    assert named[0].parameters["k3"].value == pytest.approx(0.27 / 0.375, abs=0.25)
+    less = dict(named[0].indistinguishable)
+    assert all(less.get(name, 0.0) < named[0].probability for name in
+               ("clock-drift", "frequency-drift"))  # fmt: skip
 
 
 def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:

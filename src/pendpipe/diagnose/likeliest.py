@@ -38,9 +38,12 @@ def with_likeliest(found: Search, beginning: Beginning) -> Search:
             continue
         remainder = remainder_of(fit, found.data, found.noise)
         fit = replace(fit, spread=remainder.spread)
-        rest = [rival for rival in step.rivals if rival.lead.effect.key != best.lead.effect.key]
+        key = best.lead.effect.key
+        # As it was found: what it weighs in the end is no gain.
+        own = [rival for rival in step.rivals if rival.lead.effect.key == key]
+        rest = [rival for rival in step.rivals if rival.lead.effect.key != key]
         steps = list(found.steps)
-        steps[place] = replace(step, rivals=(best, *rest))
+        steps[place] = replace(step, rivals=(*own, *rest))
         found = replace(
             found, improved=fit, steps=tuple(steps), remainder=remainder,
             named=found.named._replace(fit=fit, remainder=remainder),
