@@ -144,3 +144,17 @@ def test_a_gain_that_is_all_of_the_misfit_is_believed_as_far_as_chance_allows() 
     one = credibility(some_step(), Remainder(1.0, 2.0, 2.0), 1e4)
     worth = 2.0 * math.log1p(1e4)
     assert one == pytest.approx(math.erfc(math.sqrt(0.5 * worth)), rel=1e-6)
+
+
+def test_curves_that_make_it_worse_are_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit that ends above where it began takes less than nothing off chi^2."""
+    from pendpipe.diagnose import review
+
+    fit, data, noise = null_fit()
+    state = State(fit, data, noise, [], TRUTH, fit.value)
+    curves = [curve(fit.at.span) for curve in CURVES[:2]]
+    worse = [Rival(Lead(curve, (), 0.0, 1.0), fit, -5.0, 0.0) for curve in curves]
+    monkeypatch.setattr(review, "refit_leads", lambda *_, **__: worse)
+    found = detect(prepare(fit, data, noise, curves), fit, seed=1)
+    assert not describe_rest(state, found, 1e-9)
+    assert state.fit is fit

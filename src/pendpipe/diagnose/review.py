@@ -171,6 +171,7 @@ def _of_the_motion(rivals: list[Rival]) -> Rival:
     that must repeat itself each cycle, leaves as little, it is the law that is drawn.
     """
     largest = max(rival.gain for rival in rivals)
-    near = [rival for rival in rivals if rival.gain > _AS_WELL * largest]
+    # Where no curve helps, the gains are negative.
+    near = [rival for rival in rivals if rival.gain >= min(_AS_WELL * largest, largest)]
     return min(near, key=lambda rival: (isinstance(rival.lead.effect, Curve)
                                         and rival.lead.effect.in_time, -rival.gain))  # fmt: skip
