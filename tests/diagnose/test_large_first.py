@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, B
+from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.circular_error import CircularError
 from pendpipe.recording import Recording
 
@@ -84,3 +86,20 @@ def test_a_record_of_large_amplitudes_alone_is_searched_as_a_whole() -> None:
     state, asked = searching(Recording(TIME_S[quarter], wide_swings()[quarter], "angle_rad"))
     assert is_gross(state.fit, state.data)
     assert asked == []
+
+
+def test_readings_that_were_cut_off_since_do_not_disturb_the_baseline() -> None:
+    """What lies behind a stop may be left out for good: the baseline goes as far as the model."""
+    from pendpipe.diagnose.search import _baseline_alone
+
+    begun = beginning_of(recording(other_engine(TRUTH), 4))
+    data = begun.data.first(1200)
+    model = begun.model.at_times(data.time_s)
+    noise = first_noise(replace(begun, data=data, model=model))
+    drift = by_identifier("frequency-drift")
+    start = np.append(begun.value, [0.0, 1e7])
+    fit = refine(model.adding(drift), data, noise, start, held=begun.held)
+    state = State(fit, data, noise, list(begun.held), begun.value, begun.value)
+    baseline = _baseline_alone(state, begun)
+    assert len(baseline.at.reading) == 1200
+    assert baseline.chi2 == pytest.approx(fit.chi2, abs=12.0)

@@ -158,7 +158,9 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     """The baseline under the noise that was judged last, at the times that were recorded."""
-    model, data, read = state.fit.model.bare(), state.data, beginning.data
+    model, data = state.fit.model.bare(), state.data
+    # The last readings may have been left out since.
+    read = beginning.data.first(len(data))
     if np.array_equal(data.time_s, read.time_s):
         if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
             return state.fit
