@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -54,7 +55,8 @@ def _named(entry: Outcome) -> list[list[str]]:
 def _nulls(done: Sequence[Outcome]) -> str:
     nulls = _of(done, "null")
     alarms = [entry for entry in nulls if entry["effects"]]
-    names = ", ".join(sorted({entry["effects"][0][0] for entry in alarms}))
+    counts = Counter(entry["effects"][0][0] for entry in alarms)
+    names = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
     return f"**False alarms** at 1 % nominal: {share(len(alarms), len(nulls))}" + (
         f"; accused were {names}." if alarms else "."
     )

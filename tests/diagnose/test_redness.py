@@ -31,7 +31,7 @@ def test_weak_drifts_of_the_level_in_white_noise_are_told_from_red_noise() -> No
 
 
 def test_red_noise_is_not_accused_of_drifting() -> None:
-    """Twice the white density at 0.05 Hz, as 1/f below: at 1 %, two of 24 are one in fifty."""
+    """Twice the white density at 0.05 Hz, as 1/f below; four of 24 would be one in ten thousand."""
     frequency = np.arange(len(TIME_S)) / (2.0 * len(TIME_S) * INTERVAL_S)
     spectrum = 1.0 + np.where(frequency < 0.05, 0.05 / np.maximum(frequency, frequency[1]), 0.0)
     accused = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.faults import Forensics
@@ -20,11 +21,14 @@ from .test_one_curve import pulled
 
 def rivals_after(readings: np.ndarray, seed: int) -> list[Rival]:
     """A curve of the torque leads; see who does after a second look."""
-    begun = beginning_of(recording(readings, seed))
+    record = recording(readings, seed)
+    begun = beginning_of(record)
     noise = first_noise(begun)
     fit = refine(begun.model, begun.data, noise, begun.value)
     state = State(fit, begun.data, noise, [], begun.value, fit.value)
-    task = Task(CATALOGUE, (), "eq8", 0.01, 1, Forensics.__new__(Forensics), silent)
+    task = Task(
+        CATALOGUE, (), "eq8", 0.01, 1, Forensics(prepare_samples(record, "the test"), 0.01), silent
+    )
     effects = applicable(CATALOGUE, fit, "eq8", "rad")
     state.now = detect(prepare(fit, begun.data, noise, effects), fit, seed=1)
     lead = next(each for each in state.now.leads if each.effect.identifier == "unnamed-restoring")

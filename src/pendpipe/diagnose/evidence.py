@@ -64,11 +64,7 @@ class Rival:
     @property
     def prior(self) -> float:
         """Twice the logarithm of how much likelier it is beforehand, its size included."""
-        effect = self.lead.effect
-        place = next((place for each, place in self.fit.model.places() if each is effect), None)
-        if place is None:
-            return effect.prior
-        return effect.prior - effect.improbable(self.fit.value[place], self.fit.at.span)
+        return _prior(self.lead.effect, self.fit)
 
     @property
     def drawn(self) -> bool:
@@ -107,25 +103,20 @@ def equivalent(p_value: float, score: float) -> float:
     return chi2_of_one(p_value)
 
 
-def evidence(
-    lead: Lead, gain: float, chance: Chance, needed: tuple[float, int], unlikely: float = 0.0
-) -> float:
+def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
     """What a gain is worth, beside effects with more or fewer free values and shapes.
 
     Parameters
     ----------
-    lead
-        The effect.
+    lead, fit
+        The effect, and the model with it.
     gain
-        Delta chi^2.
+        Delta chi^2, over what is left where that is much.
     chance
         What its own scan amounts to.
-    needed
-        Of the gain, what needless sizes make up; and how many are needed (`needed_sizes`).
-    unlikely
-        What so large values cost (`Effect.improbable`).
     """
-    gain, sizes = gain - needed[0], needed[1]
+    needless, sizes = _needed_sizes(fit, lead.effect)
+    gain -= needless
     if gain <= 0.0:
         return 0.0
     effect = lead.effect
@@ -140,10 +131,17 @@ def evidence(
         # Too large for p-values: what trials and further sizes take off a large gain.
         worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (sizes - 1)
     fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
-    return worth - _SHAPE * max(fitted, 0) + effect.prior - unlikely
+    return worth - _SHAPE * max(fitted, 0) + _prior(effect, fit)
 
 
-def needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
+def _prior(effect: Effect, fit: Fit) -> float:
+    place = next((place for other, place in fit.model.places() if other is effect), None)
+    # A held parameter that is freed is no part of the model's effects.
+    unlikely = 0.0 if place is None else effect.improbable(fit.value[place], fit.at.span)
+    return effect.prior - unlikely
+
+
+def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     """How much of a gain needless sizes make up, and how many of an effect's are needed.
 
     All are, but of a curve's mixtures: a curve is charged for those that stand out, the

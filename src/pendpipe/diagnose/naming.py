@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +15,6 @@ from pendpipe.diagnose.evidence import (
     Rival,
     equivalent,
     evidence,
-    needed_sizes,
     ranked,
 )
 from pendpipe.diagnose.finer import finer_shape
@@ -61,10 +59,7 @@ def refit_leads(
     rivals = []
     for lead, fit in fits:
         gain = base.chi2 - fit.chi2
-        rival = Rival(lead, fit, gain, 0.0)
-        needed, unlikely = needed_sizes(fit, lead.effect), lead.effect.prior - rival.prior
-        worth = evidence(lead, gain / left, detection.chance, needed, unlikely)
-        rivals.append(replace(rival, evidence=worth))
+        rivals.append(Rival(lead, fit, gain, evidence(lead, fit, gain / left, detection.chance)))
     return _named_first(rivals) if gross else ranked(rivals)
 
 

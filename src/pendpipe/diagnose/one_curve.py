@@ -15,7 +15,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, form_spread, needed_sizes, ranked
+from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, form_spread, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.review import stands_apart
@@ -112,7 +112,7 @@ def _rival(bare: Fit, fit: Fit) -> Rival:
     curve = fit.model.effects[-1]
     gain = bare.chi2 - fit.chi2
     lead = Lead(curve, (), gain, 0.0)
-    return Rival(lead, fit, gain, evidence(lead, gain, _NO_SCAN, needed_sizes(fit, curve)))
+    return Rival(lead, fit, gain, evidence(lead, fit, gain, _NO_SCAN))
 
 
 def cost(fit: Fit) -> float:
