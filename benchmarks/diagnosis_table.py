@@ -148,15 +148,17 @@ def _naming(done: Sequence[Outcome]) -> str:
         f" {share(sum(map(_class, singles)), len(singles))}, it comes first in"
         f" {share(sum(map(_first, singles)), len(singles))} (the oracle:"
         f" {sum(map(_oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
-        f" {_mean(oracle)}. {_coverage(_of(done, 'single'))}\n\n" + "\n".join(rows)
+        f" {_mean(oracle)}. {_coverage(singles, _of(done, 'single'))}\n\n" + "\n".join(rows)
     )
 
 
-def _coverage(singles: Sequence[Outcome]) -> str:
-    inside = [each for entry in singles for each in entry["inside"]]
+def _coverage(asked: Sequence[Outcome], singles: Sequence[Outcome]) -> str:
+    at_100, of_all = ([each for entry in part for each in entry["inside"]]
+                      for part in (asked, singles))  # fmt: skip
     return (
         "95 % intervals of the named effect's parameters, where it acts by the catalogue's own"
-        f" law, hold the truth in {share(sum(inside), len(inside))}."
+        f" law, hold the truth in {share(sum(at_100), len(at_100))}; over all sizes, those"
+        f" included that chance had to help above the level, in {share(sum(of_all), len(of_all))}."
     )
 
 

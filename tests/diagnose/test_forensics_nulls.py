@@ -10,7 +10,7 @@ import pytest
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
-from pendpipe.diagnose.forensics.tails import fit_tail
+from pendpipe.diagnose.forensics.tails import Tail, fit_tail
 from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
 
 from .decays import Pendulum
@@ -58,6 +58,30 @@ def test_the_largest_of_many_errors_is_judged_by_their_tail(freedom: float) -> N
     for level in (0.3, 0.1):
         expected = level * len(chances)
         assert np.sum(np.array(chances) < level) < expected + 3.3 * math.sqrt(expected)
+
+
+def test_rounding_does_not_promise_thin_tails() -> None:
+    # A step of 2.3 standard deviations fills the bulk of the errors and leaves their tails.
+    generator, step, chances, unaware = np.random.default_rng(5), 2.3, [], []
+    for _ in range(200):
+        noise = generator.standard_t(8.0, 3000) * math.sqrt(0.75)
+        size = np.sort(np.abs(noise + step * generator.uniform(-0.5, 0.5, 3000)))
+        for found, known in ((chances, step), (unaware, 0.0)):
+            beyond = float(fit_tail(size, 1, step=known).beyond(size[-1]))
+            found.append(-math.expm1(3000.0 * math.log1p(-beyond)))
+    for level in (0.3, 0.1, 0.03):
+        expected = level * len(chances)
+        assert np.sum(np.array(chances) < level) < expected + 3.3 * math.sqrt(expected)
+    assert np.mean(np.array(unaware) < 0.03) > 0.1
+
+
+def test_a_rounded_error_is_beyond_as_often_as_drawn() -> None:
+    generator, step = np.random.default_rng(6), 1.5
+    rounding = step * generator.uniform(-0.5, 0.5, 400_000)
+    drawn = np.abs(generator.standard_t(6.0, 400_000) + rounding)
+    tail = Tail(np.array([6.0]), np.ones(1), np.ones(1), step)
+    for size in (1.0, 2.0, 4.0):
+        assert tail.beyond(np.array(size)) == pytest.approx(np.mean(drawn > size), rel=0.03)
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0), (5.0, 1.0, 0.2, 0.1), (2.0, -1.0, 0.5)])

@@ -17,6 +17,7 @@ from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.forensics import TESTS, Test, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.forensics.glitches import find_in_misfit
+from pendpipe.diagnose.level import TESTS_SHARE
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress
@@ -24,13 +25,11 @@ from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import Fault, State, is_gross
 from pendpipe.estimate import Estimate
 
-CATALOGUE_SHARE: Final = 0.7
-"""Part of the level that the catalogue's scan spends; the tests share the rest."""
 _BEFORE: Final = ("clipping", "glitches")
 _BEHIND: Final = (
     "missing-codes", "coarse-quantisation", "jitter", "coloured-noise", "broadband-drive",
 )  # fmt: skip
-_EACH: Final = (1.0 - CATALOGUE_SHARE) / (len(_BEFORE) + len(_BEHIND))
+_EACH: Final = TESTS_SHARE / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
 _CLEAN: Final = 1.3
 """chi^2 per degree of freedom up to which a residual is noise enough for the fine tests."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from pendpipe.diagnose.colour import REFERENCE_HZ
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.evidence import Rival
+from pendpipe.diagnose.level import CATALOGUE_SHARE, REDNESS_SHARE
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.progress import Progress
@@ -21,20 +23,21 @@ from pendpipe.effects import Effect
 
 
 def doubt_redness(
-    state: State, effects: Sequence[Effect], threshold: float, seed: int, progress: Progress
+    state: State, effects: Sequence[Effect], level: float, seed: int, progress: Progress
 ) -> None:
     """Ask whether what passes for red noise is an effect: a step or a drift is red as well.
 
     The noise is judged again by what the best effect leaves, were the noise not red; that
-    judgement is taken where effect and noise together are likelier by 1/threshold: what is
-    normalised beats the true model by so much no more often than `threshold` (Markov).
+    judgement is taken where effect and noise together are likelier by 1/p, p this doubt's part
+    of the level: what is normalised beats the true model by so much no more often (Markov).
     """
+    share = level * REDNESS_SHARE
     progress("the noise is red: is it an effect?")
     effects = [effect for effect in effects if effect.kind != "unnamed"]
     assert state.now is not None
     fit, data, noise = settled(state.fit, state.data, state.noise, state.holding, red=False)
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
-    if other.p_value > threshold:
+    if other.p_value > share:
         return
     rivals = refit_leads(
         fit, data, noise, other, held=state.holding, gross=False, most=3, origin=state.origin
@@ -42,13 +45,16 @@ def doubt_redness(
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.holding)
-    needed = _cost(state, rivals[0]) - 2.0 * math.log(threshold)
     gained = _badness(state.fit, state.data, state.noise) - _badness(extended, data, noise)
-    if gained < needed:
+    by_chance = math.exp(0.5 * min(_cost(state, rivals[0]) - gained, 0.0))
+    if by_chance > share:
         return
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
     state.fit, state.data, state.noise = fit, data, noise
-    state.now = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    found = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    # As rare in the catalogue's share of the level as it is in this doubt's.
+    rare = by_chance * CATALOGUE_SHARE / REDNESS_SHARE
+    state.now = replace(found, p_value=max(found.p_value, rare))
     state.first = state.now if not state.steps else state.first
 
 

@@ -13,9 +13,10 @@ from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, more_leads
 from pendpipe.diagnose.evidence import MISSHAPEN
-from pendpipe.diagnose.faults import CATALOGUE_SHARE, Forensics
+from pendpipe.diagnose.faults import Forensics
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.large_first import large_first
+from pendpipe.diagnose.level import CATALOGUE_SHARE
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.one_curve import prefer_one_curve
@@ -189,7 +190,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     effects = task.scanned(state)
     assert state.now is not None
     if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
-        doubt_redness(state, effects, threshold, task.seed, progress)
+        doubt_redness(state, effects, task.level, task.seed, progress)
     if state.now.p_value > threshold or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pendpipe.diagnose.detect import detect, prepare
-from pendpipe.diagnose.faults import CATALOGUE_SHARE, Forensics
+from pendpipe.diagnose.faults import Forensics
 from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.level import CATALOGUE_SHARE
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.state import State

@@ -28,9 +28,9 @@ from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
-_NONE: Final = 1.0
+_NONE: Final = 0.0
 """Evidence (in chi^2) that it is none of the class's, where the model leaves nothing; with what
-`_misfit` adds, one lone name in twelve is wrong, as on opened challenges."""
+`_misfit` adds, one lone name in eight is wrong, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
 _FAR: Final = 100.0

@@ -58,8 +58,9 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     residual, used = residual_of(data, fit), data.weight > 0.0
     local, smeared = _errors(data, fit, noise, residual, ~used)
     error = own_error(local)
-    count = int(np.count_nonzero(used))
-    p_value, tail = _smallest(np.sort(error[used])), _others(np.sort(error[used]))
+    count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
+    ordered = np.sort(error[used])
+    p_value, tail = _smallest(ordered, step), _others(ordered, step)
     mask = np.zeros(len(data), dtype=bool)
     size = np.zeros(len(data))
     for _ in range(_ROUNDS):
@@ -79,7 +80,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
         mask &= ~ends
-        p_value = _smallest(np.sort(error[used & ~ends]))
+        p_value = _smallest(np.sort(error[used & ~ends]), step)
     if not mask.any() or p_value > _EXPECTED:
         quiet = "no reading stands out of the noise"
         return Finding("glitches", max(p_value, _EXPECTED), summary=quiet)
@@ -113,8 +114,9 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     single &= ~bent_ends(values - local.left, local.scaled, single, used)
     if not single.any():
         return nothing("glitches")
-    error = np.abs(local.scaled)[used & (single | ~mask)]
-    p_value, tail = _smallest(np.sort(error)), _others(np.sort(error))
+    ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
+    step = _rounding_in(data, local.rms)
+    p_value, tail = _smallest(ordered, step), _others(ordered, step)
     return _described(data, fit, values, local.scaled, single, p_value, tail)
 
 
@@ -199,13 +201,20 @@ def _largest_about(error: FloatArray) -> FloatArray:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1).max(axis=1))
 
 
-def _smallest(sorted_error: FloatArray) -> float:
+def _rounding_in(data: Data, error_rms: float) -> float:
+    """The readings' step in standard deviations of an error; means of readings round less."""
+    return data.step / math.sqrt(data.fold) / error_rms
+
+
+def _smallest(sorted_error: FloatArray, step: float) -> float:
     """The p-value over all numbers of glitches."""
     count = len(sorted_error)
     numbers = [k for k in _NUMBERS if k <= count // 30]
     best = 1.0
     for k in numbers:
-        tail = fit_tail(sorted_error, k)
+        if sorted_error[count - k] < _LARGE:
+            break  # so many are no larger than noise is
+        tail = fit_tail(sorted_error, k, step=step)
         chance = float(tail.beyond(sorted_error[count - k]))
         p_value = binomial_at_least(k, count, min(chance, 1.0))
         share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
@@ -213,10 +222,11 @@ def _smallest(sorted_error: FloatArray) -> float:
     return best
 
 
-def _others(sorted_error: FloatArray) -> Tail:
+def _others(sorted_error: FloatArray, step: float) -> Tail:
     """The noise's tail where the largest errors are glitches."""
     foreign = int(np.count_nonzero(sorted_error > _SURELY))
-    return fit_tail(sorted_error, min(max(foreign, 1), len(sorted_error) // 10), foreign=True)
+    most = min(max(foreign, 1), len(sorted_error) // 10)
+    return fit_tail(sorted_error, most, foreign=True, step=step)
 
 
 def _described(
