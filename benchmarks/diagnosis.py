@@ -38,6 +38,8 @@ PAIRS: Final = (
     ("quadratic-stiffness", "offset-drift"), ("sensor-cubic", "circular-error"),
     ("equilibrium-step", "second-mode"), ("sensor-quadratic", "impulse"),
 )  # fmt: skip
+BESIDE: Final = "pair-beside"
+"""Pairs of which each is worth its Delta chi^2 with the other one in the model."""
 
 
 class Case(NamedTuple):
@@ -70,6 +72,7 @@ def cases(part: float, nulls: int | None = None) -> Iterator[Case]:
     for number in numbers(20):
         for pair in PAIRS:
             yield Case("pair", pair, 400.0, number)
+            yield Case(BESIDE, pair, 400.0, number)
         for name in outside_names():
             yield Case("outside", (name,), 200.0, number)
 
@@ -84,8 +87,9 @@ def made(case: Case) -> Any:
         return make_null(random)
     if case.family == "single":
         return make_single(random, case.names[0], case.size, oracle=True)
-    if case.family == "pair":
-        return make_pair(random, *case.names, (case.size, case.size))
+    if case.family in ("pair", BESIDE):
+        sizes, beside = (case.size, case.size), case.family == BESIDE
+        return make_pair(random, *case.names, sizes, marginal=beside)
     return make_outside(random, case.names[0], case.size)
 
 

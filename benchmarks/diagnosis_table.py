@@ -206,25 +206,37 @@ def _mean(values: Sequence[int]) -> str:
 
 
 def _pairs(done: Sequence[Outcome]) -> str:
-    pairs = _of(done, "pair")
-    if not pairs:
+    """Pairs sized alone, where one may hide the other, and sized beside each other."""
+    alone, beside = _of(done, "pair"), _of(done, "pair-beside")
+    if not alone or not beside:
         return ""
-    plain = [entry for entry in pairs if min(entry["marginal"]) > MASKED]
-    rows = ["| pair | both found | of those that can be told | one found |", "|---|---|---|---|"]
-    for names in sorted({tuple(entry["names"]) for entry in pairs}):
-        part = [entry for entry in pairs if tuple(entry["names"]) == names]
-        told = [entry for entry in part if entry in plain]
-        some = sum(_count_right(entry) == 1 for entry in part)
+    plain = [entry for entry in alone if min(entry["marginal"]) > MASKED]
+    rows = [
+        "| pair | both found, 400 each beside the other | one found | both found, 400 each alone"
+        " | of those that can be told |",
+        "|---|---|---|---|---|",
+    ]
+    for names in sorted({tuple(entry["names"]) for entry in (*alone, *beside)}):
+        part, told, other = (
+            [entry for entry in pairs if tuple(entry["names"]) == names]
+            for pairs in (alone, plain, beside)
+        )
+        some = sum(_count_right(entry) == 1 for entry in other)
         rows.append(
-            f"| {' + '.join(names)} | {sum(map(_both, part))}/{len(part)}"
-            f" | {sum(map(_both, told))}/{len(told)} | {some} |"
+            f"| {' + '.join(names)} | {_of_both(other)} | {some} | {_of_both(part)}"
+            f" | {_of_both(told)} |"
         )
     return (
-        f"**Two effects at once** (400 each): both found in"
-        f" {share(sum(map(_both, pairs)), len(pairs))}. Some cancel each other: of the pairs in"
-        f" which each adds more than {MASKED:g} to the other for the oracle,"
+        "**Two effects at once**, each of which adds 400 to the other: both found in"
+        f" {share(sum(map(_both, beside)), len(beside))}. Where each is worth 400 alone one may"
+        f" hide the other: {share(sum(map(_both, alone)), len(alone))}; of those in which each"
+        f" adds more than {MASKED:g} to the other for the oracle,"
         f" {share(sum(map(_both, plain)), len(plain))}.\n\n" + "\n".join(rows)
     )
+
+
+def _of_both(pairs: Sequence[Outcome]) -> str:
+    return f"{sum(map(_both, pairs))}/{len(pairs)}"
 
 
 def _count_right(entry: Outcome) -> int:

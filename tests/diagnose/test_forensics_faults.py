@@ -8,18 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import gather
+from pendpipe.diagnose.faults import Forensics
 from pendpipe.diagnose.forensics import TESTS, Finding, find_lost_samples
 from pendpipe.diagnose.forensics.glitches import find_in_misfit
+from pendpipe.diagnose.forensics.lost_samples import LostSamples
 from pendpipe.diagnose.noise import white_noise
+from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.state import State
 from pendpipe.effects.cubic_stiffness import CubicStiffness
 from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
 
 from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
 from .examine import examine
 from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
+from .records import null_fit
 
 FOUND = 1e-3
 
@@ -311,3 +318,17 @@ def test_glitches_need_no_model(clean: FloatArray) -> None:
         found_at = [] if finding.mask is None else np.flatnonzero(finding.mask).tolist()
         assert found_at == expected
         assert (finding.p_value < 1e-3) == bool(expected)
+
+
+def test_lost_samples_that_no_motion_could_follow_are_not_mended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Behind a loss that outlasts the motion there is none to compare: the record stays."""
+    fit, data, noise = null_fit()
+    late = LostSamples(float(data.time_s[-20]), 10**9, 1e9, 1.0)
+    monkeypatch.setattr("pendpipe.diagnose.faults.find_lost_samples", lambda *_: [late])
+    state = State(fit, data, noise, [], fit.value, fit.value)
+    samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
+    Forensics(samples, 0.01).before(state, silent)
+    assert np.array_equal(state.data.time_s, data.time_s)
+    assert "dropped-samples" not in [fault.finding.identifier for fault in state.faults]

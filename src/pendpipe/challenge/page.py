@@ -163,13 +163,20 @@ def _families(scores: Score) -> Iterator[str]:
             elif key == "named":
                 yield f"- first names: {_counts(value)}"
         yield ""
-    if scores["real"]["by_change"]:
-        yield "| real recording | concealed | named | named without it |"
-        yield "|---|---|---|---|"
-        for entry in scores["real"]["by_change"].values():
-            told = ["yes" if entry[key] else "no" for key in ("named", "twin_named")]
-            yield f"| {entry['source']} | {entry['effect']} | {told[0]} | {told[1]} |"
-        yield ""
+    yield from _changes(list(scores["real"]["by_change"].values()))
+
+
+def _changes(entries: list[Score]) -> Iterator[str]:
+    """What was concealed in real recordings, each recording and change once."""
+    if not entries:
+        return
+    yield "| real recording | concealed | how often | named | named without it |"
+    yield "|---|---|---|---|---|"
+    for source, effect in sorted({(entry["source"], entry["effect"]) for entry in entries}):
+        same = [e for e in entries if (e["source"], e["effect"]) == (source, effect)]
+        named, without = (sum(bool(e[key]) for e in same) for key in ("named", "twin_named"))
+        yield f"| {source} | {effect} | {len(same)} | {named} | {without} |"
+    yield ""
 
 
 def _missed(scores: Score) -> Iterator[str]:

@@ -43,6 +43,8 @@ def why(scores: Score) -> Iterator[str]:
 
 def _reasons(scores: Score) -> Iterator[str]:
     """What physics says of the causes that occurred, each once."""
+    if not any(each["reasons"] for each in scores["causes"].values()):
+        return
     yield "### What physics says of these causes"
     yield ""
     yield "Reasons are kept in `src/pendpipe/challenge/reasons.toml`; only those whose cause"
@@ -103,3 +105,7 @@ def _bins(bins: list[Score]) -> Iterator[str]:
             f" {row['error']:.3f} | {families} | {kind}: {culprits} |"
         )
     yield ""
+    if not any(row["boasts"] for row in bins):
+        yield "More came true than was stated, in each of these: what the readings say for a name"
+        yield "and against its rivals was discounted too far."
+        yield ""

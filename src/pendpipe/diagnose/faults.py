@@ -23,6 +23,7 @@ from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import Fault, State, is_gross
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 
 _BEFORE: Final = ("clipping", "glitches")
@@ -136,7 +137,10 @@ class Forensics:
             time[data.time_s >= each.time_s - 1e-9] += each.number * interval
         mended = replace(data, time_s=time, uniform=False)
         model = state.fit.model.at_times(time)
-        fit = refine(model, mended, state.noise, state.fit.value, held=state.holding)
+        try:
+            fit = refine(model, mended, state.noise, state.fit.value, held=state.holding)
+        except NoMotionError:
+            return  # so much later the pendulum of this model has come to rest
         if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
             return
         progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
