@@ -40,7 +40,7 @@ def _head(scores: Score) -> Iterator[str]:
     yield ""
     yield "A fresh set from a seed drawn at run time:"
     yield ""
-    yield "    make proof SET=fresh"
+    yield f"    make proof SET=fresh ITEMS={scores['set']['count']}"
     yield ""
     yield "| | |"
     yield "|---|---|"
