@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from benchmarks.diagnosis_table import BESIDE, table
 from pendpipe.challenge.workers import workers
 
 JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
@@ -38,8 +39,6 @@ PAIRS: Final = (
     ("quadratic-stiffness", "offset-drift"), ("sensor-cubic", "circular-error"),
     ("equilibrium-step", "second-mode"), ("sensor-quadratic", "impulse"),
 )  # fmt: skip
-BESIDE: Final = "pair-beside"
-"""Pairs of which each is worth its Delta chi^2 with the other one in the model."""
 
 
 class Case(NamedTuple):
@@ -216,7 +215,6 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--table", action="store_true", help="write the table of what there is")
     arguments = parser.parse_args()
-    from benchmarks.diagnosis_table import table
 
     if arguments.table:
         lines = JOURNAL.read_text(encoding="utf-8").splitlines()

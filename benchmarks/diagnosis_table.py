@@ -9,6 +9,8 @@ from typing import Any
 Outcome = dict[str, Any]
 MASKED = 50.0
 """Delta chi^2 of one of a pair with the other in the model, below which it is hidden by it."""
+BESIDE = "pair-beside"
+"""The family of pairs of which each is worth its Delta chi^2 with the other one in the model."""
 
 
 def share(hits: int, count: int) -> str:
@@ -207,7 +209,7 @@ def _mean(values: Sequence[int]) -> str:
 
 def _pairs(done: Sequence[Outcome]) -> str:
     """Pairs sized alone, where one may hide the other, and sized beside each other."""
-    alone, beside = _of(done, "pair"), _of(done, "pair-beside")
+    alone, beside = _of(done, "pair"), _of(done, BESIDE)
     if not alone or not beside:
         return ""
     plain = [entry for entry in alone if min(entry["marginal"]) > MASKED]

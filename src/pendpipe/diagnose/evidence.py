@@ -28,8 +28,8 @@ MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
 term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
 _UNSURE: Final = 1.5
-"""By how much wider than `form_spread` differences of evidence scatter: on opened challenges
-(1141 first names), four sevenths of the log odds came true."""
+"""By how much wider than `form_spread` differences of evidence scatter: on opened challenges,
+four sevenths of the log odds came true."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 

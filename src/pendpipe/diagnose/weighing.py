@@ -28,9 +28,9 @@ from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
-_NONE: Final = 0.0
-"""Evidence (in chi^2) that it is none of the class's, where the model leaves nothing; with what
-`_misfit` adds, one lone name in eight is wrong, as on opened challenges."""
+_CLEAN: Final = 4.0
+"""What a model that leaves nothing takes off the evidence (in chi^2) that it is none of the
+class's: one lone name in eight is wrong then, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
 _FAR: Final = 100.0
@@ -77,7 +77,7 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     ]  # fmt: skip
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # What every pendulum has is likelier than its rivals beforehand, and than none of them.
-    none = own.evidence - max(own.prior, 0.0) - _NONE - _misfit(found)
+    none = own.evidence - max(own.prior, 0.0) - _misfit(found)
     weights = probabilities([own, *mates], none)
     if not stands_apart(effect, found.improved):
         weights = weights * _explained(found, effect, gain)
@@ -144,7 +144,7 @@ def fault_named(found: Search, fault: Fault) -> Named:
 
     finding = fault.finding
     effect = by_identifier(finding.identifier)
-    doubt = math.exp(-0.5 * (_NONE + _misfit(found)))
+    doubt = math.exp(-0.5 * _misfit(found))
     # What would have given the very same codes is as likely.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _OF_THE_REST:
@@ -159,7 +159,7 @@ def fault_named(found: Search, fault: Fault) -> Named:
 
 def _misfit(found: Search) -> float:
     """How much of the doubt a model that leaves nothing takes away."""
-    return 4.0 if found.unexplained > 0.01 else 0.0
+    return _CLEAN if found.unexplained > 0.01 else 0.0
 
 
 def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
