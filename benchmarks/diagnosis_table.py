@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
-Outcome = dict[str, Any]
+from benchmarks.diagnosis_detection import detection
+from benchmarks.diagnosis_outcome import (
+    Outcome,
+    classes,
+    first,
+    found,
+    in_class,
+    of,
+    oracle_first,
+    oracle_found,
+    share,
+)
+
 MASKED = 50.0
 """Delta chi^2 of one of a pair with the other in the model, below which it is hidden by it."""
 BESIDE = "pair-beside"
 """The family of pairs of which each is worth its Delta chi^2 with the other one in the model."""
-
-
-def share(hits: int, count: int) -> str:
-    """A rate with its 95 % interval (Clopper and Pearson)."""
-    if count == 0:
-        return "-"
-    from scipy.stats import binomtest
-
-    low, high = binomtest(hits, count).proportion_ci(0.95, "exact")
-    return f"{hits}/{count} = {100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -36,7 +37,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
     ]
     parts = [
         _nulls(done),
-        _detection(done),
+        detection(done),
         _naming(done),
         _pairs(done),
         _outside(done),
@@ -45,17 +46,8 @@ def table(outcomes: Sequence[Outcome]) -> str:
     return "\n\n".join([*head, *(part for part in parts if part)])
 
 
-def _of(done: Sequence[Outcome], family: str) -> list[Outcome]:
-    return [entry for entry in done if entry["family"] == family]
-
-
-def _named(entry: Outcome) -> list[list[str]]:
-    """The class of each effect that was reported, the leader first."""
-    return [[name, *rest] for name, _, rest in entry["effects"]]
-
-
 def _nulls(done: Sequence[Outcome]) -> str:
-    nulls = _of(done, "null")
+    nulls = of(done, "null")
     alarms = [entry for entry in nulls if entry["effects"]]
     counts = Counter(entry["effects"][0][0] for entry in alarms)
     names = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
@@ -64,93 +56,30 @@ def _nulls(done: Sequence[Outcome]) -> str:
     )
 
 
-def _detection(done: Sequence[Outcome]) -> str:
-    singles = _of(done, "single")
-    rows = ["| Delta chi^2 | detected | oracle | class right | oracle | first | oracle |",
-            "|---|---|---|---|---|---|---|"]  # fmt: skip
-    for size in sorted({entry["size"] for entry in singles}):
-        part = [entry for entry in singles if entry["size"] == size]
-        tests = (_found, _oracle_found, _class, _oracle_class, _first, _oracle_first)
-        counts = [sum(test(entry) for entry in part) for test in tests]
-        cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
-        rows.append(f"| {size:g} ({len(part)}) | {cells} |")
-    if not singles:
-        return ""
-    return "**Single effects**\n\n" + "\n".join(rows) + "\n\n" + _reached(singles)
-
-
-def _reached(singles: Sequence[Outcome]) -> str:
-    """Delta chi^2 at which half and nine tenths of the effects are detected, and the oracle's."""
-    import numpy as np
-
-    from pendpipe.challenge.intervals import power_ratio
-
-    sizes = np.array([entry["size"] for entry in singles])
-    ours, best = (
-        np.array([float(test(entry)) for entry in singles]) for test in (_found, _oracle_found)
-    )
-    found = power_ratio(sizes, ours, best)
-    said = []
-    for key, words in (("half", "Half"), ("nine_tenths", "Nine tenths")):
-        one = found[key]
-        low, high = one["interval95"]
-        said.append(
-            f"{words} are detected at {one['found']:.3g}, by the oracle at {one['oracle']:.3g}:"
-            f" {one['ratio']:.2f} times ({low:.2f} to {high:.2f})."
-        )
-    return " ".join(said)
-
-
-def _found(entry: Outcome) -> bool:
-    return bool(entry["effects"])
-
-
-def _oracle_found(entry: Outcome) -> bool:
-    return bool(entry["oracle"]["detected"])
-
-
-def _class(entry: Outcome) -> bool:
-    right = set(entry["right"][0])
-    return any(right & set(names) for names in _named(entry)[:1])
-
-
-def _first(entry: Outcome) -> bool:
-    return bool(entry["effects"]) and entry["effects"][0][0] in entry["right"][0]
-
-
-def _oracle_class(entry: Outcome) -> bool:
-    right = set(entry["right"][0])
-    return _oracle_found(entry) and bool(right & set(entry["oracle"]["class"] or []))
-
-
-def _oracle_first(entry: Outcome) -> bool:
-    return _oracle_found(entry) and entry["oracle"]["named"] in entry["right"][0]
-
-
 def _naming(done: Sequence[Outcome]) -> str:
-    singles = [entry for entry in _of(done, "single") if entry["size"] == 100.0]
+    singles = [entry for entry in of(done, "single") if entry["size"] == 100.0]
     if not singles:
         return ""
     rows = ["| effect | detected | class right | first | class size | oracle's | named instead |",
             "|---|---|---|---|---|---|---|"]  # fmt: skip
     for name in sorted({entry["names"][0] for entry in singles}):
         part = [entry for entry in singles if entry["names"][0] == name]
-        sizes = [len(_named(entry)[0]) for entry in part if entry["effects"]]
-        oracle = [len(entry["oracle"]["class"] or []) for entry in part if _oracle_found(entry)]
+        sizes = [len(classes(entry)[0]) for entry in part if entry["effects"]]
+        oracle = [len(entry["oracle"]["class"] or []) for entry in part if oracle_found(entry)]
         wrong = sorted({entry["effects"][0][0] for entry in part
-                        if entry["effects"] and not _class(entry)})  # fmt: skip
+                        if entry["effects"] and not in_class(entry)})  # fmt: skip
         rows.append(
-            f"| {name} | {sum(map(_found, part))}/{len(part)} | {sum(map(_class, part))}"
-            f" | {sum(map(_first, part))} | {_mean(sizes)} | {_mean(oracle)} | {', '.join(wrong)} |"
+            f"| {name} | {sum(map(found, part))}/{len(part)} | {sum(map(in_class, part))}"
+            f" | {sum(map(first, part))} | {_mean(sizes)} | {_mean(oracle)} | {', '.join(wrong)} |"
         )
-    sizes = [len(_named(entry)[0]) for entry in singles if entry["effects"]]
-    oracle = [len(entry["oracle"]["class"] or []) for entry in singles if _oracle_found(entry)]
+    sizes = [len(classes(entry)[0]) for entry in singles if entry["effects"]]
+    oracle = [len(entry["oracle"]["class"] or []) for entry in singles if oracle_found(entry)]
     return (
         "**Naming at Delta chi^2 = 100**: the class holds the true effect in"
-        f" {share(sum(map(_class, singles)), len(singles))}, it comes first in"
-        f" {share(sum(map(_first, singles)), len(singles))} (the oracle:"
-        f" {sum(map(_oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
-        f" {_mean(oracle)}. {_coverage(singles, _of(done, 'single'))}\n\n" + "\n".join(rows)
+        f" {share(sum(map(in_class, singles)), len(singles))}, it comes first in"
+        f" {share(sum(map(first, singles)), len(singles))} (the oracle:"
+        f" {sum(map(oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
+        f" {_mean(oracle)}. {_coverage(singles, of(done, 'single'))}\n\n" + "\n".join(rows)
     )
 
 
@@ -209,7 +138,7 @@ def _mean(values: Sequence[int]) -> str:
 
 def _pairs(done: Sequence[Outcome]) -> str:
     """Pairs sized alone, where one may hide the other, and sized beside each other."""
-    alone, beside = _of(done, "pair"), _of(done, BESIDE)
+    alone, beside = of(done, "pair"), of(done, BESIDE)
     if not alone or not beside:
         return ""
     plain = [entry for entry in alone if min(entry["marginal"]) > MASKED]
@@ -242,7 +171,7 @@ def _of_both(pairs: Sequence[Outcome]) -> str:
 
 
 def _count_right(entry: Outcome) -> int:
-    named = [set(names) for names in _named(entry)]
+    named = [set(names) for names in classes(entry)]
     return sum(any(set(right) & names for names in named) for right in entry["right"])
 
 
@@ -251,7 +180,7 @@ def _both(entry: Outcome) -> bool:
 
 
 def _outside(done: Sequence[Outcome]) -> str:
-    outside = _of(done, "outside")
+    outside = of(done, "outside")
     if not outside:
         return ""
     unnamed = [entry for entry in outside

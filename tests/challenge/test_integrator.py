@@ -116,6 +116,18 @@ def test_viscous_decay_is_the_closed_form() -> None:
     assert np.abs(track.angle_rad - exact).max() < 2e-7 * AMPLITUDE
 
 
+def test_a_sample_may_follow_a_turning_point_at_once() -> None:
+    """However short the rest of a step is: it is still a step."""
+    swing = Motion({"omega": 3.0}, 0.2)
+    times = np.array([0.0, 0.4, np.pi / 3.0 + 1e-6, 1.7])
+    there = swing.run(times)
+    turns_s = times[2] + there.rate_rad_s[2] / (9.0 * there.angle_rad[2])
+    for late in (0.0, 2e-16, 5e-16, 1e-15, 1e-14, 1e-13, 1e-12):
+        times[2] = turns_s + late
+        found = swing.run(times).angle_rad
+        np.testing.assert_allclose(found, 0.2 * np.cos(3.0 * times), rtol=0.0, atol=1e-8)
+
+
 def test_error_falls_with_the_eighth_power_of_the_step() -> None:
     motion = Motion({"omega": 1.0, "gamma": 0.05}, 1.0)
     reference = motion.run(np.arange(0.0, 30.001, 0.025)).angle_rad[-1]

@@ -1,4 +1,4 @@
-"""Cosines, erf and bounded least squares, against scipy, which costs more to import."""
+"""Cosines, erfcx and bounded least squares, against scipy, which costs more to import."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from pendpipe.diagnose.bounded import bounded_least_squares
 from pendpipe.diagnose.cosines import cosines, from_cosines
-from pendpipe.effects.complex_erf import erf
+from pendpipe.effects.complex_erfcx import erfcx
 
 
 @given(st.integers(1, 300), st.integers(0, 2**32 - 1))
@@ -25,7 +25,7 @@ def test_cosines_of_any_number_of_readings(count: int, seed: int) -> None:
 @given(st.floats(0.0, 0.05), st.floats(0.1, 20.0), st.floats(0.0, 300.0))
 def test_the_error_function_of_a_dying_oscillation(decay: float, omega: float, time: float) -> None:
     z = np.sqrt(np.array([(-decay + 1j * omega) * time]))
-    np.testing.assert_allclose(erf(z), special.erf(z), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(erfcx(z), special.erfcx(z), rtol=1e-10, atol=1e-10)
 
 
 @given(st.integers(1, 9), st.integers(0, 2**32 - 1))

@@ -28,7 +28,7 @@ VALUES: dict[str, tuple[float, ...]] = {
     "presliding-friction": (1e-3, 0.02),
     "backlash": (1e-3,),
     "history-force": (0.01,),
-    "vortex-shedding": (0.01, 0.1),
+    "vortex-shedding": (0.01, 0.1, 0.6),
     "second-mode": (1e-3, 2e-3, 4.3, 3.0),
     "plane-coupling": (1e-3, 5e-4, 0.02),
     "periodic-drive": (5e-4, 3e-4, 1.2),

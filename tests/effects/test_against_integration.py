@@ -61,7 +61,13 @@ CASES: dict[str, tuple[tuple[float, ...], Any, dict[str, Any]]] = {
         (2e-3, 0.1), lambda t, x, v, s, turn: -2e-3 * s * math.exp(-((v / 0.1) ** 2)), {},
     ),
     "vortex-shedding": (
-        (0.05, 0.11), lambda t, x, v, s, turn: -0.1 * max(0.0, 1.0 - 0.11 / abs(turn)) * v, {},
+        (0.05, 0.11, 1.0),
+        lambda t, x, v, s, turn: (
+            -0.05 * OMEGA * math.pi * 2.0 / (1.0 + math.exp(-math.pi)) * s
+            * max(0.0, abs(turn) - 0.11)
+            * math.exp(-math.atan2(abs(v) / OMEGA, math.copysign(x, x * turn)))
+        ),
+        {},
     ),
     "periodic-drive": (
         (0.02, 0.01, 1.3),

@@ -7,7 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from pendpipe.effects.baseline import TIME as TIME_S
+from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 from pendpipe.effects.scan import STRAIGHT_S
 
 from .lock_in import lock_in
@@ -142,6 +145,49 @@ def test_history_starts_from_rest() -> None:
     assert effect > 0.05 * start
     assert np.max(np.abs(exact - expected)) < 0.01 * effect
     assert np.max(np.abs(found - expected)) < 0.1 * effect
+
+
+@pytest.mark.parametrize(
+    ("identifier", "values"),
+    [
+        ("history-force", (0.05,)),
+        ("equilibrium-creep", (1e-3, 0.5, 0.0)),
+        ("frequency-drift", (1e-4, 5.0)),
+    ],
+)
+def test_what_begins_with_the_release_knows_when_that_was(
+    identifier: str, values: tuple[float, ...]
+) -> None:
+    """The clock of a fit starts at a virtual turning point half a cycle before."""
+    time = times(20.0, 0.03)
+    effect = (by_identifier(identifier),)
+    let_go = Model(time, 0.03, effect).evaluate(np.append(baseline(), values)).reading
+    earlier = baseline(start=-0.15)
+    earlier[TIME_S] = -math.pi / OMEGA
+    for late in (-1e-3, 1e-3):
+        first_s = late / OMEGA
+        found = Model(time, 0.03, effect, first_s=first_s).evaluate(np.append(earlier, values))
+        error = np.max(np.abs(found.reading - let_go))
+        assert error < 0.06 * np.max(np.abs(let_go - plain(baseline(), time)))
+
+
+def test_the_memory_of_the_release_fades_though_dry_friction_stops_the_pendulum() -> None:
+    """Half the derivative, from the readings themselves: (1/sqrt pi) int a(s)/sqrt(t - s) ds."""
+    base = baseline(c=2e-3, b=0.01)
+    step = 2e-3
+    time = times(35.0, step)
+    motion = evaluated("history-force", (1e-9,), base, time)
+    nodes = motion.tangent.motion
+    found = by_identifier("history-force").acceleration(nodes, pendulum_of(base), np.ones(1))
+    velocity = motion.sampled.velocity
+    ago = np.sqrt(np.arange(len(time) + 1) * step)
+    for row in (1, 12, 40):
+        for node in (3, 8, 12):
+            last = int(nodes.time_s[row, node] / step)
+            gained = np.diff(velocity[: last + 1]) / step
+            exact = 2.0 / math.sqrt(math.pi) * gained[::-1] @ np.diff(ago[: last + 1])
+            size = math.sqrt(OMEGA) * OMEGA * float(nodes.amplitude[row, node])
+            assert abs(-found[row, node] - exact) < 0.03 * size
 
 
 def test_broadband_drive_has_no_template() -> None:

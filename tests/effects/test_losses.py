@@ -107,10 +107,20 @@ def test_presliding_loses_in_a_cycle_what_its_loop_encloses() -> None:
 def test_vortices_are_shed_above_an_amplitude_only() -> None:
     """dy/dt = -k (y - y_c) above y_c, nothing below."""
     k, y_c = 0.01, 0.2
-    for amplitude, rate in fall_rates("vortex-shedding", (k, y_c), 0.3):
+    for amplitude, rate in fall_rates("vortex-shedding", (k, y_c, 0.5), 0.3):
         assert rate == pytest.approx(k * max(amplitude - y_c, 0.0), rel=0.01, abs=1e-7)
-    below = reading("vortex-shedding", (k, 0.2), baseline(start=0.15, b=0.01), TIME)
+    below = reading("vortex-shedding", (k, 0.2, 0.5), baseline(start=0.15, b=0.01), TIME)
     np.testing.assert_allclose(below, plain(baseline(start=0.15, b=0.01), TIME), 0.0, 1e-9)
+
+
+@pytest.mark.parametrize("phi", [0.3, 0.8, 2.0])
+def test_a_burst_after_the_reversal_slows_the_pendulum(phi: float) -> None:
+    """The frequency falls by k (1 - y_c/y)/phi: the shorter the burst, the more it is a spring."""
+    k, y_c, amplitude = 1e-4, 0.1, 0.3
+    found = reading("vortex-shedding", (k, y_c, phi), baseline(start=amplitude), TIME)
+    window = lock_in(TIME, found, OMEGA, 0.0, 9.0)
+    expected = -k * (1.0 - y_c / amplitude) / phi
+    assert window.angular_frequency - OMEGA == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -212,7 +212,7 @@ def follow(
                 if sign == 0.0:
                     t = limit
                 else:
-                    h = left / math.ceil(left / longest_step(p, s) - 1e-9)
+                    h = left / max(math.ceil(left / longest_step(p, s) - 1e-9), 1)
                     step(p, s, new, k, work, t, h, sign, region, extra, turn, turned_at, states)
                     kind, edge = 0, 0.0
                     if p.play != 0.0:

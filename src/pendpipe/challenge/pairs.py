@@ -21,8 +21,8 @@ OWN_LEVEL = 13.0
 
 def make_pair(
     random: np.random.Generator, first: str, second: str, delta_chi2: tuple[float, float], *,
-    cancelling: bool = False, marginal: bool = False, oracle: bool = True,
-    **scenario_options: Any,
+    cancelling: bool = False, marginal: bool = False, own_form: bool | None = None,
+    oracle: bool = True, **scenario_options: Any,
 ) -> Item:  # fmt: skip
     """Hide two effects at once.
 
@@ -36,9 +36,11 @@ def make_pair(
         Give the second effect the sign that hides the first, where it has a sign.
     marginal
         Size each by its marginal Delta chi^2 instead (approximately).
+    own_form
+        Ask for laws that are (or are not) the catalogue's own.
     """
     for _ in range(TRIES):
-        found = _draw(random, first, second, delta_chi2, easier(scenario_options))
+        found = _draw(random, first, second, delta_chi2, own_form, easier(scenario_options))
         if found is None:
             continue
         prepared, a, b, inner = found
@@ -73,7 +75,7 @@ def make_pair(
 
 def _draw(
     random: np.random.Generator, first: str, second: str, wanted: tuple[float, float],
-    options: dict[str, Any],
+    own_form: bool | None, options: dict[str, Any],
 ) -> tuple[Scenario, Sized, Sized, float] | None:  # fmt: skip
     """Size each alone on the same pendulum.
 
@@ -83,8 +85,8 @@ def _draw(
         What both need, each at its strength, and the inner product of what they leave.
     """
     drawn: Scenario = draw_scenario(random, **options)
-    one = hide(random, first, drawn)
-    two = hide(random, second, one.prepared)
+    one = hide(random, first, drawn, own_form=own_form)
+    two = hide(random, second, one.prepared, own_form=own_form)
     # What the second needs (a release from rest, say) holds for the first as well.
     one = replace(one, prepared=two.prepared)
     if one.moves and two.moves:

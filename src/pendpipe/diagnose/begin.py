@@ -98,7 +98,10 @@ def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
 def _before_the_stop(data: Data, value: FloatArray, order: int) -> tuple[Data, Model]:
     """Leave readings at the end out until the start values move the pendulum to the last."""
     while True:
-        model = Model(data.time_s, data.interval_s, order=order, fold=data.fold)
+        model = Model(
+            data.time_s, data.interval_s, order=order, fold=data.fold,
+            first_s=float(data.time_s[0]),
+        )  # fmt: skip
         try:
             model.evaluate(value)
         except NoMotionError:

@@ -15,7 +15,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, form_spread, ranked
+from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.review import stands_apart
@@ -29,6 +29,9 @@ from pendpipe.effects.curves import CURVES
 BETTER: Final = 22.0
 """By how much (in chi^2, two a free value counted) two names must be better than one curve: each
 is one of some forty (2 ln 40 = 7.4), and to need two at once is as rare."""
+_KNOTS: Final = 0.005
+"""Part of a curve's gain that it may miss between its knots: of laws that are in no catalogue
+the best curve missed a quarter of that at most (opened challenges)."""
 _PART: Final = 0.5
 """Of its gain beside other names: what something sudden must keep beside a curve."""
 _EACH: Final = 2.0
@@ -68,7 +71,7 @@ def _prefer(state: State, kept: Sequence[Step], progress: Progress) -> None:
         return
     rivals = ranked([_rival(bare, fit) for fit in fits])
     best = rivals[0]
-    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, form_spread(best)):
+    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, _KNOTS * best.gain):
         return
     sudden = [step for step in names if _lasts(step, best.fit, state)]
     if sudden:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pendpipe.effects.curve import AmplitudeCurve, Curve
 from pendpipe.effects.curves import FrictionCurve, usual_loss_rate
+from pendpipe.effects.scan import phase_since_reversal
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -48,8 +49,7 @@ class MemoryCurve(FrictionCurve):
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -g(r (1 - cos psi)) sgn(v), psi from the last turning point."""
-        phase = np.mod(motion.clock.psi, np.pi)
-        phase[:, -1] = np.pi
+        phase = phase_since_reversal(motion)
         way = motion.amplitude * (1.0 - np.cos(phase))
         return np.asarray(-motion.direction * self.scale(pendulum) * self.curve(values, way))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.curve import AmplitudeCurve, Curve
+from pendpipe.effects.scan import phase_since_reversal
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -113,8 +114,7 @@ class ProfileCurve(Curve):
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -r h(psi) sgn(v)."""
-        phase = np.mod(motion.clock.psi, np.pi)
-        phase[:, -1] = np.pi
+        phase = phase_since_reversal(motion)
         profile = self.scale(pendulum) * self.curve(values, phase)
         return np.asarray(-motion.direction * motion.amplitude * profile)
 

@@ -12,7 +12,7 @@ from pendpipe.effects.scan import (
     relaxation_times,
     relaxed,
     rows,
-    since_start,
+    since_release,
     unusual_drift,
 )
 
@@ -34,7 +34,7 @@ class FrequencyDrift(Effect):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 eps tau (1 - e^(-t/tau)) omega^2 x, t from the motion's start."""
         rate, tau = values
-        change = rate * relaxed(since_start(motion), tau)
+        change = rate * relaxed(since_release(motion, pendulum), tau)
         return np.asarray(-2.0 * change * pendulum.angular_frequency**2 * motion.angle)
 
     def improbable(self, values: FloatArray, span: Span) -> float:
@@ -63,7 +63,7 @@ class DampingDrift(Effect):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 gamma(t) v, t from the motion's start."""
         rate, tau = values
-        gamma = rate * relaxed(since_start(motion), tau)
+        gamma = rate * relaxed(since_release(motion, pendulum), tau)
         return np.asarray(-2.0 * gamma * motion.velocity)
 
     def shapes(self, span: Span) -> list[tuple[float]]:
@@ -94,7 +94,7 @@ class EquilibriumCreep(Effect):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return omega^2 x_eq, t from the motion's start."""
         size, tau, exponential = values
-        late = since_start(motion) / tau
+        late = since_release(motion, pendulum) / tau
         crept = (1.0 - exponential) * np.log1p(late) - exponential * np.expm1(-late)
         return np.asarray(size * pendulum.angular_frequency**2 * crept)
 

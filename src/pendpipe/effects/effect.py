@@ -58,6 +58,8 @@ class Pendulum:
         omega, rad/s.
     quadratic, hysteretic, viscous, coulomb
         a in 1/(rad s); the parts b_h and b_v of b in 1/s; c in rad/s.
+    released
+        Half cycles that the motion is followed for before the release.
     """
 
     angular_frequency: float
@@ -65,6 +67,7 @@ class Pendulum:
     hysteretic: float = 0.0
     viscous: float = 0.0
     coulomb: float = 0.0
+    released: int = 0
 
     @property
     def linear(self) -> float:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendpipe.effects.complex_erf import erf
+from pendpipe.effects.complex_erfcx import erfcx
 from pendpipe.effects.effect import Effect, Parameter, Pendulum
-from pendpipe.effects.scan import since_start
+from pendpipe.effects.scan import since_release
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 class HistoryForce(Effect):
     """h times the half derivative of the velocity, from rest at the release.
 
-    The fluid is at rest until the turning point from which the motion starts. For a motion
-    V e^(st) that begins there, the half derivative of v is sqrt(s) erf(sqrt(st)) V e^(st); s,
-    the local rate of decay and phase, changes too slowly in a free decay to matter. What
-    remains long after the release is a viscous friction and an added mass.
+    The fluid is at rest until the turning point at which the pendulum is let go. For a motion
+    V(t) = V(0) e^(st) from there, the half derivative of v is
+    sqrt(s) [V(t) - V(0) erfcx(sqrt(st))], erfcx(z) = e^(z^2) erfc(z); s, the local rate of decay
+    and phase, changes too slowly in a free decay to matter. What remains long after the release
+    is a viscous friction and an added mass.
     """
 
     identifier = "history-force"
@@ -38,13 +39,18 @@ class HistoryForce(Effect):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -h d^(1/2) v/dt^(1/2)."""
         rate = _local_rate(motion)
-        memory = np.sqrt(rate) * erf(np.sqrt(rate * since_start(motion)))
-        # v = Re(V), V = i omega upwards r e^(i psi).
-        velocity = (
-            1j * pendulum.angular_frequency * motion.upwards * motion.amplitude
-            * (motion.clock.cosine + 1j * motion.clock.sine)
-        )  # fmt: skip
-        return np.asarray(-values[0] * np.real(memory * velocity))
+        root = np.sqrt(rate)
+        faded = erfcx(root * np.sqrt(since_release(motion, pendulum)))
+        # x = Re(X), X = upwards r e^(i psi), and V = i omega X.
+        swinging = (
+            motion.upwards * motion.amplitude * (motion.clock.cosine + 1j * motion.clock.sine)
+        )
+        let_go = motion.angle[pendulum.released, 0]
+        half_derivative = np.real(
+            1j * pendulum.angular_frequency * root * (swinging - let_go * faded)
+        )
+        half_derivative[: pendulum.released] = 0.0
+        return np.asarray(-values[0] * half_derivative)
 
 
 def _local_rate(motion: Motion) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:

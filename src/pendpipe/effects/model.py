@@ -25,6 +25,8 @@ from pendpipe.effects.baseline import (
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
 from pendpipe.effects.evaluated import Evaluated, kick_sizes
 
+_LATE: Final = 0.1
+"""Of a half cycle, by which the release may seem to come after the first reading."""
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
 
@@ -47,6 +49,10 @@ class Model:
         How many are followed; None for as many as the readings may need, and some more.
     fold
         How many readings each is the mean of, `interval_s` apart.
+    first_s
+        When the first reading was taken, where the start is a virtual turning point before the
+        release: the pendulum was let go at the last turning point before it. By default, at
+        the start.
     """
 
     time_s: FloatArray
@@ -55,6 +61,7 @@ class Model:
     order: int = 14
     half_cycles: int | None = None
     fold: int = 1
+    first_s: float = -math.inf
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     def adding(self, effect: Effect) -> Model:
@@ -108,8 +115,9 @@ class Model:
         return [place.start for effect, place in self.places() if effect.switch]
 
     def pendulum(self, value: FloatArray) -> Pendulum:
-        """The baseline's constants."""
-        return pendulum_of(value)
+        """The baseline's constants, and when the pendulum was let go."""
+        earlier = (self.first_s - float(value[TIME])) * float(value[OMEGA]) / math.pi
+        return replace(pendulum_of(value), released=int(max(earlier + _LATE, 0.0)))
 
     def span(self, value: FloatArray, sampled: Sampled) -> Span:
         """What the scans of effects must know."""

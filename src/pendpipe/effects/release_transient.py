@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import rows, since_start
+from pendpipe.effects.scan import rows, since_release
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -38,7 +38,7 @@ class ReleaseTransient(Effect):
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 gamma e^(-t/tau) v."""
-        fading = np.exp(-since_start(motion) / values[1])
+        fading = np.exp(-since_release(motion, pendulum) / values[1])
         return np.asarray(-2.0 * values[0] * fading * motion.velocity)
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:

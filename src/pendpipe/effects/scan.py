@@ -14,7 +14,7 @@ from pendpipe.effects.effect import Parameter
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.any_law import Motion
-    from pendpipe.effects.effect import Span
+    from pendpipe.effects.effect import Pendulum, Span
 
 
 def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:
@@ -77,9 +77,15 @@ def unusual_drift(span: Span, rate: float, tau: float) -> float:
     return 2.0 * math.log(max(change / USUAL_DRIFT, 1.0))
 
 
-def since_start(motion: Motion) -> FloatArray:
-    """Return the time since the turning point from which the motion starts, s."""
-    return np.asarray(motion.time_s - motion.time_s[0, 0])
+def since_release(motion: Motion, pendulum: Pendulum) -> FloatArray:
+    """Return the time since the turning point at which the pendulum was let go, s; 0 before."""
+    released = motion.time_s[min(pendulum.released, len(motion.time_s) - 1), 0]
+    return np.asarray(np.maximum(motion.time_s - released, 0.0))
+
+
+def phase_since_reversal(motion: Motion) -> FloatArray:
+    """Return the phase since the turning point before, 0 to pi, at the nodes, rad."""
+    return np.asarray(motion.clock.psi - motion.clock.psi[:, :1])
 
 
 def smooth_step(motion: Motion, instant_s: float) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import rows, since_start
+from pendpipe.effects.scan import rows, since_release
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -140,7 +140,7 @@ class PeriodicDrive(SteadyTone):
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the drive, its time counted from the motion's start."""
-        return _tone(values, 2.0 * math.pi * values[2] * since_start(motion))
+        return _tone(values, 2.0 * math.pi * values[2] * since_release(motion, pendulum))
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """A rough grid of frequencies about the pendulum's."""

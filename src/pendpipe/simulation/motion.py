@@ -13,7 +13,6 @@ from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Motion, NoMotionError
 from pendpipe.dynamics.sampling import sample_pieces
 from pendpipe.effects.baseline import BASELINE
-from pendpipe.effects.effect import Pendulum
 from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
 from pendpipe.simulation.effects import Given
@@ -53,7 +52,7 @@ def angles(
         stamps = stamps if late is None else stamps + late
     end = float(pieces[-1][1].time_s[-1, -1])
     sampled = replace(sample_pieces(pieces, np.minimum(stamps, end)), time_s=stamps)
-    constants = Pendulum(*(getattr(equation, name) for name in Pendulum.__dataclass_fields__))
+    constants = model.pendulum(value)
     reading = sampled.angle
     for one in given:
         extra = one.effect.reading(sampled, constants, one.values)

@@ -1,4 +1,4 @@
-"""The error function of complex numbers, without scipy (whose import takes longer)."""
+"""The scaled complementary error function of complex numbers, without scipy's slow import."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ _TERMS: Final = 32
 Complex = NDArray[np.complex128]
 
 
-def erf(z: Complex) -> Complex:
-    """Return erf(z) for Re z >= 0, by w(iz) = e^(z^2) erfc(z) as Weideman (1994) sums it.
+def erfcx(z: Complex) -> Complex:
+    """Return e^(z^2) erfc(z) for Re z >= 0, as Weideman (1994) sums it.
 
     With L = sqrt(N/sqrt 2) and Z = (L - z)/(L + z),
-    w(iz) = 2 p(Z)/(L + z)^2 + 1/(sqrt(pi) (L + z)), p a polynomial of N terms.
+    erfcx(z) = 2 p(Z)/(L + z)^2 + 1/(sqrt(pi) (L + z)), p a polynomial of N terms.
     """
     scale = np.sqrt(_TERMS / np.sqrt(2.0))
     down = 1.0 / (scale + z)
-    faddeeva = 2.0 * np.polyval(_polynomial(), (scale - z) * down) * down**2
-    faddeeva += down / np.sqrt(np.pi)
-    return np.asarray(1.0 - np.exp(-(z**2)) * faddeeva)
+    found = 2.0 * np.polyval(_polynomial(), (scale - z) * down) * down**2
+    return np.asarray(found + down / np.sqrt(np.pi))
 
 
 @lru_cache(maxsize=1)
