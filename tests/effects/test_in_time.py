@@ -206,3 +206,16 @@ def test_a_drift_is_the_less_likely_the_larger_beyond_a_thousandth(name: str) ->
     # One that has long relaxed has changed by rate tau, however long the record.
     relaxed = np.array([-1e-2, 1.0])
     assert effect.improbable(relaxed, span) == pytest.approx(2.0 * math.log(10.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "values"),
+    [("ac-coupling", (-4.0, 1e6)), ("equilibrium-creep", (10.0, 2.5e6, 0.0)),
+     ("equilibrium-creep", (1e-3, 60.0, 1.0))],
+)  # fmt: skip
+def test_a_slow_creep_has_hardly_begun(identifier: str, values: tuple[float, ...]) -> None:
+    """However far it would go in the end, what counts is how far it went within the record."""
+    moved = reading(identifier, values, baseline(), TIME) - plain(baseline(), TIME)
+    went = abs(float(np.mean(moved[-28:]) - np.mean(moved[:28])))
+    told = by_identifier(identifier).displacement(np.array(values), float(TIME[-1]))
+    assert told == pytest.approx(went, rel=0.05)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -104,14 +103,11 @@ def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     as the first describes a change of phase, and no second mode.
     """
     first = len(base.value) + effect.switch
-    if not effect.believable(fit.value[first:]):
+    own = fit.value[first:]
+    if not effect.believable(own):
         return False
-    sizes = [
-        float(fit.value[first + index])
-        for index, parameter in enumerate(effect.parameters[: effect.sizes])
-        if parameter.unit == "rad"
-    ]
-    return math.hypot(*sizes) < _LARGEST * base.at.span.first_amplitude
+    span = base.at.span
+    return effect.displacement(own, span.duration_s) < _LARGEST * span.first_amplitude
 
 
 def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:

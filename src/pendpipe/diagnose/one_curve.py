@@ -71,7 +71,7 @@ def _prefer(state: State, kept: Sequence[Step], progress: Progress) -> None:
         return
     rivals = ranked([_rival(bare, fit) for fit in fits])
     best = rivals[0]
-    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, _KNOTS * best.gain):
+    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, _misses(names) * best.gain):
         return
     sudden = [step for step in names if _lasts(step, best.fit, state)]
     if sudden:
@@ -109,6 +109,16 @@ def _one_alone(names: Sequence[Step]) -> bool:
     """Whether one name explains so much that the others may be its own form."""
     gains = [step.winner.gain for step in names]
     return sum(gains) - max(gains) < _REST * sum(gains)
+
+
+def _misses(names: Sequence[Step]) -> float:
+    """Part of its gain by which a curve may fall short of names and still be preferred.
+
+    Where all names but one add no more than the form of a real law may differ from the
+    catalogue's, they may be corrections of one wrong name.
+    """
+    gains = [step.winner.gain for step in names]
+    return _KNOTS if sum(gains) - max(gains) > MISSHAPEN * sum(gains) else MISSHAPEN
 
 
 def _rival(bare: Fit, fit: Fit) -> Rival:

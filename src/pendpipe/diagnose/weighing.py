@@ -77,7 +77,9 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     ]  # fmt: skip
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # What every pendulum has is likelier than its rivals beforehand, and than none of them.
-    none = own.evidence - max(own.prior, 0.0) - _misfit(found)
+    # A curve in time follows whatever has happened: that it leaves nothing says little.
+    follows = isinstance(effect, Curve) and effect.in_time
+    none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _misfit(found))
     weights = probabilities([own, *mates], none)
     if not stands_apart(effect, found.improved):
         weights = weights * _explained(found, effect, gain)

@@ -94,9 +94,13 @@ class EquilibriumCreep(Effect):
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return omega^2 x_eq, t from the motion's start."""
         size, tau, exponential = values
-        late = since_release(motion, pendulum) / tau
-        crept = (1.0 - exponential) * np.log1p(late) - exponential * np.expm1(-late)
+        crept = _crept(since_release(motion, pendulum) / tau, exponential)
         return np.asarray(size * pendulum.angular_frequency**2 * crept)
+
+    def displacement(self, values: FloatArray, duration_s: float) -> float:
+        """Return how far it has crept at the end: a slow creep has hardly begun."""
+        size, tau, exponential = values.tolist()
+        return float(abs(size * _crept(np.asarray(duration_s / tau), exponential)))
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """Short and long times, of both forms."""
@@ -105,3 +109,8 @@ class EquilibriumCreep(Effect):
             *rows(lasts * np.array([0.03, 0.3, 3.0]), (0.0,)),
             *rows(lasts * np.array([0.05, 0.2]), (1.0,)),
         ]
+
+
+def _crept(late: FloatArray, exponential: float) -> FloatArray:
+    """(1 - p) ln(1 + t/tau) + p (1 - e^(-t/tau))."""
+    return np.asarray((1.0 - exponential) * np.log1p(late) - exponential * np.expm1(-late))

@@ -198,6 +198,11 @@ class Effect:
         """Whether fitted values are those of the thing that is named."""
         return True
 
+    def displacement(self, values: FloatArray, duration_s: float) -> float:
+        """Return how far the reading is moved within a record at most, rad."""
+        sizes = zip(self.parameters[: self.sizes], values, strict=False)
+        return math.hypot(*(float(value) for size, value in sizes if size.unit == "rad"))
+
     def improbable(self, values: FloatArray, span: Span) -> float:
         """Return twice the logarithm by which so large values are less likely beforehand."""
         return 0.0

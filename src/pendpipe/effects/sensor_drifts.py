@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,6 +79,11 @@ class AcCoupling(Effect):
         """Return u e^(-t/tau)."""
         late = sampled.time_s - sampled.time_s[0]
         return np.asarray(values[0] * np.exp(-late / values[1]))
+
+    def displacement(self, values: FloatArray, duration_s: float) -> float:
+        """Return how far the level has decayed at the end."""
+        level, tau = values.tolist()
+        return float(abs(level * math.expm1(-duration_s / tau)))
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """From a period to half the record."""
