@@ -31,7 +31,7 @@ BETTER: Final = 22.0
 is one of some forty (2 ln 40 = 7.4), and to need two at once is as rare."""
 _KNOTS: Final = 0.005
 """Part of a curve's gain that it may miss between its knots: of laws that are in no catalogue
-the best curve missed a quarter of that at most (opened challenges)."""
+the best curve missed half of that at most (opened challenges)."""
 _PART: Final = 0.5
 """Of its gain beside other names: what something sudden must keep beside a curve."""
 _EACH: Final = 2.0
