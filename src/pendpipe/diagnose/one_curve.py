@@ -29,9 +29,9 @@ from pendpipe.effects.curves import CURVES
 BETTER: Final = 22.0
 """By how much (in chi^2, two a free value counted) two names must be better than one curve: each
 is one of some forty (2 ln 40 = 7.4), and to need two at once is as rare."""
-_KNOTS: Final = 0.005
+_KNOTS: Final = 0.012
 """Part of a curve's gain that it may miss between its knots: of laws that are in no catalogue
-the best curve missed half of that at most (opened challenges)."""
+the best curve missed a hundredth at most (development recordings, opened challenges)."""
 _PART: Final = 0.5
 """Of its gain beside other names: what something sudden must keep beside a curve."""
 _EACH: Final = 2.0
