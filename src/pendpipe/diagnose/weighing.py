@@ -77,8 +77,8 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     ]  # fmt: skip
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # What every pendulum has is likelier than its rivals beforehand, and than none of them.
-    # A curve in time follows whatever has happened: that it leaves nothing says little.
-    follows = isinstance(effect, Curve) and effect.in_time
+    # Of a curve that follows whatever has happened it says little that it leaves nothing.
+    follows = isinstance(effect, Curve) and effect.of_anything
     none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _misfit(found))
     weights = probabilities([own, *mates], none)
     if not stands_apart(effect, found.improved):

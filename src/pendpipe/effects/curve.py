@@ -40,6 +40,8 @@ class Curve(Effect, ABC):
     ordinate: ClassVar[str]
     """What is drawn."""
     flavour: ClassVar[str] = ""
+    of_anything: ClassVar[bool] = False
+    """Whether it follows whatever may happen, at whatever time."""
 
     def __init__(self, span: Span, mixing: FloatArray | None = None) -> None:
         self.span = span

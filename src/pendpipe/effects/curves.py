@@ -126,7 +126,7 @@ class ProfileCurve(Curve):
 class DriveCurve(Curve):
     """A torque that comes and goes with the time, in step with the motion."""
 
-    in_time = True
+    in_time = of_anything = True
     prior = -6.0
     identifier = "unnamed-drive"
     name = "a torque that depends on the time in an unknown way"
@@ -182,7 +182,7 @@ class ReadingCurve(Curve):
 class BaselineCurve(Curve):
     """A level that wanders in time."""
 
-    in_time = True
+    in_time = of_anything = True
     identifier = "unnamed-measurement"
     name = "a level that wanders"
     equation = r"y = x + s(t)"
