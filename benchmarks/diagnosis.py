@@ -88,7 +88,8 @@ def made(case: Case) -> Any:
         return make_single(random, case.names[0], case.size, oracle=True)
     if case.family in ("pair", BESIDE):
         sizes, beside = (case.size, case.size), case.family == BESIDE
-        return make_pair(random, *case.names, sizes, marginal=beside)
+        own_form = True if beside else None
+        return make_pair(random, *case.names, sizes, marginal=beside, own_form=own_form)
     return make_outside(random, case.names[0], case.size)
 
 
