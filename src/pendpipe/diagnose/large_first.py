@@ -15,7 +15,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.growing import grown
+from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
@@ -47,9 +49,13 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
         return
     while is_gross(part.fit, part.data) and add_one(part):
         pass
-    fit = _over_all(part, state)
-    if fit is None or not fit.model.effects or fit.chi2 >= state.fit.chi2:
+    found = _over_all(part, state)
+    if found is None:
         return
+    fit, data, noise = found
+    if not fit.model.effects or fit.chi2 >= state.fit.chi2:
+        return
+    state.data, state.noise = data, noise
     state.fit, state.steps, state.first = fit, part.steps, part.first
     state.holding = part.holding
 
@@ -81,8 +87,8 @@ def _first_part(beginning: Beginning, state: State, count: int) -> State | None:
     return part
 
 
-def _over_all(part: State, state: State) -> Fit | None:
-    """Follow what was found to the end of the record; `state` is cut where it cannot be."""
+def _over_all(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
+    """Follow what was found to the end of the record, or of as much as it can be followed."""
     whole = state.data
     for cut in range(_CUTS):
         data = whole.first(int(len(whole) * _SHORTER**cut))
@@ -96,6 +102,5 @@ def _over_all(part: State, state: State) -> Fit | None:
             fit = refine(model, data, noise, value, held=part.holding)
         except (NoMotionError, np.linalg.LinAlgError):
             continue
-        state.data, state.noise = data, noise
-        return fit
+        return fit, data, noise
     return None
