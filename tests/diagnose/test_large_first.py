@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.large_first import large_first
 from pendpipe.diagnose.refine import refine
@@ -18,6 +20,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.circular_error import CircularError
+from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
 from .records import TRUTH, beginning_of, other_engine, recording
@@ -103,3 +106,26 @@ def test_readings_that_were_cut_off_since_do_not_disturb_the_baseline() -> None:
     baseline = _baseline_alone(state, begun)
     assert len(baseline.at.reading) == 1200
     assert baseline.chi2 == pytest.approx(fit.chi2, abs=12.0)
+
+
+def test_a_search_that_is_not_taken_leaves_the_record_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing is found at large amplitudes, and the end of the record can't be followed."""
+    beginning = beginning_of(Recording(TIME_S, wide_swings(), "angle_rad"))
+    noise = first_noise(beginning)
+    fit = refine(beginning.model, beginning.data, noise, beginning.value)
+    state = State(fit, beginning.data, noise, [], beginning.value, fit.value)
+    followed: list[int] = []
+
+    def not_to_the_end(model: Model, data: Data, *given: Any, **named: Any) -> FloatArray:
+        followed.append(len(data))
+        if len(data) == len(beginning.data):
+            raise NoMotionError("it stops")
+        return grown(model, data, *given, **named)
+
+    monkeypatch.setattr("pendpipe.diagnose.large_first.grown", not_to_the_end)
+    large_first(beginning, state, lambda _: False)
+    assert followed[1] < followed[0] == len(beginning.data)
+    assert len(state.data) == len(state.noise.weight) == len(beginning.data)
+    assert state.fit is fit

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.colour import fit_colour
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
 
@@ -86,6 +87,19 @@ def test_red_noise_is_recognised() -> None:
     found = [estimated(red(np.random.default_rng(seed))) for seed in range(8)]
     assert all(noise.red > 0.0 for noise in found)
     assert np.mean([noise.slope for noise in found]) == pytest.approx(1.5, abs=0.25)
+
+
+def test_noise_below_a_corner_is_not_taken_for_flat() -> None:
+    """A few slow cosines that are small by chance make the slowest no effect: red noise rises."""
+    power = np.random.default_rng(8).chisquare(1.0, 3500)[1:]
+    frequency = np.arange(1, 3500) / (2.0 * 3500 * 0.178)
+    slow = frequency <= 0.05
+    power[slow] *= 2.7
+    power[0], power[1:8] = 170.0, 0.3
+    colour = fit_colour(power, frequency, 0.178)
+    spectrum = colour.spectrum(frequency, 0.178)
+    assert colour.red > 0.0
+    assert spectrum[0] > 1.5 * spectrum[slow][-1]
 
 
 def test_a_low_pass_is_recognised_by_its_memory() -> None:

@@ -17,7 +17,9 @@ draughts, electronics) is slower than that, and what is faster is mostly white."
 _WORTH: Final = (2.5, 12.0)
 """Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
 is missed accuses drifts and slow tones of the noise; a needless one costs little."""
-_STEEPEST: Final = 1.6
+_FLATTEST, _STEEPEST = 0.3, 1.6
+"""Slopes between which noise is red. Were it flat below the end, a few low cosines that are small
+by chance would tell that the slowest of all must be an effect."""
 _SETTLED: Final = 1e-2
 """Of -2 ln L: a step that promises less is the last."""
 _MOST: Final = 25
@@ -141,9 +143,8 @@ def _red(
 
     # Far below the powers all of them are clipped, and the cost would fall without end.
     middle = math.log(level)
-    flattest = 0.0 if ends < math.inf else 0.3
     bounds = Bounds(
-        np.array([middle - 8.0, -12.0, flattest]), np.array([middle + 4.0, 8.0, _STEEPEST])
+        np.array([middle - 8.0, -12.0, _FLATTEST]), np.array([middle + 4.0, 8.0, _STEEPEST])
     )
     # What is clipped makes several minima.
     starts = [

@@ -149,8 +149,10 @@ def _shaped(
 
 def _noise(samples: Samples, measured: Measured) -> float:
     """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
-    known = np.isfinite(measured.amplitude) & (measured.readings > 6) & ~measured.single
     size = 2 + measured.harmonics.shape[1]
+    # A level of its own is taken off each: one reading more must be left to tell the noise.
+    told = measured.readings > size + 1
+    known = np.isfinite(measured.amplitude) & told & ~measured.single
     # The level is common; what a half cycle wants of its own is not noise of the readings.
     square = own_square(measured)
     freedom = float(np.sum(measured.readings[known] - size - 1))
