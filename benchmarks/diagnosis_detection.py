@@ -7,21 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.diagnosis_outcome import (
-    Outcome,
-    first,
-    found,
-    in_class,
-    of,
-    oracle_first,
-    oracle_found,
-    oracle_in_class,
-)
+from benchmarks import diagnosis_outcome as outcome
+from benchmarks.diagnosis_outcome import Outcome
 
 
 def detection(done: Sequence[Outcome]) -> str:
     """How many single effects are found and named at each size, and the sizes of each effect."""
-    singles = of(done, "single")
+    singles = outcome.of(done, "single")
     if not singles:
         return ""
     return "\n\n".join(
@@ -34,7 +26,10 @@ def _by_size(singles: Sequence[Outcome]) -> str:
             "|---|---|---|---|---|---|---|"]  # fmt: skip
     for size in sorted({entry["size"] for entry in singles}):
         part = [entry for entry in singles if entry["size"] == size]
-        tests = (found, oracle_found, in_class, oracle_in_class, first, oracle_first)
+        tests = (
+            outcome.found, outcome.oracle_found, outcome.in_class, outcome.oracle_in_class,
+            outcome.first, outcome.oracle_first,
+        )  # fmt: skip
         counts = [sum(test(entry) for entry in part) for test in tests]
         cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
         rows.append(f"| {size:g} ({len(part)}) | {cells} |")
@@ -46,7 +41,8 @@ def _power(singles: Sequence[Outcome]) -> dict[str, Any]:
 
     sizes = np.array([entry["size"] for entry in singles])
     ours, best = (
-        np.array([float(test(entry)) for entry in singles]) for test in (found, oracle_found)
+        np.array([float(test(entry)) for entry in singles])
+        for test in (outcome.found, outcome.oracle_found)
     )
     return power_ratio(sizes, ours, best)
 

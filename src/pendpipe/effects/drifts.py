@@ -32,7 +32,7 @@ class FrequencyDrift(Effect):
     deciding = "release it again with the same amplitude: the frequency must have moved on"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 eps tau (1 - e^(-t/tau)) omega^2 x, t from the motion's start."""
+        """Return -2 eps tau (1 - e^(-t/tau)) omega^2 x, t from the release."""
         rate, tau = values
         change = rate * relaxed(since_release(motion, pendulum), tau)
         return np.asarray(-2.0 * change * pendulum.angular_frequency**2 * motion.angle)
@@ -61,7 +61,7 @@ class DampingDrift(Effect):
     deciding = "release it again with the same amplitude: the damping must have moved on"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 gamma(t) v, t from the motion's start."""
+        """Return -2 gamma(t) v, t from the release."""
         rate, tau = values
         gamma = rate * relaxed(since_release(motion, pendulum), tau)
         return np.asarray(-2.0 * gamma * motion.velocity)
@@ -92,7 +92,7 @@ class EquilibriumCreep(Effect):
     deciding = "a second sensor or a level on the stand: a sensor's drift leaves it still"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return omega^2 x_eq, t from the motion's start."""
+        """Return omega^2 x_eq, t from the release."""
         size, tau, exponential = values
         crept = _crept(since_release(motion, pendulum) / tau, exponential)
         return np.asarray(size * pendulum.angular_frequency**2 * crept)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pendpipe.effects.complex_erfcx import erfcx
 from pendpipe.effects.effect import Effect, Parameter, Pendulum
-from pendpipe.effects.scan import since_release
+from pendpipe.effects.scan import half_cycle_of_release, since_release
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -45,11 +45,12 @@ class HistoryForce(Effect):
         swinging = (
             motion.upwards * motion.amplitude * (motion.clock.cosine + 1j * motion.clock.sine)
         )
-        let_go = motion.angle[pendulum.released, 0]
+        first = half_cycle_of_release(motion, pendulum)
+        let_go = motion.angle[first, 0]
         half_derivative = np.real(
             1j * pendulum.angular_frequency * root * (swinging - let_go * faded)
         )
-        half_derivative[: pendulum.released] = 0.0
+        half_derivative[:first] = 0.0
         return np.asarray(-values[0] * half_derivative)
 
 

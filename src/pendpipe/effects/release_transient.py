@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ReleaseTransient(Effect):
-    """Damping gamma e^(-t/tau) on top, after the motion's start: hand, wake, other modes."""
+    """Damping gamma e^(-t/tau) on top, after the release: hand, wake, other modes."""
 
     identifier = "release-transient"
     name = "transient of the release"

@@ -77,9 +77,15 @@ def unusual_drift(span: Span, rate: float, tau: float) -> float:
     return 2.0 * math.log(max(change / USUAL_DRIFT, 1.0))
 
 
+def half_cycle_of_release(motion: Motion, pendulum: Pendulum) -> int:
+    """Return the number of the half cycle that begins where the pendulum was let go."""
+    # Values that are merely tried may put it behind the end of the motion.
+    return min(pendulum.released, len(motion.time_s) - 1)
+
+
 def since_release(motion: Motion, pendulum: Pendulum) -> FloatArray:
     """Return the time since the turning point at which the pendulum was let go, s; 0 before."""
-    released = motion.time_s[min(pendulum.released, len(motion.time_s) - 1), 0]
+    released = motion.time_s[half_cycle_of_release(motion, pendulum), 0]
     return np.asarray(np.maximum(motion.time_s - released, 0.0))
 
 

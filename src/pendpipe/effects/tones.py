@@ -139,7 +139,7 @@ class PeriodicDrive(SteadyTone):
     deciding = "record the pendulum at rest: the tone must stay, and fall off above resonance"
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return the drive, its time counted from the motion's start."""
+        """Return the drive, its time counted from the release."""
         return _tone(values, 2.0 * math.pi * values[2] * since_release(motion, pendulum))
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
