@@ -38,12 +38,16 @@ class Trials:
     usual: float = 0.05
     """The p-value at which the trials were counted."""
 
+    def number_at(self, log_local: float) -> float:
+        """How many trials there are where the local p-value is exp(`log_local`)."""
+        rarer = max(log_local / math.log(self.usual), 1.0)
+        return max(self.first * rarer**self.growth, 1.0)
+
     def global_p_value(self, local: float) -> float:
         """The probability that chance finds a local p-value as small anywhere."""
         if local <= 0.0:
             return 0.0
-        rarer = max(math.log(local) / math.log(self.usual), 1.0)
-        trials = max(self.first * rarer**self.growth, 1.0)
+        trials = self.number_at(math.log(local))
         return float(-math.expm1(trials * math.log1p(-min(local, 1.0 - 1e-15))))
 
 

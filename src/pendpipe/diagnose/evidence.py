@@ -27,9 +27,9 @@ little is gained: it grows with the gain by `MISSHAPEN`."""
 MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
 term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
-_UNSURE: Final = 1.5
-"""By how much wider than `form_spread` differences of evidence scatter: on opened challenges,
-four sevenths of the log odds came true."""
+_UNSURE: Final = (4.5, 0.01)
+"""The same for what odds come true, as on opened challenges: scans and optima add to the
+spread where little is gained, and most laws leave less of a large gain than `MISSHAPEN`."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 
@@ -181,9 +181,10 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     """Probability of each rival, with `none` the evidence that it is none of these.
 
     Real laws differ a little from the catalogue's forms, so that differences of evidence
-    are uncertain (`form_spread`); log odds are averaged over that (MacKay's approximation).
+    are uncertain; log odds are averaged over that (MacKay's approximation).
     """
-    spread = _UNSURE * form_spread(max(rivals, key=lambda rival: rival.evidence))
+    leader = max(rivals, key=lambda rival: rival.evidence)
+    spread = math.hypot(_UNSURE[0], _UNSURE[1] * max(leader.gain, 0.0))
     shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
     prior = np.array([rival.prior for rival in rivals])
     likelihood = np.array([rival.evidence for rival in rivals]) - prior

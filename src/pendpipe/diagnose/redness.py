@@ -37,7 +37,7 @@ def doubt_redness(
     assert state.now is not None
     fit, data, noise = settled(state.fit, state.data, state.noise, state.holding, red=False)
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
-    if other.p_value > share:
+    if other.p_value > level * CATALOGUE_SHARE:
         return
     rivals = refit_leads(
         fit, data, noise, other, held=state.holding, gross=False, most=3, origin=state.origin
@@ -61,15 +61,19 @@ def doubt_redness(
 def _cost(state: State, rival: Rival) -> float:
     """What must be gained: the shapes that were tried, and how finely its size is told.
 
-    A size that is known to one part in gain^(1/2) was one among as many (Laplace). A tone was
-    looked for in every second cosine.
+    chi^2 of one size is beyond g with a probability below exp(-g/2), so that an effect that
+    acts throughout is charged for its shapes alone. Red noise has a step or a slow wave at any
+    instant or frequency: there a size that is known to one part in g^(1/2) was one among as
+    many (Laplace). A tone was looked for in every second cosine.
     """
     assert state.now is not None
-    effect = rival.lead.effect
+    effect, gain = rival.lead.effect, max(rival.gain, 1.0)
     by_frequency = Trials(0.5 * len(state.data), 0.0)
     own = state.now.chance.own.get(effect.key)
-    tried = (own or (by_frequency if effect.spectral else Trials(1.0, 0.0))).first
-    return 2.0 * math.log(tried) + effect.sizes * math.log(max(rival.gain, 1.0))
+    trials = own or (by_frequency if effect.spectral else Trials(1.0, 0.0))
+    sought = effect.local or effect.spectral
+    charged = effect.sizes if sought else effect.sizes - 1
+    return 2.0 * math.log(trials.number_at(-0.5 * gain)) + charged * math.log(gain)
 
 
 def _badness(fit: Fit, data: Data, noise: Noise) -> float:

@@ -28,9 +28,9 @@ from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.model import Model
 
-_CLEAN: Final = 4.0
+_CLEAN: Final = 5.0
 """What a model that leaves nothing takes off the evidence (in chi^2) that it is none of the
-class's: one lone name in eight is wrong then, as on opened challenges."""
+class's: one lone name in thirteen is wrong then, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
 _FAR: Final = 100.0
