@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from benchmarks.diagnosis_pairs import over_one
 from benchmarks.diagnosis_table import BESIDE, table
 from pendpipe.challenge.workers import workers
 
@@ -117,15 +118,14 @@ def diagnosed(case: Case) -> dict[str, Any]:
         recording = read_plain(path).as_motion()
     began = time.process_time()
     try:
-        found = diagnose_recording(
-            recording, baseline=item.truth["baseline"], seed=case.number
-        ).diagnosis
+        outcome = diagnose_recording(recording, baseline=item.truth["baseline"], seed=case.number)
     except (InputError, NoMotionError) as fault:
         return {**entry, "refused": str(fault)}
+    cpu_s, found = time.process_time() - began, outcome.diagnosis
     oracle = item.truth.get("oracle") or {}
     return {
         **entry,
-        "cpu_s": time.process_time() - began,
+        "cpu_s": cpu_s,
         "p_value": found.p_value,
         "effects": [
             [effect.identifier, effect.probability, [name for name, _ in effect.indistinguishable]]
@@ -133,9 +133,7 @@ def diagnosed(case: Case) -> dict[str, Any]:
         ],
         "right": [[each["effect"], *(each.get("also") or [])] for each in item.truth["effects"]],
         "oracle": {name: oracle.get(name) for name in ("detected", "named", "class")},
-        "marginal": [
-            float(each.get("marginal_delta_chi2") or 0.0) for each in item.truth["effects"]
-        ],
+        "over_one": over_one(outcome, case.names) if len(case.names) == 2 else None,
         "inside": _inside(item.truth, found.effects),
         **({"peers": _peers(item)} if _beside_peers(case) else {}),
     }

@@ -19,8 +19,8 @@ from benchmarks.diagnosis_outcome import (
     share,
 )
 
-MASKED = 50.0
-"""Delta chi^2 of one of a pair with the other in the model, below which it is hidden by it."""
+NEEDED = 50.0
+"""Delta chi^2 by which two effects are better than any one, above which two are needed."""
 BESIDE = "pair-beside"
 """The family of pairs of which each is worth its Delta chi^2 with the other one in the model,
 by laws of the catalogue's form: what is asked is whether two at once are told apart."""
@@ -143,30 +143,37 @@ def _pairs(done: Sequence[Outcome]) -> str:
     alone, beside = of(done, "pair"), of(done, BESIDE)
     if not alone or not beside:
         return ""
-    plain = [entry for entry in alone if min(entry["marginal"]) > MASKED]
+    plain, needed = _needing_two(alone), _needing_two(beside)
     rows = [
-        "| pair | both found, 400 each beside the other | one found | both found, 400 each alone"
-        " | of those that can be told |",
-        "|---|---|---|---|---|",
+        "| pair | both found, 400 each beside the other | of those that need two | one found"
+        " | both found, 400 each alone | of those that need two |",
+        "|---|---|---|---|---|---|",
     ]
     for names in sorted({tuple(entry["names"]) for entry in (*alone, *beside)}):
-        part, told, other = (
+        part, told, other, asked = (
             [entry for entry in pairs if tuple(entry["names"]) == names]
-            for pairs in (alone, plain, beside)
+            for pairs in (alone, plain, beside, needed)
         )
         some = sum(_count_right(entry) == 1 for entry in other)
         rows.append(
-            f"| {' + '.join(names)} | {_of_both(other)} | {some} | {_of_both(part)}"
-            f" | {_of_both(told)} |"
+            f"| {' + '.join(names)} | {_of_both(other)} | {_of_both(asked)} | {some}"
+            f" | {_of_both(part)} | {_of_both(told)} |"
         )
     return (
         "**Two effects at once**, each of which adds 400 to the other (laws of the catalogue's"
         " form): both found, each by an effect of its own, in"
-        f" {share(sum(map(_both, beside)), len(beside))}. Where each is worth 400 alone one may"
-        f" hide the other: {share(sum(map(_both, alone)), len(alone))}; of those in which each"
-        f" adds more than {MASKED:g} to the other for the oracle,"
+        f" {share(sum(map(_both, beside)), len(beside))}. Each adds that to the other of a given"
+        " shape; a law whose shape is free, or a curve, may do as well as both. Of those in which"
+        f" two are better by {NEEDED:g} than any one thing that was fitted, both are found in"
+        f" {share(sum(map(_both, needed)), len(needed))}. Where each is worth 400 alone one may"
+        f" hide the other: {share(sum(map(_both, alone)), len(alone))}, of those that need two"
         f" {share(sum(map(_both, plain)), len(plain))}.\n\n" + "\n".join(rows)
     )
+
+
+def _needing_two(pairs: Sequence[Outcome]) -> list[Outcome]:
+    """Those in which two effects fit better than any one."""
+    return [entry for entry in pairs if (entry["over_one"] or 0.0) > NEEDED]
 
 
 def _of_both(pairs: Sequence[Outcome]) -> str:

@@ -41,7 +41,7 @@ class Trials:
     def number_at(self, log_local: float) -> float:
         """How many trials there are where the local p-value is exp(`log_local`)."""
         rarer = max(log_local / math.log(self.usual), 1.0)
-        return max(self.first * rarer**self.growth, 1.0)
+        return float(max(self.first * rarer**self.growth, 1.0))
 
     def global_p_value(self, local: float) -> float:
         """The probability that chance finds a local p-value as small anywhere."""
