@@ -2,19 +2,22 @@
 
 The recordings come from the challenge's generator, which shares no code with what it judges;
 its oracle knows nuisances, noise and catalogue, and pays the same look-elsewhere. Every
-recording's outcome is kept under ``.evidence/diagnosis.jsonl``, so that a run can be broken
-off and taken up; `python -m benchmarks.diagnosis` makes what is missing and writes the table
+recording's outcome is kept under ``.evidence/diagnosis.jsonl`` with a digest of the code, so
+that a run can be broken off and taken up, and is begun anew where the code has changed;
+`python -m benchmarks.diagnosis` makes what is missing and writes the table
 to ``docs/diagnosis.md``. ``--part 0.1`` makes a tenth of it, ``--nulls 500`` that many nulls.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import time
 from collections.abc import Iterator
 from concurrent.futures import as_completed
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -23,6 +26,7 @@ import numpy as np
 from benchmarks.diagnosis_pairs import over_one
 from benchmarks.diagnosis_table import BESIDE, table
 from pendpipe.challenge.workers import workers
+from pendpipe.provenance import code_version
 
 JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
 PAGE: Final = Path("docs/diagnosis.md")
@@ -133,7 +137,7 @@ def diagnosed(case: Case) -> dict[str, Any]:
         ],
         "right": [[each["effect"], *(each.get("also") or [])] for each in item.truth["effects"]],
         "oracle": {name: oracle.get(name) for name in ("detected", "named", "class")},
-        "over_one": over_one(outcome, case.names) if len(case.names) == 2 else None,
+        **({"over_one": over_one(outcome, case.names)} if len(case.names) == 2 else {}),
         "inside": _inside(item.truth, found.effects),
         **({"peers": _peers(item)} if _beside_peers(case) else {}),
     }
@@ -184,20 +188,35 @@ def _peers(item: Any) -> dict[str, Any]:
     }
 
 
+@cache
+def code() -> str:
+    """Digest of what makes the recordings, diagnoses them, and says what is right."""
+    modules = ("pendpipe.diagnose.run", "pendpipe.challenge.items")
+    own = (Path(__file__), Path(__file__).with_name("diagnosis_pairs.py"))
+    digest = hashlib.sha256("".join(map(code_version, modules)).encode())
+    for path in own:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def kept() -> dict[str, dict[str, Any]]:
+    """Outcomes of this very code, by key."""
+    if not JOURNAL.exists():
+        return {}
+    entries = map(json.loads, JOURNAL.read_text(encoding="utf-8").splitlines())
+    return {entry["key"]: entry for entry in entries if entry.get("code") == code()}
+
+
 def run(part: float, processes: int, nulls: int | None = None) -> list[dict[str, Any]]:
     """Make what is missing; return all outcomes."""
     JOURNAL.parent.mkdir(exist_ok=True)
-    known = {}
-    if JOURNAL.exists():
-        for line in JOURNAL.read_text(encoding="utf-8").splitlines():
-            entry = json.loads(line)
-            known[entry["key"]] = entry
+    known, version = kept(), code()
     wanted = list(cases(part, nulls))
     todo = [case for case in wanted if case.key not in known]
     with workers(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
         made_by = [pool.submit(diagnosed, case) for case in todo]
         for done, outcome in enumerate(as_completed(made_by), start=1):
-            entry = outcome.result()
+            entry = {**outcome.result(), "code": version}
             known[entry["key"]] = entry
             journal.write(json.dumps(entry, default=float) + "\n")
             journal.flush()
@@ -216,8 +235,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     if arguments.table:
-        lines = JOURNAL.read_text(encoding="utf-8").splitlines()
-        outcomes = list({entry["key"]: entry for entry in map(json.loads, lines)}.values())
+        outcomes = list(kept().values())
     else:
         outcomes = run(arguments.part, arguments.processes, arguments.nulls)
     text = table(outcomes)

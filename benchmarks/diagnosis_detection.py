@@ -50,6 +50,8 @@ def _power(singles: Sequence[Outcome]) -> dict[str, Any]:
 def _reached(singles: Sequence[Outcome]) -> str:
     """Delta chi^2 at which half and nine tenths of the effects are detected, and the oracle's."""
     power = _power(singles)
+    if "half" not in power:
+        return "Too few to say where half and nine tenths are detected."
     said = []
     for key, words in (("half", "Half"), ("nine_tenths", "Nine tenths")):
         one = power[key]

@@ -7,82 +7,70 @@ straight one and a cubic torque): then no method can say that there are two.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import product
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from collections.abc import Sequence
+from itertools import permutations
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pendpipe.diagnose.refine import Fit
     from pendpipe.diagnose.run import Outcome
-    from pendpipe.effects import Effect
-
-_TRIED = 24
-"""Pairs of shapes from which the two true effects are fitted."""
 
 
-def over_one(outcome: Outcome, truths: Sequence[str]) -> float | None:
+def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
     """By how much chi^2 (two a free value counted) two effects are better than the best single.
 
-    Singles are all that the search refitted first, and its answer where that is one effect;
-    pairs are the two true ones, and the answer where it holds two. None where no pair moves.
+    Singles are the baseline alone, each true effect, all that the search refitted first, and
+    its answer where that is one effect; pairs are the true ones, each found behind the other,
+    and the answer where it holds two.
     """
-    pairs = [*_pair_fits(outcome, truths), *_answer(outcome, at_least=2)]
-    singles = [*_single_fits(outcome), *_answer(outcome, at_least=1, at_most=1)]
-    if not pairs or not singles:
-        return None
-    return min(map(_cost, singles)) - min(map(_cost, pairs))
-
-
-def _cost(fit: Fit) -> float:
     from pendpipe.diagnose.one_curve import cost
 
-    return cost(fit)
+    singles, pairs = [outcome.search.baseline, *_answer(outcome, 1)], _answer(outcome, 2)
+    for first, second in permutations(truths, 2):
+        alone = _added(outcome, outcome.search.baseline, first)
+        singles += alone
+        pairs += [both for one in alone for both in _added(outcome, one, second)]
+    singles += _first_rivals(outcome)
+    return min(map(cost, singles)) - min(map(cost, pairs or singles))
 
 
-def _answer(outcome: Outcome, *, at_least: int, at_most: int = 9) -> list[Fit]:
+def _answer(outcome: Outcome, effects: int) -> list[Fit]:
     found = outcome.search
-    named = len(found.steps)
-    return [found.improved] if at_least <= named <= at_most else []
+    return [found.improved] if len(found.steps) == effects else []
 
 
-def _single_fits(outcome: Outcome) -> Iterator[Fit]:
-    found = outcome.search
-    if not found.steps:
-        return
-    for rival in found.steps[0].rivals:
-        effect = rival.lead.effect
-        own = rival.fit.value[len(rival.fit.value) - effect.count :]
-        yield from _fit(outcome, [(effect, own)])
-
-
-def _pair_fits(outcome: Outcome, truths: Sequence[str]) -> Iterator[Fit]:
+def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
+    """The best fit with one more effect of a given name, at the shape that its scan finds."""
+    from pendpipe.diagnose.detect import detect, prepare
+    from pendpipe.diagnose.naming import refit_leads
+    from pendpipe.diagnose.state import is_gross
     from pendpipe.effects.catalogue import by_identifier
 
-    effects = [by_identifier(name) for name in truths]
-    starts = list(product(*(_starts(effect, outcome) for effect in effects)))
-    # Spread over all: a scan's first shapes are neighbours.
-    for start in starts[:: max(len(starts) // _TRIED, 1)]:
-        yield from _fit(outcome, list(zip(effects, start, strict=True)))
+    found = outcome.search
+    scanner = prepare(base, found.data, found.noise, [by_identifier(name)])
+    lead = detect(scanner, base, seed=0, known=found.detection)
+    rivals = refit_leads(
+        base, found.data, found.noise, lead, held=outcome.beginning.held,
+        gross=is_gross(base, found.data), origin=outcome.beginning.value,
+    )  # fmt: skip
+    return [rival.fit for rival in rivals]
 
 
-def _starts(effect: Effect, outcome: Outcome) -> list[Any]:
-    """Values from which an effect is fitted: no size yet, and each shape of its scan."""
-    shapes = effect.shapes(outcome.search.baseline.at.span)
-    return [np.array([*np.zeros(effect.sizes), *shape]) for shape in shapes]
+def _first_rivals(outcome: Outcome) -> list[Fit]:
+    """What the search refitted first, under the noise that was judged last."""
+    import numpy as np
 
-
-def _fit(outcome: Outcome, effects: Sequence[tuple[Effect, Any]]) -> Iterator[Fit]:
-    """Fit some effects under the noise that was judged last, if the model moves."""
     from pendpipe.diagnose.refine import refine
     from pendpipe.dynamics.any_law import NoMotionError
 
-    found = outcome.search
-    model, value = found.baseline.model, found.baseline.value
-    for effect, own in effects:
-        model, value = model.adding(effect), np.concatenate([value, own])
-    try:
-        yield refine(model, found.data, found.noise, value, held=outcome.beginning.held)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return
+    found, fits = outcome.search, []
+    for rival in found.steps[0].rivals if found.steps else ():
+        effect = rival.lead.effect
+        own = rival.fit.value[len(rival.fit.value) - effect.count :]
+        start = np.concatenate([found.baseline.value, own])
+        model = found.baseline.model.adding(effect)
+        try:
+            fits.append(refine(model, found.data, found.noise, start, held=outcome.beginning.held))
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+    return fits

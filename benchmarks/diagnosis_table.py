@@ -173,7 +173,7 @@ def _pairs(done: Sequence[Outcome]) -> str:
 
 def _needing_two(pairs: Sequence[Outcome]) -> list[Outcome]:
     """Those in which two effects fit better than any one."""
-    return [entry for entry in pairs if (entry["over_one"] or 0.0) > NEEDED]
+    return [entry for entry in pairs if entry["over_one"] > NEEDED]
 
 
 def _of_both(pairs: Sequence[Outcome]) -> str:

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scipy.stats import binom, kstest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.chance import Trials, draw_chance
-from pendpipe.diagnose.detect import detect, prepare
+from pendpipe.diagnose.chance import Chance, Trials, draw_chance
+from pendpipe.diagnose.detect import Lead, detect, prepare
+from pendpipe.diagnose.evidence import evidence
 from pendpipe.diagnose.scores import Bank, Candidate, local_p_values
 from pendpipe.diagnose.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -88,3 +89,13 @@ def test_the_whole_catalogue_accuses_noise_as_often_as_it_says() -> None:
         below = int(np.count_nonzero(found < level))
         # The number of trials is itself drawn, to a tenth.
         assert binom.ppf(1e-3, count, 0.9 * level) <= below <= binom.isf(1e-3, count, 1.1 * level)
+
+
+@pytest.mark.parametrize("name", ["equilibrium-step", "offset-drift"])
+def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(name: str) -> None:
+    """P-values underflow at a chi^2 of 1331; the rarer, the more trials are charged beyond it."""
+    fit, _, _ = null_fit()
+    chance = Chance(Trials(1.0, 0.0), {name: Trials(60.0, 0.5)})
+    lead = Lead(by_identifier(name), (), 0.0, 0.0)
+    below, above = (evidence(lead, fit, gain, chance) for gain in (1325.0, 1345.0))
+    assert above - below == pytest.approx(20.0, abs=0.3)

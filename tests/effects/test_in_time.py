@@ -171,6 +171,24 @@ def test_what_begins_with_the_release_knows_when_that_was(
         assert error < 0.06 * np.max(np.abs(let_go - plain(baseline(), time)))
 
 
+@pytest.mark.parametrize("amplitude", [0.3, 2.0])
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.88])
+def test_a_first_reading_in_mid_swing_came_after_the_turning_point_before_it(
+    amplitude: float, share: float
+) -> None:
+    """Wide swings take longer than pi/omega, small ones do not: the drift is the same."""
+    circular = by_identifier("circular-error")
+    effects = (circular, by_identifier("frequency-drift"))
+    value = np.array([*baseline(start=amplitude), 1.0, 1e-3, 5.0])
+    time = times(8.0, 0.03)
+    motion = Model(time, 0.03, effects).evaluate(value).tangent.motion
+    half_s = float(motion.time_s[0, -1] - motion.time_s[0, 0])
+    first_s = float(motion.time_s[0, 0]) + share * half_s
+    let_go = Model(time, 0.03, effects).evaluate(value).reading
+    found = Model(time, 0.03, effects, first_s=first_s).evaluate(value).reading
+    np.testing.assert_allclose(found, let_go, rtol=0.0, atol=1e-9)
+
+
 def test_the_memory_of_the_release_fades_though_dry_friction_stops_the_pendulum() -> None:
     """Half the derivative, from the readings themselves: (1/sqrt pi) int a(s)/sqrt(t - s) ds."""
     base = baseline(c=2e-3, b=0.01)

@@ -129,7 +129,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
         worth = equivalent(trials.global_p_value(local), gain)
     else:
         # Too large for p-values: what trials and further sizes take off a large gain.
-        worth = gain - 2.0 * math.log(max(trials.first, 1.0)) - _SIZE * (sizes - 1)
+        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - _SIZE * (sizes - 1)
     fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
     return worth - _SHAPE * max(fitted, 0) + _prior(effect, fit)
 

@@ -53,7 +53,9 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
     if found is None:
         return
     fit, data, noise = found
-    if not fit.model.effects or fit.chi2 >= state.fit.chi2:
+    # Only the readings that it follows can be compared.
+    before = float(np.sum(state.fit.residual[: len(data)] ** 2))
+    if not fit.model.effects or fit.chi2 >= before:
         return
     state.data, state.noise = data, noise
     state.fit, state.steps, state.first = fit, part.steps, part.first

@@ -61,10 +61,10 @@ def doubt_redness(
 def _cost(state: State, rival: Rival) -> float:
     """What must be gained: the shapes that were tried, and how finely its size is told.
 
-    chi^2 of one size is beyond g with a probability below exp(-g/2), so that an effect that
-    acts throughout is charged for its shapes alone. Red noise has a step or a slow wave at any
-    instant or frequency: there a size that is known to one part in g^(1/2) was one among as
-    many (Laplace). A tone was looked for in every second cosine.
+    chi^2 of one size is beyond g with a probability below exp(-g/2), so that an effect of one
+    size that acts throughout is charged for its shapes alone. Red noise has a step or a slow
+    wave at any instant or frequency: there a size that is known to one part in g^(1/2) was one
+    among as many (Laplace). A tone was looked for in every second cosine.
     """
     assert state.now is not None
     effect, gain = rival.lead.effect, max(rival.gain, 1.0)

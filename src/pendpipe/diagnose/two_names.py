@@ -27,8 +27,8 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
     """Put a name before the curve that leads, where it and a second are better than the curve.
 
     A curve bends far enough to follow some of both of two effects, and once it is drawn
-    nothing is named on top of it. The margin is that of `prefer_one_curve`, beyond what the
-    names' own scans take off.
+    nothing is named on top of it. The margin is wider than that of `prefer_one_curve`, since
+    the names come after it, and beyond what their own scans take off.
     """
     curve = rivals[0]
     if not curve.drawn:

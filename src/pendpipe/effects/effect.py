@@ -58,8 +58,9 @@ class Pendulum:
         omega, rad/s.
     quadratic, hysteretic, viscous, coulomb
         a in 1/(rad s); the parts b_h and b_v of b in 1/s; c in rad/s.
-    released
-        Half cycles that the motion is followed for before the release.
+    first_s
+        When the first reading was taken: the pendulum was let go at the last turning point
+        before it. By default, at the start of the motion.
     """
 
     angular_frequency: float
@@ -67,7 +68,7 @@ class Pendulum:
     hysteretic: float = 0.0
     viscous: float = 0.0
     coulomb: float = 0.0
-    released: int = 0
+    first_s: float = -math.inf
 
     @property
     def linear(self) -> float:

@@ -25,8 +25,6 @@ from pendpipe.effects.baseline import (
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
 from pendpipe.effects.evaluated import Evaluated, kick_sizes
 
-_LATE: Final = 0.1
-"""Of a half cycle, by which the release may seem to come after the first reading."""
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
 
@@ -115,9 +113,8 @@ class Model:
         return [place.start for effect, place in self.places() if effect.switch]
 
     def pendulum(self, value: FloatArray) -> Pendulum:
-        """The baseline's constants, and when the pendulum was let go."""
-        earlier = (self.first_s - float(value[TIME])) * float(value[OMEGA]) / math.pi
-        return replace(pendulum_of(value), released=int(max(earlier + _LATE, 0.0)))
+        """The baseline's constants, and when the first reading was taken."""
+        return replace(pendulum_of(value), first_s=self.first_s)
 
     def span(self, value: FloatArray, sampled: Sampled) -> Span:
         """What the scans of effects must know."""

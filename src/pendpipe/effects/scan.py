@@ -77,10 +77,19 @@ def unusual_drift(span: Span, rate: float, tau: float) -> float:
     return 2.0 * math.log(max(change / USUAL_DRIFT, 1.0))
 
 
+_LATE: Final = 0.1
+"""Of a half cycle, by which the release may seem to come after the first reading."""
+
+
 def half_cycle_of_release(motion: Motion, pendulum: Pendulum) -> int:
-    """Return the number of the half cycle that begins where the pendulum was let go."""
-    # Values that are merely tried may put it behind the end of the motion.
-    return min(pendulum.released, len(motion.time_s) - 1)
+    """Return the number of the half cycle that begins where the pendulum was let go.
+
+    That is the last turning point before the first reading, or a little behind it: what begins
+    with the first reading begins, within its error, at a turning point.
+    """
+    begins, lasts = motion.time_s[:, 0], math.pi / pendulum.angular_frequency
+    before = int(np.searchsorted(begins, pendulum.first_s + _LATE * lasts, side="right"))
+    return max(before - 1, 0)
 
 
 def since_release(motion: Motion, pendulum: Pendulum) -> FloatArray:

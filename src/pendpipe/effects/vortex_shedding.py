@@ -34,7 +34,7 @@ class VortexShedding(Effect):
     parameters = (
         Parameter("k", "1/s", 0.0, 100.0),
         Parameter("y_c", "rad", 1e-6, 10.0),
-        Parameter("phi", "rad", 0.2, 2.0, 0.6),
+        Parameter("phi", "1", 0.2, 2.0, 0.6),
     )
     deciding = "change the fluid's viscosity: the kink in the damping must move, in amplitude"
 
