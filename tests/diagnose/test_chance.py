@@ -13,7 +13,7 @@ from scipy.stats import binom, kstest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.chance import Chance, Trials, draw_chance
 from pendpipe.diagnose.detect import Lead, detect, prepare
-from pendpipe.diagnose.evidence import evidence
+from pendpipe.diagnose.evidence import Rival, evidence
 from pendpipe.diagnose.scores import Bank, Candidate, local_p_values
 from pendpipe.diagnose.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -99,3 +99,13 @@ def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(nam
     lead = Lead(by_identifier(name), (), 0.0, 0.0)
     below, above = (evidence(lead, fit, gain, chance) for gain in (1325.0, 1345.0))
     assert above - below == pytest.approx(20.0, abs=0.3)
+
+
+def test_who_is_behind_stays_as_far_behind_whatever_else_was_left_at_first() -> None:
+    """Found while fifty times the noise was left, both are refitted where none of that is."""
+    fit, _, _ = null_fit()
+    lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
+    best, other = (Rival(lead, fit, gain, gain / 50.0 - 8.0, 50.0) for gain in (9e5, 6e5))
+    better, worse = best.reaching(fit, 400.0), other.reaching(fit, 350.0)
+    assert better.evidence == pytest.approx(400.0 - 8.0)
+    assert better.evidence - worse.evidence == pytest.approx(50.0)

@@ -49,12 +49,20 @@ class Rival:
     evidence
         chi^2 of one degree of freedom that is as improbable by chance, the effect's own
         scan counted.
+    left
+        chi^2 a reading that the best of its rivals left: `evidence` counts `gain` over it.
     """
 
     lead: Lead
     fit: Fit
     gain: float
     evidence: float
+    left: float = 1.0
+
+    def reaching(self, fit: Fit, gain: float) -> Rival:
+        """Return it refitted where nothing but noise is left, its scan charged as before."""
+        charged = self.gain / self.left - self.evidence
+        return Rival(self.lead, fit, gain, gain - charged)
 
     @property
     def identifier(self) -> str:

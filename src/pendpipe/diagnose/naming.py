@@ -58,7 +58,8 @@ def refit_leads(
     rivals = []
     for lead, fit in fits:
         gain = base.chi2 - fit.chi2
-        rivals.append(Rival(lead, fit, gain, evidence(lead, fit, gain / left, detection.chance)))
+        worth = evidence(lead, fit, gain / left, detection.chance)
+        rivals.append(Rival(lead, fit, gain, worth, left))
     return _named_first(rivals) if gross else ranked(rivals)
 
 

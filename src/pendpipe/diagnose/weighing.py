@@ -184,12 +184,11 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         if _far_behind(rival, step.winner):
             # It stays as far behind.
             more = gain - step.winner.gain
-            rivals.append(replace(rival, gain=rival.gain + more, evidence=rival.evidence + more))
+            rivals.append(rival.reaching(rival.fit, rival.gain + more))
             continue
         fit = found.improved if own else refitted(without, found, held, rival)
         if fit is not None:
-            reached = without.chi2 - fit.chi2
-            rivals.append(Rival(rival.lead, fit, reached, rival.evidence + reached - rival.gain))
+            rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
 
 
