@@ -192,10 +192,9 @@ def _peers(item: Any) -> dict[str, Any]:
 def code() -> str:
     """Digest of what makes the recordings, diagnoses them, and says what is right."""
     modules = ("pendpipe.diagnose.run", "pendpipe.challenge.items")
-    own = (Path(__file__), Path(__file__).with_name("diagnosis_pairs.py"))
     digest = hashlib.sha256("".join(map(code_version, modules)).encode())
-    for path in own:
-        digest.update(path.read_bytes())
+    for name in ("diagnosis.py", "diagnosis_pairs.py", "peers_diagnosis.py"):
+        digest.update(Path(__file__).with_name(name).read_bytes())
     return digest.hexdigest()[:12]
 
 

@@ -7,6 +7,7 @@ straight one and a cubic torque): then no method can say that there are two.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import permutations
 from typing import TYPE_CHECKING
@@ -21,17 +22,22 @@ def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
 
     Singles are the baseline alone, each true effect, all that the search refitted first, and
     its answer where that is one effect; pairs are the true ones, each found behind the other,
-    and the answer where it holds two.
+    and the answer where it holds two. Infinite where the true pair can't be fitted: it counts
+    as needed then.
     """
     from pendpipe.diagnose.one_curve import cost
+    from pendpipe.diagnose.weighing import refitted
 
-    singles, pairs = [outcome.search.baseline, *_answer(outcome, 1)], _answer(outcome, 2)
+    found, held = outcome.search, outcome.beginning.held
+    singles, pairs = [found.baseline, *_answer(outcome, 1)], _answer(outcome, 2)
     for first, second in permutations(truths, 2):
-        alone = _added(outcome, outcome.search.baseline, first)
+        alone = _added(outcome, found.baseline, first)
         singles += alone
         pairs += [both for one in alone for both in _added(outcome, one, second)]
-    singles += _first_rivals(outcome)
-    return min(map(cost, singles)) - min(map(cost, pairs or singles))
+    rivals = found.steps[0].rivals if found.steps else ()
+    fits = [refitted(found.baseline, found, held, rival) for rival in rivals]
+    singles += [fit for fit in fits if fit is not None]
+    return min(map(cost, singles)) - min(map(cost, pairs), default=-math.inf)
 
 
 def _answer(outcome: Outcome, effects: int) -> list[Fit]:
@@ -40,7 +46,7 @@ def _answer(outcome: Outcome, effects: int) -> list[Fit]:
 
 
 def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
-    """The best fit with one more effect of a given name, at the shape that its scan finds."""
+    """The fit with one more effect of a given name, at the shape its scan finds, if it moves."""
     from pendpipe.diagnose.detect import detect, prepare
     from pendpipe.diagnose.naming import refit_leads
     from pendpipe.diagnose.state import is_gross
@@ -54,23 +60,3 @@ def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
         gross=is_gross(base, found.data), origin=outcome.beginning.value,
     )  # fmt: skip
     return [rival.fit for rival in rivals]
-
-
-def _first_rivals(outcome: Outcome) -> list[Fit]:
-    """What the search refitted first, under the noise that was judged last."""
-    import numpy as np
-
-    from pendpipe.diagnose.refine import refine
-    from pendpipe.dynamics.any_law import NoMotionError
-
-    found, fits = outcome.search, []
-    for rival in found.steps[0].rivals if found.steps else ():
-        effect = rival.lead.effect
-        own = rival.fit.value[len(rival.fit.value) - effect.count :]
-        start = np.concatenate([found.baseline.value, own])
-        model = found.baseline.model.adding(effect)
-        try:
-            fits.append(refine(model, found.data, found.noise, start, held=outcome.beginning.held))
-        except (NoMotionError, np.linalg.LinAlgError):
-            continue
-    return fits

@@ -108,24 +108,36 @@ def test_readings_that_were_cut_off_since_do_not_disturb_the_baseline() -> None:
     assert baseline.chi2 == pytest.approx(fit.chi2, abs=12.0)
 
 
+@pytest.mark.parametrize("found", [False, True])
 def test_a_search_that_is_not_taken_leaves_the_record_whole(
-    monkeypatch: pytest.MonkeyPatch,
+    found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing is found at large amplitudes, and the end of the record can't be followed."""
+    """The end can't be followed, and nothing is found, or nothing better over the rest."""
     beginning = beginning_of(Recording(TIME_S, wide_swings(), "angle_rad"))
     noise = first_noise(beginning)
     fit = refine(beginning.model, beginning.data, noise, beginning.value)
+    only_the_end = np.where(np.arange(len(fit.residual)) > 0.99 * len(fit.residual), 1e3, 0.0)
+    fit = replace(fit, residual=only_the_end, chi2=float(only_the_end @ only_the_end))
     state = State(fit, beginning.data, noise, [], beginning.value, fit.value)
     followed: list[int] = []
 
     def not_to_the_end(model: Model, data: Data, *given: Any, **named: Any) -> FloatArray:
-        followed.append(len(data))
+        if len(data) == len(beginning.data) or followed:
+            followed.append(len(data))
         if len(data) == len(beginning.data):
             raise NoMotionError("it stops")
         return grown(model, data, *given, **named)
 
+    def add_circular_error(part: State) -> bool:
+        if not found or part.fit.model.effects:
+            return False
+        model = part.fit.model.adding(CircularError())
+        start = np.append(beginning.value, 1.0)
+        part.settle(refine(model, part.data, part.noise, grown(model, part.data, NOISE_RAD, start)))
+        return True
+
     monkeypatch.setattr("pendpipe.diagnose.large_first.grown", not_to_the_end)
-    large_first(beginning, state, lambda _: False)
+    large_first(beginning, state, add_circular_error)
     assert followed[1] < followed[0] == len(beginning.data)
     assert len(state.data) == len(state.noise.weight) == len(beginning.data)
     assert state.fit is fit

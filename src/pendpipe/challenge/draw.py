@@ -111,7 +111,7 @@ def _abstention(axes: Any, scores: dict[str, Any]) -> None:
     axes.set_ylim(-0.03, 1.03)
     axes.set_xlabel("probability below which a first name is withheld")
     axes.set_ylabel("share")
-    axes.legend(loc="lower right", frameon=False)
+    axes.legend(loc="lower center", frameon=False)
 
 
 FIGURES: Final = {

@@ -17,7 +17,8 @@ draughts, electronics) is slower than that, and what is faster is mostly white."
 _WORTH: Final = (2.5, 12.0)
 """Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
 is missed accuses drifts and slow tones of the noise; a needless one costs little."""
-_FLATTEST, _STEEPEST = 0.3, 1.6
+_FLATTEST: Final = 0.3
+_STEEPEST: Final = 1.6
 """Slopes between which noise is red. Were it flat below the end, a few low cosines that are small
 by chance would tell that the slowest of all must be an effect."""
 _SETTLED: Final = 1e-2

@@ -28,8 +28,9 @@ MISSHAPEN: Final = 0.03
 """Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
 term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
 _UNSURE: Final = (4.5, 0.01)
-"""The same for what odds come true, as on opened challenges: scans and optima add to the
-spread where little is gained, and most laws leave less of a large gain than `MISSHAPEN`."""
+"""What `_FORM` and `MISSHAPEN` are to classes, to probabilities: with these, stated ones came
+true on opened challenges. Scans and optima add to the spread where little is gained, and most
+laws leave less of a large gain than the worst do."""
 _SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 

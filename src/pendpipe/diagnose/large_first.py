@@ -53,7 +53,8 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
     if found is None:
         return
     fit, data, noise = found
-    # Only the readings that it follows can be compared.
+    # Only the readings that it follows can be compared (gross misfits have white noise, so that
+    # each has its own residual).
     before = float(np.sum(state.fit.residual[: len(data)] ** 2))
     if not fit.model.effects or fit.chi2 >= before:
         return
