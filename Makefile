@@ -23,7 +23,7 @@ report: .venv/installed
 bench: .venv/installed-bench
 	$(RUN) python -m benchmarks
 
-evidence: .venv/installed
+evidence: .venv/installed-bench
 	$(RUN) python -m benchmarks.acquisition
 	$(RUN) python -m benchmarks.evidence
 	$(RUN) python -m benchmarks.diagnosis

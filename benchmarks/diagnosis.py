@@ -81,12 +81,16 @@ def cases(part: float, nulls: int | None = None) -> Iterator[Case]:
             yield Case("outside", (name,), 200.0, number)
 
 
+def seed_of(case: Case) -> list[int]:
+    """What a recording is drawn from."""
+    return [case.number, round(case.size), *map(ord, case.family + "".join(case.names))]
+
+
 def made(case: Case) -> Any:
     """Make a recording, with its truth."""
     from pendpipe.challenge.items import make_null, make_outside, make_pair, make_single
 
-    seed = [case.number, round(case.size), *map(ord, case.family + "".join(case.names))]
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(seed_of(case))
     if case.family == "null":
         return make_null(random)
     if case.family == "single":

@@ -16,6 +16,7 @@ from benchmarks.diagnosis_outcome import (
     of,
     oracle_first,
     oracle_found,
+    oracle_in_class,
     share,
 )
 
@@ -81,7 +82,19 @@ def _naming(done: Sequence[Outcome]) -> str:
         f" {share(sum(map(in_class, singles)), len(singles))}, it comes first in"
         f" {share(sum(map(first, singles)), len(singles))} (the oracle:"
         f" {sum(map(oracle_first, singles))}); mean class size {_mean(sizes)}, the oracle's"
-        f" {_mean(oracle)}. {_coverage(singles, of(done, 'single'))}\n\n" + "\n".join(rows)
+        f" {_mean(oracle)}. {_nameable(singles)} {_coverage(singles, of(done, 'single'))}\n\n"
+        + "\n".join(rows)
+    )
+
+
+def _nameable(singles: Sequence[Outcome]) -> str:
+    """The same of those that the oracle itself can name."""
+    held = [entry for entry in singles if oracle_in_class(entry)]
+    led = [entry for entry in singles if oracle_first(entry)]
+    return (
+        "Of those that the oracle's own class holds it is in the class in"
+        f" {share(sum(map(in_class, held)), len(held))}; of those that the oracle names, first in"
+        f" {share(sum(map(first, led)), len(led))}."
     )
 
 
