@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from copy import copy
 
 import numpy as np
 
@@ -30,7 +31,7 @@ TRUTH = np.array([7.2e-3, 9.6e-3, 1.3e-4, 0.4, OMEGA_RAD_S, 0.15, -0.3, 0.01])
 LINEAR = np.array([0.0, 9.6e-3, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.01])
 """The same pendulum with viscous friction alone."""
 
-INSTANT_S, TONE_HZ = 41.3, 3.3
+INSTANT_S, LATER_S, TONE_HZ = 41.3, 70.2, 3.3
 VALUES: dict[str, tuple[float, ...]] = {
     "circular-error": (1.0,),
     "frequency-drift": (6e-6, 40.0),
@@ -94,9 +95,18 @@ def _dropped() -> FloatArray:
     return np.concatenate([whole[:700], whole[703:]])
 
 
+def _two_steps() -> FloatArray:
+    """The equilibrium jumps one way, and by half of it back."""
+    step = by_identifier("equilibrium-step")
+    size, instant_s = VALUES["equilibrium-step"]
+    values = (size, instant_s, -0.5 * size, LATER_S)
+    return Model(TIME_S, INTERVAL_S, (step, copy(step))).reading(np.append(TRUTH, values))
+
+
 _READINGS: dict[str, Callable[[], FloatArray]] = {
     "null": lambda: other_engine(TRUTH),
     "dropped-samples": _dropped,
+    "two steps": _two_steps,
     "two": lambda: with_effects("equilibrium-step", "tone-pickup"),
     "linear": lambda: other_engine(LINEAR),
 }

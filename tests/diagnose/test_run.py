@@ -15,6 +15,7 @@ from pendpipe.effects.catalogue import by_identifier
 
 from .records import (
     FREQUENCY_HZ,
+    LATER_S,
     LINEAR,
     NOISE_RAD,
     TRUTH,
@@ -109,6 +110,16 @@ def test_two_effects_are_both_named() -> None:
     assert sum("equilibrium-step" in names for names in classes) == 1
     assert sum("tone-pickup" in names for names in classes) == 1
     assert outcome.diagnosis.unexplained_p_value > 0.001
+
+
+def test_what_happens_twice_is_told_twice_each_with_its_own_size_and_instant() -> None:
+    effects = diagnosed("two steps").diagnosis.effects
+    assert [effect.identifier for effect in effects] == ["equilibrium-step"] * 2
+    size, instant_s = VALUES["equilibrium-step"]
+    for effect, sign, at_s in zip(effects, (1.0, -0.5), (instant_s, LATER_S), strict=True):
+        jump, time_s = effect.parameters["J"], effect.parameters["time"]
+        assert abs(jump.value - sign * size) < 4.0 * jump.sd
+        assert abs(time_s.value - at_s) < 4.0 * time_s.sd
 
 
 def test_a_viscous_baseline_lacks_coulomb_friction() -> None:

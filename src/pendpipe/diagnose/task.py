@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 from pendpipe.diagnose.detect import detect, prepare
@@ -19,12 +20,16 @@ from pendpipe.effects.soft_clipping import SoftClipping
 
 
 def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
-    """Choose the effects that a baseline may lack, and curves for what has no name."""
+    """Choose the effects that a baseline may lack, and curves for what has no name.
+
+    What happens at an instant may happen again: a second one is an object of its own, by which
+    its values are found in the model.
+    """
     value = fit.value
     present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
     used = {effect.identifier for effect in fit.model.effects}
     named = [
-        effect
+        copy(effect) if effect.identifier in used else effect
         for effect in catalogue
         if effect.template
         and baseline not in effect.inside
