@@ -109,6 +109,26 @@ def test_upside_down_it_does_not_turn() -> None:
         follow(sine_law, OMEGA, 3.12, 0.0, undamped(Clock(12, 40), 3.12))
 
 
+@pytest.mark.parametrize("rest", [0.1, 0.3, 0.4])
+def test_about_a_displaced_rest_it_swings_as_about_nought(rest: float) -> None:
+    """It goes as rest + (1 - rest) cos(omega t), however near to nought it turns beyond."""
+    clock = Clock(12, 60)
+    motion = follow(
+        lambda motion: np.full_like(motion.angle, OMEGA**2 * rest), OMEGA, 1.0, 0.0, undamped(clock)
+    )
+    assert motion.time_s[:, 0] == pytest.approx(np.arange(12) * math.pi / OMEGA, abs=1e-6)
+    far = 2.0 * rest - 1.0
+    assert motion.turning_angle[:, 0] == pytest.approx([1.0, far] * 6, abs=1e-6)
+
+
+def test_about_a_rest_at_which_it_turns_short_of_nought_there_is_no_phase() -> None:
+    with pytest.raises(NoMotionError):
+        follow(
+            lambda motion: np.full_like(motion.angle, OMEGA**2 * 0.55),
+            OMEGA, 1.0, 0.0, undamped(Clock(12, 40)),
+        )  # fmt: skip
+
+
 def test_beyond_the_stop_there_is_no_motion() -> None:
     """Coulomb friction of a third of the amplitude stops the pendulum in two half cycles."""
     pendulum = Pendulum(OMEGA, coulomb=0.01 * OMEGA / 3.0)

@@ -29,7 +29,9 @@ _STEP: Final = 1e-6
 _STRIDE: Final = 0.7
 """Longest step in ln r."""
 _STEEPEST: Final = 0.9
-"""Of g: beyond, the pendulum hardly turns, or never."""
+"""Of g cos(psi): beyond, the pendulum hardly turns, or never."""
+_LARGEST: Final = 4.0
+"""Of g, where it pulls back: the equilibrium is far off for so small an r."""
 
 
 class NoMotionError(ArithmeticError):
@@ -183,9 +185,12 @@ def rates(law: Law, motion: Motion, *, lenient: bool = False) -> Rates:
     g = motion.upwards * law(motion) / (omega * omega * motion.amplitude)
     free = 1.0 - g * clock.cosine
     if lenient:
-        g = np.nan_to_num(np.clip(g, -_STEEPEST, _STEEPEST))
-        free = 1.0 - g * clock.cosine
-    elif not np.all(np.isfinite(g)) or np.min(free) < 1.0 - _STEEPEST:
+        g = np.nan_to_num(np.clip(g, -_LARGEST, _LARGEST))
+        least = 1.0 - _STEEPEST
+        steep = 1.0 - g * clock.cosine < least
+        g = np.where(steep, np.copysign(_STEEPEST, g), g)
+        free = np.maximum(1.0 - g * clock.cosine, least)
+    elif not np.all(np.abs(g) <= _LARGEST) or np.min(free) < 1.0 - _STEEPEST:
         raise NoMotionError("the pendulum does not turn")
     return Rates(-g * clock.sine / free, 1.0 / (omega * free))
 
