@@ -74,7 +74,7 @@ def diagnose_recording(
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
     progress("finding the free decay and its turning points")
-    points, part = measure_recording(recording.as_motion(), place)
+    points, part = measure_recording(recording.as_motion(place=place), place)
     return diagnose_decay(
         part, points, baseline=baseline, fixed=fixed, seed=seed, level=level, place=place,
         provenance=provenance, progress=progress, whole=recording,
