@@ -59,10 +59,13 @@ def _improvement(
     )
     if held is None:
         return text + "."
-    return (
-        f"{text}, and blocks held out are predicted better by {held.gain:.4g} +-"
-        f" {held.gain_sd:.2g} in log density."
-    )
+    by = f"{abs(held.gain):.4g} +- {held.gain_sd:.2g} in log density"
+    if held.gain < 0.0:
+        return (
+            f"{text}, but blocks held out are predicted worse by {by}: the extended model does"
+            " not stand this test."
+        )
+    return f"{text}, and blocks held out are predicted better by {by}."
 
 
 def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
