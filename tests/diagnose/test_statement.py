@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,13 @@ def test_a_model_that_predicts_worse_is_said_to() -> None:
     assert "predicted worse by 50 +- 5" in worse
     assert "does not stand this test" in worse
     assert "better" not in worse
+
+
+def test_a_question_ends_as_one() -> None:
+    """What decides may be asked: "what touched it?"."""
+    rival = replace(named("amplitude-step"), indistinguishable=(("impulse", 0.2),))
+    assert rival.deciding.endswith("?")
+    assert f"impulse: {rival.deciding} With it" in said(rival)
 
 
 def test_a_pure_number_has_no_unit() -> None:

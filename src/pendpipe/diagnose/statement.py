@@ -110,7 +110,7 @@ def _effect(effect: Named) -> str:
     if effect.indistinguishable:
         others = ", ".join(name for name, _ in effect.indistinguishable)
         text += f"; this recording cannot tell it from {others}: {effect.deciding}"
-    return text + "."
+    return text if text.endswith("?") else text + "."
 
 
 def _number(name: str, each: Estimate) -> str:

@@ -45,7 +45,7 @@ def _entry(effect: Effect) -> str:
     lines = [
         f"### {effect.identifier}", "", f"*{effect.name[0].upper()}{effect.name[1:]}.* {text}", "",
         f"$${effect.equation}$$", "", *_table(effect), *_remarks(effect), "",
-        f"What decides: {effect.deciding}.",
+        f"What decides: {effect.deciding}{'' if effect.deciding.endswith('?') else '.'}",
     ]  # fmt: skip
     return "\n".join(lines)
 
