@@ -140,6 +140,13 @@ def test_a_step_of_the_level_prefers_no_part_of_the_cycle() -> None:
     assert "turning points" not in summary
 
 
+def test_what_fades_after_the_release_lies_at_the_beginning_and_not_at_its_time_constant() -> None:
+    found, _ = located("release-transient", (0.02, 4.8))
+    assert found.time_s is not None
+    assert found.time_s[0] == TIME_S[0]
+    assert 4.8 < found.time_s[1] < 0.5 * TIME_S[-1]
+
+
 def test_an_encoder_that_writes_its_counts_makes_no_harmonics_of_a_slip() -> None:
     """Its readings are dense at the crossings: |sin| of the phase, which has a second harmonic."""
     finer = np.arange(0.0, 60.0, INTERVAL_S / 4.0)

@@ -111,8 +111,12 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
 
 
 def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
-    """The 95 % interval of the instant at which a local effect happens."""
-    return _interval_of(fit, effect, "s") if effect.local else None
+    """The 95 % interval of the instant at which a local effect happens.
+
+    What fades after the release has a time constant and no instant.
+    """
+    sudden = any(parameter.name == "time" for parameter in effect.parameters)
+    return _interval_of(fit, effect, "s") if sudden else None
 
 
 def tone_of(fit: Fit, effect: Effect) -> float | None:
