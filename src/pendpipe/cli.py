@@ -13,7 +13,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NoReturn
 
 from pendpipe.errors import InputError
 from pendpipe.process import one_thread
@@ -40,6 +40,15 @@ COMMANDS: Final = {
 """The commands with the line that ``--help`` shows for each."""
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line, as of every fault, what of a call can't be understood."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the program with status 2."""
+        line = " ".join(message.split())
+        self.exit(2, f"{self.prog}: {line}; see {self.prog} --help\n")
+
+
 def _list_of_commands() -> str:
     width = max(map(len, COMMANDS)) + 2
     return "\n".join(f"  {name:<{width}}{text}" for name, text in COMMANDS.items())
@@ -49,7 +58,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
     if argv and argv[0] in COMMANDS:
         module = importlib.import_module(f"pendpipe.commands.{argv[0].replace('-', '_')}")
-        parser = argparse.ArgumentParser(
+        parser = _Parser(
             prog=f"pendpipe {argv[0]}",
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -58,7 +67,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         arguments = parser.parse_args(argv[1:])
         arguments.run = module.run
         return arguments
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="pendpipe",
         description=(__import__("pendpipe").__doc__ or "").splitlines()[0],
         epilog="commands (each has its own --help):\n" + _list_of_commands(),

@@ -35,6 +35,10 @@ class InputError(Exception):
         line = f"{self.place}: {problem}; {remedy}"
         super().__init__(" ".join(line.split()))
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+        """Let it come back whole from a worker process."""
+        return type(self), (self.place, self.problem, self.remedy)
+
 
 class NotAnalysableError(InputError):
     """The recording can be read, but holds no free decay that could be analysed."""

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from pendpipe.errors import InputError
+
 
 @contextmanager
 def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
@@ -23,10 +25,20 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         The file to write; its folder is made where it is missing.
     mode
         ``"w"`` for text (UTF-8, line feeds on every system) or ``"wb"``.
+
+    Raises
+    ------
+    InputError
+        Where no file can be written: no folder, no right to it, or a folder of that name.
     """
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    make_folder(target.parent)
+    if target.is_dir():
+        raise InputError(target, "this is a folder", "name a file in it")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as fault:
+        raise _cannot_write(target, fault) from None
     temporary = Path(name)
     try:
         text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
@@ -40,6 +52,27 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def make_folder(path: str | Path) -> None:
+    """Make a folder for results, with those above it.
+
+    Raises
+    ------
+    InputError
+        Where it can't be made: a file has its name, or the user has no right to it.
+    """
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InputError(path, "this is a file, not a folder", "name another folder") from None
+    except OSError as fault:
+        raise _cannot_write(path, fault) from None
+
+
+def _cannot_write(path: str | Path, fault: OSError) -> InputError:
+    reason = fault.strerror or str(fault)
+    return InputError(path, f"it can't be written ({reason})", "name another place")
 
 
 def finite(value: Any) -> Any:

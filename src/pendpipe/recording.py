@@ -78,8 +78,8 @@ class Recording:
         """The usual time between samples: the median of the differences."""
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else float("nan")
 
-    def number(self, key: str) -> float | None:
-        """Read a number from the metadata; ``None`` where it is absent or blank."""
+    def number(self, key: str, place: str | Path = "recording") -> float | None:
+        """Read a number from the metadata of `place`; ``None`` where it is absent or blank."""
         text = self.metadata.get(key, "").strip()
         if not text:
             return None
@@ -87,7 +87,7 @@ class Recording:
             return float(text)
         except ValueError:
             raise InputError(
-                f"metadata {key}", f"'{text}' is no number", f"write '# {key}: 3.85'"
+                f"{place}, metadata {key}", f"'{text}' is no number", f"write '# {key}: 3.85'"
             ) from None
 
     def between(self, start_s: float | None, stop_s: float | None) -> Recording:
@@ -102,8 +102,17 @@ class Recording:
             quality=None if self.quality is None else self.quality[keep],
         )
 
-    def as_motion(self, volts_per_radian: float | None = None) -> Recording:
+    def as_motion(
+        self, volts_per_radian: float | None = None, place: str | Path = "recording"
+    ) -> Recording:
         """Return the same recording in radians (or metres), volts divided by V/rad.
+
+        Parameters
+        ----------
+        volts_per_radian
+            The sensor's constant; by default the recording's own.
+        place
+            Named in messages.
 
         Raises
         ------
@@ -112,10 +121,10 @@ class Recording:
         """
         if self.quantity != "volts":
             return self
-        constant = volts_per_radian or self.number("volts_per_radian")
+        constant = volts_per_radian or self.number("volts_per_radian", place)
         if not constant:
             raise InputError(
-                self.metadata.get("source", "recording"),
+                place,
                 "the readings are volts and no sensor constant is known",
                 "give --volts-per-radian (see pendpipe calibrate)",
             )
@@ -179,7 +188,7 @@ def read_plain(path: str | Path) -> Recording:
         metadata=metadata,
     )
     check(place, recording, first_line=first + 2)
-    return replace(recording, resolution=converter_step(recording))
+    return replace(recording, resolution=converter_step(recording, place))
 
 
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
@@ -279,12 +288,12 @@ def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> No
         )
 
 
-def converter_step(recording: Recording) -> float | None:
+def converter_step(recording: Recording, place: str | Path = "recording") -> float | None:
     """The step of the converter, from `bits` and `range_volts`, where both are told."""
-    bits, high = recording.number("bits"), recording.number("range_volts")
+    bits, high = recording.number("bits", place), recording.number("range_volts", place)
     if bits is None or high is None or recording.quantity != "volts":
         return None
-    low = recording.number("range_low_volts")
+    low = recording.number("range_low_volts", place)
     span = high - (-high if low is None else low)
     # What no converter has tells nothing of the step.
     return span / 2.0**bits if 1 <= bits <= 64 and 0 < span < 1e9 else None

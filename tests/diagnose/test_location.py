@@ -5,9 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.location import locate
+from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.refine import refine
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 
-from .records import FREQUENCY_HZ, INSTANT_S, TIME_S, TONE_HZ, diagnosed
+from .records import (
+    FREQUENCY_HZ,
+    INSTANT_S,
+    INTERVAL_S,
+    NOISE_RAD,
+    TIME_S,
+    TONE_HZ,
+    TRUTH,
+    diagnosed,
+    white,
+)
+
+LARGE = np.where(TRUTH == 0.15, 0.4, TRUTH)
+"""The same pendulum released at 0.4 rad, where sin x is far from x."""
 
 
 def location_of(name: str) -> Location:
@@ -60,3 +80,78 @@ def test_intervals_lie_within_the_record(name: str) -> None:
         assert interval is not None
         assert lowest <= interval[0] < interval[1] <= highest
     assert np.all(np.isfinite(found.frequency_hz))
+
+
+def located(
+    identifier: str, values: tuple[float, ...], base: FloatArray = TRUTH,
+    time_s: FloatArray = TIME_S,
+) -> tuple[Location, float]:  # fmt: skip
+    """Where an effect shows that Eq. 8 alone leaves out; and Eq. 8's slip of the phase, rad."""
+    effect = by_identifier(identifier)
+    bare, extended = Model(time_s, INTERVAL_S), Model(time_s, INTERVAL_S, (effect,))
+    truth = np.append(base, values)
+    readings = extended.reading(truth) + white(2, len(time_s))
+    even = len(time_s) == len(TIME_S)
+    data = Data(time_s, readings, INTERVAL_S, even, np.ones(len(time_s)))
+    noise = white_noise(data, NOISE_RAD)
+    before, after = refine(bare, data, noise, base), refine(extended, data, noise, truth)
+    return locate(before, after, data, effect), before.slip_rad
+
+
+SLIPPING = {
+    "circular-error": ((1.0,), LARGE),
+    "clock-drift": ((1e-4, 1e3), TRUTH),
+    "frequency-drift": ((3e-4, 40.0), TRUTH),
+}
+
+
+@pytest.mark.parametrize("name", SLIPPING)
+def test_a_phase_that_slips_by_a_radian_is_a_misfit_of_the_fundamental(name: str) -> None:
+    """However far it slips: the pendulum is early or late, and its level is where it was."""
+    found, slip = located(name, *SLIPPING[name])
+    assert slip > 0.5
+    assert found.harmonics == (1,)
+    assert found.frequency_hz == pytest.approx((FREQUENCY_HZ,), rel=1e-2)
+    assert "level" not in found.summary
+
+
+def test_a_slip_is_seen_at_the_same_amplitudes_whether_it_is_small_or_large() -> None:
+    """What it does to the readings is linear along the motion, if not in the readings."""
+    small, slip = located("clock-drift", (2e-6, 1e3))
+    large, slipped = located("clock-drift", (1e-4, 1e3))
+    assert slip < 0.02
+    assert slipped > 0.5
+    assert large.amplitude_rad == pytest.approx(small.amplitude_rad, rel=0.01)
+
+
+def test_a_misfit_of_the_phase_shows_at_both_crossings_and_one_of_the_loss_where_it_turns() -> None:
+    """Twice a cycle: no single arc of less than half a circle holds most of it."""
+    early, _ = located("clock-drift", (1e-5, 1e3))
+    assert early.phase_rad is None
+    assert "both crossings" in early.summary
+    lossy, _ = located("damping-drift", (3e-4, 1e3))
+    assert lossy.phase_rad is None
+    assert "turning points of both sides" in lossy.summary
+
+
+def test_a_step_of_the_level_prefers_no_part_of_the_cycle() -> None:
+    summary = located("equilibrium-step", (4e-4, INSTANT_S))[0].summary
+    assert "crossings" not in summary
+    assert "turning points" not in summary
+
+
+def test_what_fades_after_the_release_lies_at_the_beginning_and_not_at_its_time_constant() -> None:
+    found, _ = located("release-transient", (0.02, 4.8))
+    assert found.time_s is not None
+    assert found.time_s[0] == TIME_S[0]
+    assert 4.8 < found.time_s[1] < 0.5 * TIME_S[-1]
+
+
+def test_an_encoder_that_writes_its_counts_makes_no_harmonics_of_a_slip() -> None:
+    """Its readings are dense at the crossings: |sin| of the phase, which has a second harmonic."""
+    finer = np.arange(0.0, 60.0, INTERVAL_S / 4.0)
+    speed = np.abs(np.sin(TRUTH[4] * (finer - TRUTH[6])))
+    written = finer[np.random.default_rng(4).uniform(size=len(finer)) < speed]
+    found, slip = located("frequency-drift", (1e-3, 40.0), time_s=written)
+    assert slip > 0.5
+    assert found.harmonics == (1,)

@@ -203,3 +203,22 @@ def test_codes_are_counted_where_they_matter(outcome: Any) -> None:
     assert heights[top] == np.count_nonzero(clipped == 20 * step)
     expected = axes.lines[0].get_ydata()
     assert max(heights) > 2 * max(expected)
+
+
+def test_a_code_is_marked_where_its_readings_are(outcome: Any) -> None:
+    """The diagnosis numbers codes from a reading of zero, and so does the figure."""
+    content = shown(outcome)
+    step, code = 5e-3, 20
+    values = np.minimum(step * np.round(content.data.values / step), code * step)
+    effect = content.diagnosis.effects[0]
+    where = replace(effect.location, adc_codes=(code,))
+    content = replace(
+        content,
+        data=replace(content.data, values=values, step=step, lattice=None),
+        diagnosis=replace(content.diagnosis, effects=(replace(effect, location=where),)),
+    )
+    (axes,) = diagnosis_codes.draw(content).axes
+    mark = axes.lines[-1].get_xdata()[0]
+    (bar,) = [bar for bar in axes.patches if bar.get_x() < mark < bar.get_x() + bar.get_width()]
+    assert bar.get_height() == np.count_nonzero(values == code * step)
+    assert axes.get_xlim()[0] == pytest.approx(round(values.min() / step) - 0.5)

@@ -173,7 +173,7 @@ def test_clipping_glitches_steps_and_codes(tmp_path: Path) -> None:
         (table("impulse", dv=1.0), "'time' is missing; add it, in s"),
         (table("quadratic-drag", a=-1.0), "'a' is -1; give a number from 0 to 100, in 1/"),
         ('[[effects]]\nid = "cubic-stiffness"\nk3 = "x"\n', "'k3' is no number"),
-        (table("missing-codes", number=3), "missing-codes without a converter"),
+        (table("missing-codes", number=3), "(missing-codes): there are no missing codes without"),
         (table("coulomb-friction", c=1.0), "the pendulum does not swing"),
     ],
 )
@@ -183,3 +183,60 @@ def test_what_is_wrong_is_said_in_one_line(more: str, message: str, tmp_path: Pa
     assert message in str(caught.value)
     assert "m.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def quiet(text: str) -> str:
+    return text.replace("noise_rad = 1e-5", "noise_rad = 0.0")
+
+
+COLOUR = table("coloured-noise", corner=1.0, exponent=1.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "text", "message"),
+    [
+        (COLOUR, quiet(TOML), "(coloured-noise): it colours the noise, and there is none"),
+        ("[sensor]\n" + COLOUR, quiet(TOML), "(coloured-noise): it colours the noise"),
+        (table("drag-form"), TOML.replace("a = 7e-3", "a = 0.0"), "where the pendulum's a is 0"),
+        (table("clipping"), TOML, "(clipping): neither of its levels is given"),
+        (table("clipping", width=0.01), TOML, "(clipping): neither of its levels is given"),
+        (
+            table("damping-step", change=0.3, time=10.0),
+            TOML.replace("a = 7e-3\nc = 1e-4", "").replace("quality_factor_viscous = 300.0", ""),
+            "(damping-step): it does nothing where the pendulum has no damping",
+        ),
+        (
+            table("glitches", number=1, rms=0.02) + table("glitches", number=3, rms=0.02),
+            TOML,
+            "effects 2 (glitches): it is given before",
+        ),
+    ],
+)
+def test_an_effect_that_could_do_nothing_is_no_silent_null(
+    more: str, text: str, message: str, tmp_path: Path
+) -> None:
+    """Else a recording would say that it has an effect, and would have none (or only the last)."""
+    with pytest.raises(InputError) as caught:
+        simulate(model(tmp_path, more, text), place="m.toml")
+    assert message in str(caught.value)
+    assert "m.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_sensors_noise_can_be_coloured_too(tmp_path: Path) -> None:
+    without = simulate(model(tmp_path, MEASURED, quiet(TOML)))
+    coloured = simulate(model(tmp_path, MEASURED + COLOUR, quiet(TOML)))
+    assert np.std(coloured.values - without.values) > 1e-5
+
+
+def test_two_jumps_are_two_tables_of_one_effect(tmp_path: Path) -> None:
+    """What has a template may come twice: the readings have both."""
+    text = quiet(TOML)
+    first, second = (table("impulse", dv=0.01, time=when) for when in (10.0, 20.0))
+    bare, one, both = (
+        simulate(model(tmp_path, more, text)).values for more in ("", first, first + second)
+    )
+    time_s = np.arange(len(bare)) / 20.0
+    np.testing.assert_allclose(both[time_s < 20.0], one[time_s < 20.0], 0.0, 1e-9)
+    assert np.max(np.abs(both - one)[time_s > 20.0]) > 1e-3
+    assert np.max(np.abs(one - bare)) > 1e-3

@@ -9,6 +9,7 @@ repositioning, and every decay but the most telling one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -56,7 +57,7 @@ class FreeDecay:
         return recording.between(self.start_s, self.stop_s)
 
 
-def find_free_decay(recording: Recording) -> FreeDecay:
+def find_free_decay(recording: Recording, place: str | Path = "recording") -> FreeDecay:
     """Find the free decay in a recording of angles or displacements.
 
     After a pull or a hold by hand it starts where the first free swing passes its middle
@@ -68,13 +69,14 @@ def find_free_decay(recording: Recording) -> FreeDecay:
     ----------
     recording
         In radians or metres (`Recording.as_motion`); samples may be uneven.
+    place
+        Named in messages.
 
     Raises
     ------
     NotAnalysableError
         When there is no free decay of at least three half cycles: one line that says why.
     """
-    place = recording.metadata.get("source", "recording")
     time, values = recording.time_s[recording.usable], recording.values[recording.usable]
     span = float(np.ptp(values)) if len(values) else 0.0
     if len(values) < 8 or span == 0:
@@ -143,7 +145,7 @@ def _rise(swing: FloatArray) -> float:
     return float(np.max(means - np.minimum.accumulate(means)))
 
 
-def _refuse_without_fall(place: str, cycles: HalfCycles, run: Run, least: float) -> None:
+def _refuse_without_fall(place: str | Path, cycles: HalfCycles, run: Run, least: float) -> None:
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
     swing = cycles.swing[run.first : run.last + 1]
     if float(swing[:3].max()) < 3.0 * least:

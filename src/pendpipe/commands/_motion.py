@@ -29,7 +29,7 @@ def read_motion(arguments: argparse.Namespace) -> tuple[Recording, dict[str, Any
         print(f"{arguments.file}: {note}", file=sys.stderr)
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
-    recording = recording.as_motion(constant)
+    recording = recording.as_motion(constant, arguments.file)
     return recording, {
         "input_sha256": sha256(arguments.file),
         "version": __version__,

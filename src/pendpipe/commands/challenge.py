@@ -45,10 +45,9 @@ def _set(parser: argparse.ArgumentParser, *, sealed: bool) -> None:
 
 
 def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError("it must be at least 1")
-    return value
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number of 1 or more")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:

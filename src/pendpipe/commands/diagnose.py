@@ -65,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, write, and say it."""
     from pendpipe.analysis.fit.fixed import parse_fixed
+    from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
     from pendpipe.stages.diagnose import Question, refused_before
 
@@ -73,6 +74,9 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.baseline, parse_fixed(arguments.fix), arguments.seed, arguments.level,
         arguments.figures, arguments.record is not None,
     )  # fmt: skip
+    if Path(arguments.file).is_file():
+        # Before the work: a long diagnosis must not end without a place for it.
+        make_folder(arguments.out)
     earlier = refused_before(arguments.refused)
     if earlier is not None:
         return _not_analysable(arguments, question, earlier, {})
@@ -121,7 +125,10 @@ def _say(line: str) -> None:
 
 
 def _probability(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number between 0 and 1") from None
     if not 0.0 < value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text} lies not between 0 and 1")
+        raise argparse.ArgumentTypeError(f"{text} does not lie between 0 and 1")
     return value

@@ -9,15 +9,18 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.arcs import facing_arcs, one_arc, powers_of_cycle
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.remainder import by_cycle
 from pendpipe.effects import Effect
 from pendpipe.effects.tones import PlaneCoupling
 
 _MOST: Final = 0.9
 """Part of what an effect explains that its interval holds."""
-_BINS: Final = 24
+_SLIP: Final = 0.3
+"""Phase in rad between two models from which their plain difference misleads."""
 _HARMONICS: Final = 6
 _LOUD: Final = 0.1
 
@@ -28,14 +31,14 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     Each reading's share of Delta chi^2 is expected to be the squared difference of the two
     models (both at their best) over the noise; intervals hold nine tenths of it.
     """
-    difference = (after.at.reading - before.at.reading) * data.weight
-    if before.slip_rad > 0.3:
-        difference = _along(before, after) * data.weight
+    difference = _difference(before, after) * data.weight
     power = difference**2
     sampled = after.at.sampled
     time = _interval(data.time_s, power)
     amplitude = _interval(sampled.amplitude, power)
-    phase = _phase_interval(sampled.phase + (math.pi if sampled.motion.upwards < 0 else 0.0), power)
+    turned = math.pi if sampled.motion.upwards < 0.0 else 0.0
+    of_cycle = powers_of_cycle(sampled.phase + turned, power)
+    phase = one_arc(of_cycle, _MOST)
     harmonics = _harmonics(sampled.phase, difference)
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
@@ -46,18 +49,31 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     if tone is not None:
         lines, harmonics = (tone,), ()
     found = Location(time, amplitude, phase, lines, harmonics)
-    summary = _summary(found, data, sampled.amplitude)
+    summary = _summary(found, data, sampled.amplitude, facing_arcs(of_cycle))
     beat = beat_of(after, effect)
     if beat is not None:
         summary += f", beating with the motion every {beat:.3g} s"
     return replace(found, summary=summary)
 
 
-def _along(before: Fit, after: Fit) -> FloatArray:
-    """The difference where the models are far out of phase: phase times amplitude."""
+def _difference(before: Fit, after: Fit) -> FloatArray:
+    """Readings of the two models, one less the other; along the motion where a phase slips.
+
+    Far out of phase the plain difference is as large as the motion and says no longer where
+    they drift apart. Then it is taken as if readings were linear in ln amplitude and phase,
+    x (change of ln A) + (dx/d phase) (change of phase), as the fit itself does it.
+    """
     one, other = before.at.sampled, after.at.sampled
     turn = other.phase - one.phase
-    return np.asarray(other.amplitude * (turn - np.mean(turn)))
+    # Whole turns may be counted differently; the phase of the release belongs to either model.
+    turn = turn - np.average(turn, weights=other.amplitude**2)
+    if np.max(np.abs(turn)) < _SLIP:
+        return after.at.reading - before.at.reading
+    grown = np.log(np.maximum(other.amplitude, 1e-300) / np.maximum(one.amplitude, 1e-300))
+    moved = other.angle * grown + other.velocity / other.motion.angular_frequency * turn
+    # What the sensor adds to the motion: its level, its curve, a tone.
+    sensor = (after.at.reading - other.angle) - (before.at.reading - one.angle)
+    return np.asarray(moved + sensor)
 
 
 def _interval(argument: FloatArray, power: FloatArray) -> tuple[float, float] | None:
@@ -79,52 +95,28 @@ def _interval(argument: FloatArray, power: FloatArray) -> tuple[float, float] | 
     return float(sorted_argument[first]), float(sorted_argument[ends[first]])
 
 
-def _phase_interval(phase: FloatArray, power: FloatArray) -> tuple[float, float] | None:
-    """The arc that holds most, where it is clearly shorter than the circle."""
-    turned = np.mod(phase, 2.0 * math.pi)
-    bins = np.bincount((turned / (2.0 * math.pi) * _BINS).astype(int) % _BINS, weights=power,
-                       minlength=_BINS)  # fmt: skip
-    total = float(bins.sum())
-    if not total > 0.0:
-        return None
-    for width in range(1, _BINS // 2):
-        sums = np.array([np.roll(bins, -start)[:width].sum() for start in range(_BINS)])
-        start = int(np.argmax(sums))
-        if sums[start] > _MOST * total:
-            step = 2.0 * math.pi / _BINS
-            return start * step, (start + width) * step
-    return None
-
-
 def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
-    """Multiples of the motion's frequency that hold a tenth of the difference or more."""
+    """Multiples of the motion's frequency that hold a tenth of the difference or more.
+
+    The envelope is a slow function: harmonics are compared cycle by cycle.
+    """
     total = float(np.sum(difference**2))
     if not total > 0.0:
         return ()
-    # The envelope is a slow function: harmonics are compared cycle by cycle.
-    cycle = np.floor(phase / (2.0 * math.pi)).astype(np.int64)
-    cycle -= cycle.min()
-    count = int(cycle.max()) + 1
-    size = np.maximum(np.bincount(cycle, minlength=count), 1)
-    found = []
-    for harmonic in range(_HARMONICS + 1):
-        parts = (
-            [np.cos(harmonic * phase), np.sin(harmonic * phase)]
-            if harmonic
-            else [np.ones_like(phase)]
-        )
-        held = 0.0
-        for part in parts:
-            sums = np.bincount(cycle, weights=difference * part, minlength=count)
-            held += float(np.sum(sums**2 / size)) * (2.0 if harmonic else 1.0)
-        if held > _LOUD * total:
-            found.append(harmonic)
-    return tuple(found)
+    series, _ = by_cycle(difference, phase, _HARMONICS)
+    held = np.sum(series**2, axis=0)
+    # A cosine and a sine each; the level has but one.
+    powers = [held[0], *(held[1::2] + held[2::2])]
+    return tuple(order for order, power in enumerate(powers) if power > _LOUD * total)
 
 
 def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
-    """The 95 % interval of the instant at which a local effect happens."""
-    return _interval_of(fit, effect, "s") if effect.local else None
+    """The 95 % interval of the instant at which a local effect happens.
+
+    What fades after the release has a time constant and no instant.
+    """
+    sudden = any(parameter.name == "time" for parameter in effect.parameters)
+    return _interval_of(fit, effect, "s") if sudden else None
 
 
 def tone_of(fit: Fit, effect: Effect) -> float | None:
@@ -163,8 +155,8 @@ def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | N
     return None
 
 
-def _summary(found: Location, data: Data, amplitude: FloatArray) -> str:
-    """One clause."""
+def _summary(found: Location, data: Data, amplitude: FloatArray, facing: str) -> str:
+    """One clause; `facing` names two arcs of the cycle where no single one will do."""
     said = []
     span = float(data.time_s[-1] - data.time_s[0])
     if found.time_s is not None:
@@ -182,6 +174,8 @@ def _summary(found: Location, data: Data, amplitude: FloatArray) -> str:
     if found.phase_rad is not None:
         low, high = found.phase_rad
         said.append(f"at phases from {low:.2f} to {high:.2f} rad of the cycle")
+    elif facing:
+        said.append(facing)
     if found.harmonics:
         names = {0: "the level", 1: "the fundamental"}
         parts = [names.get(h, f"harmonic {h}") for h in found.harmonics]

@@ -101,7 +101,7 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     over = math.sqrt(fit.chi2 / freedom)
     if over <= _FLOOR:
         return Remainder(excess, over, float(freedom))
-    series, rest = _by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
+    series, rest = by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
     powers = [_powers(row) for row in series.T] + [_powers(rest)]
     known = [float(np.sum(power - 1.0)) for power in powers[:-1]]
     between = float(np.sum(rest**2)) - (np.count_nonzero(rest) - series.size)
@@ -124,14 +124,16 @@ def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
     return np.asarray(data.residual(fit.at.reading) * data.weight / sd)
 
 
-def _by_cycle(residual: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+def by_cycle(
+    residual: FloatArray, phase: FloatArray, harmonics: int = _HARMONICS
+) -> tuple[FloatArray, FloatArray]:
     """Coefficients of level, cosine, sine and harmonics, (cycles, 1 + 2 harmonics); the rest.
 
     Within a cycle they are orthonormal, so that noise gives each the variance 1.
     """
     number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
     ends = np.searchsorted(number, np.arange(number[-1] + 2))
-    width, rest = 1 + 2 * _HARMONICS, residual.copy()
+    width, rest = 1 + 2 * harmonics, residual.copy()
     found = np.zeros((len(ends) - 1, width))
     for cycle, (first, last) in enumerate(pairwise(ends.tolist())):
         size = min(width, (last - first) // 2)
@@ -139,7 +141,7 @@ def _by_cycle(residual: FloatArray, phase: FloatArray) -> tuple[FloatArray, Floa
             continue
         part = phase[first:last]
         waves = [np.ones(len(part))]
-        for harmonic in range(1, _HARMONICS + 1):
+        for harmonic in range(1, harmonics + 1):
             waves += [np.cos(harmonic * part), np.sin(harmonic * part)]
         basis, mixing = np.linalg.qr(np.stack(waves[:size], axis=1))
         basis *= np.sign(np.diag(mixing))

@@ -12,6 +12,7 @@ import numpy as np
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.diagnose.begin import Beginning, begin
+from pendpipe.diagnose.fault_terms import in_catalogue_terms
 from pendpipe.diagnose.forensics.lattice import with_true_step
 from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.freed import freed_parameters
@@ -74,7 +75,7 @@ def diagnose_recording(
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
     progress("finding the free decay and its turning points")
-    points, part = measure_recording(recording.as_motion(), place)
+    points, part = measure_recording(recording.as_motion(place=place), place)
     return diagnose_decay(
         part, points, baseline=baseline, fixed=fixed, seed=seed, level=level, place=place,
         provenance=provenance, progress=progress, whole=recording,
@@ -136,7 +137,8 @@ def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:
     """Name effects and faults in the order in which they were added."""
     effects = [(place, effect_named(found, beginning, step)) for place, step in
                enumerate(found.steps)]  # fmt: skip
-    faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
+    faults = [(fault.behind, in_catalogue_terms(fault_named(found, fault), found.data))
+              for fault in found.faults]  # fmt: skip
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.
     return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))
 

@@ -59,10 +59,13 @@ def _improvement(
     )
     if held is None:
         return text + "."
-    return (
-        f"{text}, and blocks held out are predicted better by {held.gain:.4g} +-"
-        f" {held.gain_sd:.2g} in log density."
-    )
+    by = f"{abs(held.gain):.4g} +- {held.gain_sd:.2g} in log density"
+    if held.gain < 0.0:
+        return (
+            f"{text}, but blocks held out are predicted worse by {by}: the extended model does"
+            " not stand this test."
+        )
+    return f"{text}, and blocks held out are predicted better by {by}."
 
 
 def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
@@ -107,7 +110,7 @@ def _effect(effect: Named) -> str:
     if effect.indistinguishable:
         others = ", ".join(name for name, _ in effect.indistinguishable)
         text += f"; this recording cannot tell it from {others}: {effect.deciding}"
-    return text + "."
+    return text if text.endswith("?") else text + "."
 
 
 def _number(name: str, each: Estimate) -> str:

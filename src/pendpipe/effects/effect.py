@@ -29,8 +29,8 @@ class Parameter(NamedTuple):
     """What a simulation takes where it is not given; None: it must be."""
 
     def unit_in(self, unit: str) -> str:
-        """Return its unit where displacements are in `unit` ("rad" or "m")."""
-        return self.unit.replace("rad", unit)
+        """Return its unit where displacements are in `unit` ("rad" or "m"); "" for a number."""
+        return "" if self.unit == "1" else self.unit.replace("rad", unit)
 
 
 class Kick(NamedTuple):

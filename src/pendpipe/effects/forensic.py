@@ -23,7 +23,8 @@ class Clipping(Effect):
     """Readings beyond the range are cut off: sharply, or over a width w about the level.
 
     With a width the upper end reads y = L - w ln(1 + e^((L - x)/w)). What is sharp is found
-    by the largest reading, what is soft by its shape.
+    by the largest reading, what is soft by its shape. The diagnosis tells a sharp level as it
+    stands in the readings, and of a soft end what the largest angle loses by it.
     """
 
     identifier = "clipping"
@@ -91,7 +92,11 @@ class Glitches(Effect):
 
 
 class ColouredNoise(Effect):
-    """Noise that grows to low frequencies."""
+    """Noise that grows to low frequencies.
+
+    The diagnosis tells how steeply it falls about the pendulum's own frequency: the slope
+    -d ln S/d ln f, which is alpha far below the corner and less about it.
+    """
 
     identifier = "coloured-noise"
     name = "coloured noise"

@@ -45,7 +45,7 @@ def _entry(effect: Effect) -> str:
     lines = [
         f"### {effect.identifier}", "", f"*{effect.name[0].upper()}{effect.name[1:]}.* {text}", "",
         f"$${effect.equation}$$", "", *_table(effect), *_remarks(effect), "",
-        f"What decides: {effect.deciding}.",
+        f"What decides: {effect.deciding}{'' if effect.deciding.endswith('?') else '.'}",
     ]  # fmt: skip
     return "\n".join(lines)
 
@@ -61,7 +61,8 @@ def _row(parameter: Parameter) -> str:
     name = f"`{parameter.name}`"
     if parameter.default is not None and math.isfinite(parameter.default):
         name += f" ({parameter.default:g} unless given)"
-    return f"| {name} | {parameter.unit} | {_bound(parameter.low)} | {_bound(parameter.high)} |"
+    unit = parameter.unit_in("rad") or "none"
+    return f"| {name} | {unit} | {_bound(parameter.low)} | {_bound(parameter.high)} |"
 
 
 def _bound(value: float) -> str:

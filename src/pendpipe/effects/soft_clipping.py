@@ -34,7 +34,7 @@ class SoftClipping(Effect):
     kind = "measurement"
     equation = r"y = x - w \ln\left[1 + (e^{d/w} - 1)\, e^{(x - x_\mathrm{top})/w}\right]"
     parameters = (
-        Parameter("upper", "rad", 0.0, 10.0), Parameter("lower", "rad", 0.0, 10.0),
+        Parameter("upper_loss", "rad", 0.0, 10.0), Parameter("lower_loss", "rad", 0.0, 10.0),
         Parameter("width", "rad", 1e-7, 10.0),
     )  # fmt: skip
     sizes = 2

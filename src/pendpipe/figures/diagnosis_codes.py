@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from pendpipe.diagnose.forensics.lattice import find_lattice
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled
@@ -26,12 +27,15 @@ def draw(content: Shown) -> Figure:
     if not step > 0.0:
         raise NothingToDrawError("the readings have no steps")
     values = content.data.values
-    origin = float(values.min())
+    # The codes of the diagnosis: 0 is the one nearest to a reading of zero.
+    lattice = find_lattice(values, step)
+    origin, step = (0.0, step) if lattice is None else (lattice.origin, lattice.step)
     codes = np.rint((values - origin) / step).astype(np.int64)
     model = (content.extended or content.baseline).at.reading
     expected = np.rint((model - origin) / step).astype(np.int64)
-    group = max(1, -(-int(codes.max() + 1) // _BARS))
-    edges = np.arange(-0.5, codes.max() + group + 0.5, group)
+    low, high = int(codes.min()), int(codes.max())
+    group = -(-(high - low + 1) // _BARS)
+    edges = np.arange(low - 0.5, high + group + 0.5, group)
     given, _ = np.histogram(codes, edges)
     wanted, _ = np.histogram(expected, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -42,7 +46,7 @@ def draw(content: Shown) -> Figure:
     axes.step(middle, wanted, where="mid", color=INK, linewidth=0.9, label="expected")
     for code in marked[:200]:
         axes.axvline(code, color=VERMILION, linewidth=0.8, zorder=0)
-    axes.set(xlabel="Code, counted from the lowest", ylabel="Readings")
+    axes.set(xlabel="Code (0: nearest to a reading of zero)", ylabel="Readings")
     axes.margins(x=0.0)
     key_above(axes, 2)
     return figure

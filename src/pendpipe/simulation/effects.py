@@ -56,7 +56,7 @@ def _read(place: str, table: dict[str, Any]) -> Given:
 
 def _value(place: str, parameter: Parameter, table: Mapping[str, Any]) -> float:
     given = table.get(parameter.name, parameter.default)
-    unit = "" if parameter.unit == "1" else f", in {parameter.unit}"
+    unit = f", in {parameter.unit}" if parameter.unit_in("rad") else ""
     if given is None:
         raise InputError(place, f"'{parameter.name}' is missing", f"add it{unit}")
     if isinstance(given, bool) or not isinstance(given, int | float):

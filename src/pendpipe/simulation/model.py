@@ -17,6 +17,7 @@ from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 from pendpipe.simulation.converter import clipped, quantised
 from pendpipe.simulation.effects import Given, read_effects
+from pendpipe.simulation.in_vain import refuse_in_vain
 from pendpipe.simulation.instrument import Instrument
 
 
@@ -119,6 +120,7 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
         In volts where there is a sensor, else in radians, with its metadata.
     """
     given = read_effects(place, model.effects)
+    refuse_in_vain(model, given, place)
     rate = model.sampling.sample_rate_hz
     time = np.arange(int(np.floor(model.sampling.duration_s * rate + 1e-9))) / rate
     instrument = Instrument(given, np.random.default_rng([model.seed, 1]), place)
@@ -129,8 +131,6 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
     if given:
         metadata["effects"] = ", ".join(one.effect.identifier for one in given)
     sensor, converter = model.sensor, model.converter
-    if "missing-codes" in instrument.settings and converter is None:
-        raise InputError(place, "missing-codes without a converter", "add [converter]")
     if sensor is None:
         return Recording(time, instrument.spoilt(angle), "angle_rad", metadata=metadata)
     noise = sensor.noise_volts * random.standard_normal(len(time))

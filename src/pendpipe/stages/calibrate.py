@@ -39,7 +39,7 @@ def calibrate_record(
     """
     recording = read_plain(recording_path)
     content: dict[str, Any] = {"schema_version": 1, "volts_per_radian": None, "warnings": []}
-    own = given if given is not None else recording.number("volts_per_radian")
+    own = given if given is not None else recording.number("volts_per_radian", recording_path)
     if recording.quantity != "volts":
         content["from"] = f"recorded in {recording.unit}"
     elif own is not None:

@@ -32,7 +32,7 @@ def measure_recording(
     points, part
         The turning points, with the cuts; and the part of the recording they are from.
     """
-    decay = find_free_decay(recording)
+    decay = find_free_decay(recording, place)
     part = decay.of(recording)
     points = find_turning_points(part, place)
     notes = (*decay.notes, *points.notes)

@@ -67,7 +67,7 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
         Readings that are still volts; an angle beyond pi about its centre.
     """
     if recording.quantity == "volts":
-        recording = recording.as_motion()
+        recording = recording.as_motion(place=place)
     time, values = recording.time_s, recording.values
     finite, low, high = extent(values)
     if recording.quality is not None or not finite:

@@ -1,0 +1,98 @@
+"""What the paragraph says, and by which names and in which units its numbers are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.fault_terms import in_catalogue_terms
+from pendpipe.diagnose.held_out import HeldOut
+from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.result import Judged, Named
+from pendpipe.diagnose.statement import statement
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.estimate import Estimate
+
+from .records import INTERVAL_S, diagnosed
+
+
+def named(identifier: str, **parameters: Estimate) -> Named:
+    effect = by_identifier(identifier)
+    return Named(
+        effect.identifier, effect.name, effect.kind, effect.equation, parameters, 500.0, 1e-9,
+        0.9, (), effect.deciding, Location(summary="throughout the record"),
+    )  # fmt: skip
+
+
+def said(effect: Named, gain: float = 50.0) -> str:
+    before, after = Judged({}, 2e-4, 4.0), Judged({}, 1e-4, 1.0)
+    held = HeldOut(1000.0, 1000.0 + gain, 5.0)
+    return statement("eq8", before, after, [effect], held, 1e-4, 0.5, 0.01)
+
+
+def readings(unit: str = "rad") -> Data:
+    return Data(np.arange(10.0), np.zeros(10), 1.0, True, np.ones(10), unit=unit)
+
+
+def test_a_model_that_predicts_worse_is_said_to() -> None:
+    """A gain below zero is a loss: what was named has failed the test on readings it never saw."""
+    step = named("equilibrium-step", J=Estimate(1e-3, 1e-5, "rad"))
+    better, worse = said(step, 50.0), said(step, -50.0)
+    assert "predicted better by 50 +- 5" in better
+    assert "does not stand" not in better
+    assert "predicted worse by 50 +- 5" in worse
+    assert "does not stand this test" in worse
+    assert "better" not in worse
+
+
+def test_a_question_ends_as_one() -> None:
+    """What decides may be asked: "what touched it?"."""
+    rival = replace(named("amplitude-step"), indistinguishable=(("impulse", 0.2),))
+    assert rival.deciding.endswith("?")
+    assert f"impulse: {rival.deciding} With it" in said(rival)
+
+
+def test_a_pure_number_has_no_unit() -> None:
+    """As in every other result: "" in JSON, and nothing behind the number in the paragraph."""
+    numbers = [p for effect in CATALOGUE for p in effect.parameters if p.unit == "1"]
+    assert numbers
+    for parameter in numbers:
+        assert parameter.unit_in("rad") == ""
+    unit = by_identifier("amplitude-step").parameters[0].unit_in("m")
+    assert "s = 0.01 +- 0.001)" in said(named("amplitude-step", s=Estimate(0.01, 0.001, unit)))
+
+
+@pytest.mark.parametrize("unit", ["rad", "m"])
+@pytest.mark.parametrize(
+    ("identifier", "own", "name"),
+    [
+        ("broadband-drive", "S_a", "acceleration_density"),
+        ("clipping", "high", "upper_level"),
+        ("clipping", "low", "lower_level"),
+        ("jitter", "sigma_t", "sigma_t"),
+    ],
+)
+def test_a_fault_is_told_as_the_simulation_asks_for_it(
+    identifier: str, own: str, name: str, unit: str
+) -> None:
+    fault = named(identifier, **{own: Estimate(0.1, 0.01, "its own")})
+    told = in_catalogue_terms(fault, readings(unit)).parameters
+    declared = {p.name: p.unit_in(unit) for p in by_identifier(identifier).parameters}
+    assert told == {name: Estimate(0.1, 0.01, declared[name])}
+
+
+def test_what_a_test_measures_beside_the_catalogue_keeps_its_name() -> None:
+    fault = named("glitches", share=Estimate(0.01, 0.001, ""))
+    assert in_catalogue_terms(fault, readings()).parameters == fault.parameters
+
+
+def test_lost_samples_are_told_by_the_time_by_which_later_readings_are_late() -> None:
+    """Three readings are missing: what follows was read three intervals later."""
+    (effect,) = diagnosed("dropped-samples").diagnosis.effects
+    late = effect.parameters["d"]
+    assert late.value == pytest.approx(3.0 * INTERVAL_S)
+    assert late.unit == "s"
+    assert effect.parameters["samples"].value == 3.0
