@@ -17,7 +17,7 @@ from pendpipe.diagnose.forensics.lattice import (
     noise_before_rounding,
     whole_readings,
 )
-from pendpipe.diagnose.forensics.local import local_residual, residual_of
+from pendpipe.diagnose.forensics.local import error_of, local_residual
 from pendpipe.diagnose.refine import Fit
 from pendpipe.dynamics.sampling import lagrange
 
@@ -89,7 +89,7 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     if part is not None:
         index = np.arange(part.start, part.stop)
         return Raw(
-            samples.values[part], residual_of(data, fit), sampled.phase, data.weight > 0.0,
+            samples.values[part], error_of(data, fit), sampled.phase, data.weight > 0.0,
             index, np.arange(len(data)),
         )  # fmt: skip
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
