@@ -6,6 +6,7 @@ catalogue; what only fine residuals show, behind it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -53,8 +54,15 @@ class Forensics:
 
     def __init__(self, samples: Samples, level: float) -> None:
         self.samples, self.level = samples, level
-        self.p_value = 1.0
+        self._quiet: dict[str, float] = {}
         self.said: list[str] = []
+
+    def p_value(self, faults: Sequence[Fault]) -> float:
+        """The least global p-value: of the faults that are kept, and of tests that accused none.
+
+        What a test finds that is no fault (a step that rules, but does no harm) has no say.
+        """
+        return min([1.0, *self._quiet.values(), *(fault.p_value for fault in faults)])
 
     def before(self, state: State, progress: Progress) -> None:
         """Mend what would corrupt the fit: stamps, lost samples, clipping, glitches."""
@@ -93,9 +101,11 @@ class Forensics:
         """Make one test; keep what it finds; say whether to look again."""
         finding, p_value = self._tested(name, state, test)
         known = any(fault.finding.identifier == name for fault in state.faults)
-        if not known:
-            self.p_value = min(self.p_value, p_value)
-        if finding.kind != "fault" or p_value > self.level:
+        if finding.kind != "fault":
+            return False
+        if p_value > self.level:
+            if not known:
+                self._quiet[name] = min(p_value, self._quiet.get(name, 1.0))
             return False
         progress(f"{name}: {finding.summary}")
         if not known:
@@ -152,7 +162,6 @@ class Forensics:
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )  # fmt: skip
         state.faults.append(Fault(found, 0.0, len(state.steps)))
-        self.p_value = 0.0
         state.settle(fit, mended)
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
@@ -171,5 +180,4 @@ class Forensics:
             return False
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))
-        self.p_value = min(self.p_value, p_value)
         return True

@@ -132,7 +132,7 @@ def search(
     return Search(
         state.data, state.noise, _baseline_alone(state, beginning),
         replace(state.fit, spread=remainder.spread), tuple(state.steps), tuple(state.faults),
-        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value, 1.0),
+        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
         min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
         remainder, named or Reviewed(state.fit, remainder), tuple(forensics.said),
     )  # fmt: skip
