@@ -24,6 +24,9 @@ _SLIP: Final = 0.1
 """Phase in rad, likewise."""
 _MISJUDGED: Final = 1.6
 """By how much the first guess of the noise may be too small; more is a misfit."""
+_AGAIN: Final = 0.95
+"""Of the noise: where a refit leaves less, it was no noise of the model before."""
+_ROUNDS: Final = 3
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
 
@@ -136,4 +139,9 @@ def settled(
     # What is gross beside the first guess of the noise may be noise: it is if it is so anywhere.
     if is_gross(fit, data) and is_gross(better, finer):
         return fit, data, noise
+    for _ in range(_ROUNDS):
+        again = noise_left(better, finer, red=red)
+        if again.rms > _AGAIN * left.rms:
+            break
+        left, better = again, refine(fit.model, finer, again, better.value, held=held)
     return better, finer, left
