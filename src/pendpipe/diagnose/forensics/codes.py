@@ -13,7 +13,7 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.lattice import (
     Lattice,
-    find_lattice,
+    lattice_of,
     noise_before_rounding,
     whole_readings,
 )
@@ -120,7 +120,7 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
         return None
     raw = raw_readings(data, fit, samples)
     values, residual, used = raw.values, raw.residual, raw.used
-    lattice = find_lattice(values, samples.step)
+    lattice = lattice_of(values, samples)
     if lattice is None:
         return None
     local = local_residual(raw.phase, residual, used)
