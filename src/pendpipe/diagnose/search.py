@@ -124,6 +124,8 @@ def search(
         if not _add_one(state, task):
             break
     _prune(state, progress)
+    if forensics.again(state, progress):
+        _prune(state, progress)
     prefer_one_curve(state, progress)
     named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
@@ -232,7 +234,9 @@ def _prune(state: State, progress: Progress) -> None:
     if _drawn(state) and len(state.steps) > 1:
         without = fit_without(state, state.steps[-1])
         between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
-    for step in list(state.steps[:-1]):
+    # The last has been joined by others only if a fault was found behind it.
+    joined = any(fault.behind == len(state.steps) for fault in state.faults)
+    for step in list(state.steps if joined and not _drawn(state) else state.steps[:-1]):
         effect = step.winner.lead.effect
         without = None if isinstance(effect, FreedParameter) else fit_without(state, step)
         if without is None:

@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.between_readings import with_better_instants
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.evidence import Rival
@@ -59,12 +60,14 @@ class Step:
 class Fault:
     """A finding of the measurement's tests that counts, and its global p-value.
 
-    `behind` is how many effects had been added before.
+    `behind` is how many effects had been added before; `mask`, which readings have been left
+    out for it, in however many rounds; None for none.
     """
 
     finding: Finding
     p_value: float
     behind: int = 0
+    mask: BoolArray | None = None
 
 
 @dataclass
@@ -96,9 +99,9 @@ class State:
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
         """Take a new fit, and judge the noise by it."""
-        self.fit, self.data, self.noise = settled(
-            fit, data or self.data, noise or self.noise, self.holding
-        )
+        data, noise = data or self.data, noise or self.noise
+        fit = with_better_instants(fit, data, noise, self.holding)
+        self.fit, self.data, self.noise = settled(fit, data, noise, self.holding)
         if not fit.model.effects:
             self.bare = self.fit.value
 
