@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.forensics import TESTS, Finding
 from pendpipe.diagnose.forensics.combs import worst_comb
-from pendpipe.diagnose.forensics.lattice import with_true_step
+from pendpipe.diagnose.forensics.lattice import spacing_of, with_true_step
 from pendpipe.diagnose.run import diagnose_recording
 from pendpipe.recording import Recording
 
-from .decays import fitted
+from .decays import fitted, rounded
 from .faults import AIR, STEP_16, white
 
 
@@ -46,6 +49,46 @@ def test_bits_that_do_not_move_make_a_coarser_step(dead: int, code: FloatArray) 
     # Every second code missing is the same as a lowest bit that is stuck.
     assert finding.also == (("missing-codes",) if dead == 1 else ())
     assert asked(STEP_16 * coarse, "missing-codes").p_value > 1e-3
+
+
+@pytest.mark.parametrize("times", [2.37, 5.5, 12.62, 25.23, 100.9])
+def test_a_step_of_any_size_before_the_converter_is_a_coarser_step(times: float) -> None:
+    """Its readings are rounded to the converter's codes, and no code of its own is missing."""
+    noise = times * white(np.random.default_rng(72), AIR.count)
+    coarse = rounded(AIR.model().reading(AIR.values()) + noise, times * STEP_16)
+    readings = rounded(coarse, STEP_16)
+    finding = asked(readings, "coarse-quantisation")
+    assert finding.p_value < 1e-6
+    assert finding.kind == "fault"
+    assert finding.parameters["step"].value == pytest.approx(times * STEP_16, rel=1e-3)
+    assert "dead_bits" not in finding.parameters
+    for other in ("missing-codes", "clipping", "jitter"):
+        assert asked(readings, other).p_value > 1e-3
+
+
+def test_a_coarse_step_before_the_converter_is_all_that_is_said(code: FloatArray) -> None:
+    readings = rounded(rounded(STEP_16 * code, 12.62 * STEP_16), STEP_16)
+    record = Recording(AIR.times(), readings, "angle_rad", resolution=STEP_16)
+    effects = diagnose_recording(record).diagnosis.effects
+    assert [effect.identifier for effect in effects] == ["coarse-quantisation"]
+    assert effects[0].parameters["step"].value == pytest.approx(12.62 * STEP_16, rel=1e-3)
+
+
+@pytest.mark.parametrize("spacing", [2.2, math.e, math.pi, 7.3, 25.2, 1e3 / 3.0])
+def test_the_spacing_of_codes_is_that_of_the_lattice_they_are_roundings_of(spacing: float) -> None:
+    """Though every fourth of them never comes."""
+    for seed in range(20):
+        generator = np.random.default_rng(seed)
+        number = np.flatnonzero(generator.random(200) < 0.75)
+        found = spacing_of(np.round(spacing * number + generator.uniform(-0.5, 0.5)))
+        # Where a rounding at one end differs, the whole length does by one at most.
+        assert found == pytest.approx(spacing, abs=1.0 / 150.0)
+
+
+@given(st.floats(3.0, 1e3), st.integers(0, 2**32 - 1))
+def test_codes_that_lie_anywhere_have_no_spacing(usual: float, seed: int) -> None:
+    gaps = np.random.default_rng(seed).integers(2, int(3.0 * usual), 60).astype(np.float64)
+    assert spacing_of(np.cumsum(np.append(gaps, [2.0, 3.0]))) is None
 
 
 @pytest.mark.parametrize("period", [4, 16, 64])

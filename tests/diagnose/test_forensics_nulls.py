@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
 from pendpipe.diagnose.forensics.tails import Tail, fit_tail
 from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
+from pendpipe.diagnose.state import settled
 
-from .decays import Pendulum
-from .faults import NOISES, null
+from .decays import Fitted, Pendulum, fitted, rounded
+from .faults import AIR, NOISES, STEP_16, null
 
 _RECORDS = 6
 CLEAN: dict[Pendulum, FloatArray] = {}
@@ -75,6 +77,36 @@ def test_rounding_does_not_promise_thin_tails() -> None:
     assert np.mean(np.array(unaware) < 0.03) > 0.1
 
 
+def ruled_by_rounding(seed: int, extra: FloatArray | float = 0.0) -> tuple[Fitted, float]:
+    """A tenth of a step of noise, judged as in a search; and what is said of it in steps."""
+    noise = 0.1 * STEP_16 * np.random.default_rng(seed).standard_normal(AIR.count)
+    clean = CLEAN.setdefault(AIR, AIR.model().reading(AIR.values()))
+    record = fitted(AIR, rounded(clean + noise, STEP_16) + extra)
+    fit, data, judged = settled(record.fit, record.data, record.noise, ())
+    assert data.lattice is not None
+    record = replace(record, fit=fit, data=data, noise=judged)
+    finding = TESTS["coarse-quantisation"](data, fit, judged, record.samples)
+    return record, finding.parameters["noise_over_step"].value
+
+
+def test_a_reading_on_the_other_side_of_a_codes_edge_is_no_glitch() -> None:
+    # It is a whole step off the code that was due, and yet hardly half a step off the angle.
+    for seed in range(20):
+        record, before_rounding = ruled_by_rounding(seed)
+        finding = TESTS["glitches"](record.data, record.fit, record.noise, record.samples)
+        assert finding.p_value > 1e-3
+        assert before_rounding == pytest.approx(0.1, abs=0.035)
+
+
+def test_a_reading_two_steps_off_is_one() -> None:
+    record, _ = ruled_by_rounding(3, 2.0 * STEP_16 * (np.arange(AIR.count) == 1234))
+    finding = TESTS["glitches"](record.data, record.fit, record.noise, record.samples)
+    assert finding.p_value < 1e-6
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == [1234]
+    assert finding.parameters["largest"].value == pytest.approx(2.0 * STEP_16, rel=0.35)
+
+
 def test_a_rounded_error_is_beyond_as_often_as_drawn() -> None:
     generator, step = np.random.default_rng(6), 1.5
     rounding = step * generator.uniform(-0.5, 0.5, 400_000)
@@ -102,8 +134,6 @@ def test_one_square_of_many_is_chi_squared() -> None:
 
 
 def test_an_encoders_counts_have_no_codes_and_no_jitter() -> None:
-    from dataclasses import replace
-
     record = null(0, "12 bit, 0.8 steps", CLEAN)
     samples: Samples = replace(record.samples, counts=True, step=None)
     data = replace(record.data, time_noise=True)

@@ -41,9 +41,13 @@ def wide_swings() -> FloatArray:
     return np.asarray(solved.y[0] + NOISE_RAD * np.random.default_rng(4).standard_normal(1500))
 
 
-def searching(record: Recording) -> tuple[State, list[int]]:
-    """Search with circular error alone; and over how many readings it was asked for."""
+def searching(record: Recording, guess: float = 1.0) -> tuple[State, list[int]]:
+    """Search with circular error alone; and over how many readings it was asked for.
+
+    The noise is guessed too large by a factor, as lost samples make it.
+    """
     beginning = beginning_of(record)
+    beginning = replace(beginning, noise_rms=guess * beginning.noise_rms)
     noise = first_noise(beginning)
     fit = refine(beginning.model, beginning.data, noise, beginning.value)
     state = State(fit, beginning.data, noise, [], beginning.value, fit.value)
@@ -64,6 +68,14 @@ def searching(record: Recording) -> tuple[State, list[int]]:
 
     large_first(beginning, state, add_circular_error)
     return state, asked
+
+
+@pytest.mark.parametrize("guess", [1.0, 2.5])
+def test_the_noise_is_what_the_model_leaves_and_not_what_was_guessed(guess: float) -> None:
+    state, _ = searching(Recording(TIME_S, wide_swings(), "angle_rad"), guess)
+    sd = NOISE_RAD / math.sqrt(2.0 * len(TIME_S))
+    assert state.noise.white_rms == pytest.approx(NOISE_RAD, abs=4.0 * sd)
+    assert state.fit.chi2 / state.data.used == pytest.approx(1.0, abs=0.15)
 
 
 def test_what_rules_the_large_amplitudes_is_found_there_and_followed_to_the_end() -> None:

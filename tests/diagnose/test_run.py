@@ -12,18 +12,22 @@ from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.effects.baseline import OFFSET, OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.recording import Recording
 
+from .decays import rounded
 from .records import (
     FREQUENCY_HZ,
     LATER_S,
     LINEAR,
     NOISE_RAD,
+    TIME_S,
     TRUTH,
     VALUES,
     accused,
     diagnosed,
     other_engine,
     recording,
+    white,
 )
 
 NAMES = tuple(VALUES)
@@ -43,6 +47,15 @@ def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: i
     for name, truth in (("frequency", FREQUENCY_HZ), ("offset", TRUTH[OFFSET])):
         estimate = found.baseline.parameters[name]
         assert abs(estimate.value - truth) < 4.0 * estimate.sd
+
+
+def test_a_step_that_rules_and_does_no_harm_is_no_doubt_of_the_model() -> None:
+    """Noise far below the step, and amplitudes far above it: p is that of the verdict."""
+    step = 7.9e-5
+    readings = rounded(other_engine(TRUTH) + white(1, rms=0.05 * step), step)
+    found = diagnose_recording(Recording(TIME_S, readings, "angle_rad", resolution=step)).diagnosis
+    assert found.verdict == "consistent"
+    assert found.p_value > 0.01
 
 
 @pytest.mark.parametrize("name", NAMES)

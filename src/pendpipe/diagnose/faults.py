@@ -6,12 +6,14 @@ catalogue; what only fine residuals show, behind it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray
 from pendpipe.diagnose.data import at_even_times
 from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.forensics import TESTS, Test, find_lost_samples
@@ -53,8 +55,15 @@ class Forensics:
 
     def __init__(self, samples: Samples, level: float) -> None:
         self.samples, self.level = samples, level
-        self.p_value = 1.0
+        self._quiet: dict[str, float] = {}
         self.said: list[str] = []
+
+    def p_value(self, faults: Sequence[Fault]) -> float:
+        """The least global p-value: of the faults that are kept, and of tests that accused none.
+
+        What a test finds that is no fault (a step that rules, but does no harm) has no say.
+        """
+        return min([1.0, *self._quiet.values(), *(fault.p_value for fault in faults)])
 
     def before(self, state: State, progress: Progress) -> None:
         """Mend what would corrupt the fit: stamps, lost samples, clipping, glitches."""
@@ -92,21 +101,54 @@ class Forensics:
     ) -> bool:
         """Make one test; keep what it finds; say whether to look again."""
         finding, p_value = self._tested(name, state, test)
-        known = any(fault.finding.identifier == name for fault in state.faults)
-        if not known:
-            self.p_value = min(self.p_value, p_value)
-        if finding.kind != "fault" or p_value > self.level:
+        known = next((each for each in state.faults if each.finding.identifier == name), None)
+        if finding.kind != "fault":
+            return False
+        if p_value > self.level:
+            if known is None:
+                self._quiet[name] = min(p_value, self._quiet.get(name, 1.0))
             return False
         progress(f"{name}: {finding.summary}")
-        if not known:
-            state.faults.append(Fault(finding, p_value, len(state.steps)))
+        if known is None:
+            state.faults.append(Fault(finding, p_value, len(state.steps), finding.mask))
         if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
             return False
-        data = state.data.masked((state.data.weight == 0.0) | finding.mask)
-        noise = replace(state.noise, weight=data.weight)
-        fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
-        state.settle(fit, data, noise)
+        if known is not None and known.mask is not None:
+            more = replace(known, mask=known.mask[: len(state.data)] | finding.mask)
+            state.faults[_index(known, state.faults)] = more
+        _refit(state, (state.data.weight == 0.0) | finding.mask)
         return True
+
+    def again(self, state: State, progress: Progress) -> bool:
+        """Test anew, in the final model, what has readings left out; say whether some came back.
+
+        A misfit of the motion (or a fault that has been named since) bends windows and puts
+        readings off: with the physics in the model they may be as good as any.
+        """
+        before = state.data.weight
+        for fault in [fault for fault in state.faults if fault.mask is not None]:
+            if is_gross(state.fit, state.data):
+                break
+            self._test_again(fault, state, progress)
+        return bool(np.any(state.data.weight > before))
+
+    def _test_again(self, fault: Fault, state: State, progress: Progress) -> None:
+        name, place, masked = fault.finding.identifier, _index(fault, state.faults), state.data
+        assert fault.mask is not None
+        others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
+        whole = replace(masked, weight=np.where(others, 0.0, 1.0))
+        noise = replace(state.noise, weight=whole.weight)
+        finding = TESTS[name](whole, state.fit, noise, self.samples)
+        p_value = min(finding.p_value / _EACH, 1.0)
+        if p_value > self.level or finding.mask is None:
+            progress(f"{name}: not needed with the final model")
+            del state.faults[place]
+            self._quiet[name] = p_value
+            _refit(state, others)
+            return
+        state.faults[place] = Fault(finding, p_value, fault.behind, finding.mask)
+        if np.any((others | finding.mask) != (masked.weight == 0.0)):
+            _refit(state, others | finding.mask)
 
     def _mend_stamps(self, state: State, progress: Progress) -> None:
         """Take an even clock's times where the readings are evener than their stamps."""
@@ -152,7 +194,6 @@ class Forensics:
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )  # fmt: skip
         state.faults.append(Fault(found, 0.0, len(state.steps)))
-        self.p_value = 0.0
         state.settle(fit, mended)
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
@@ -171,5 +212,17 @@ class Forensics:
             return False
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))
-        self.p_value = min(self.p_value, p_value)
         return True
+
+
+def _index(fault: Fault, faults: Sequence[Fault]) -> int:
+    """Which of them it is (faults hold arrays, and cannot be compared)."""
+    return next(place for place, each in enumerate(faults) if each is fault)
+
+
+def _refit(state: State, out: BoolArray) -> None:
+    """Fit without the readings that are `out`, and with all others."""
+    data = replace(state.data, weight=np.where(out, 0.0, 1.0))
+    noise = replace(state.noise, weight=data.weight)
+    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
+    state.settle(fit, data, noise)

@@ -58,9 +58,9 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
     before = float(np.sum(state.fit.residual[: len(data)] ** 2))
     if not fit.model.effects or fit.chi2 >= before:
         return
-    state.data, state.noise = data, noise
-    state.fit, state.steps, state.first = fit, part.steps, part.first
-    state.holding = part.holding
+    state.steps, state.first, state.holding = part.steps, part.first, part.holding
+    # What was gross is explained now: the noise is what this model leaves, no more.
+    state.settle(fit, data, noise)
 
 
 def _large_readings(beginning: Beginning) -> int | None:

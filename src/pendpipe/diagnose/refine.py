@@ -139,6 +139,18 @@ def refine(
     )  # fmt: skip
 
 
+def misfit(model: Model, data: Data, noise: Noise, value: FloatArray) -> float:
+    """Return chi^2 at values, nothing fitted.
+
+    Raises
+    ------
+    NoMotionError
+        If the model can't be evaluated there.
+    """
+    residual, _ = _residual(data, noise, model.evaluate(value), value)
+    return float(residual @ residual)
+
+
 class _Tried(NamedTuple):
     value: FloatArray
     at: Evaluated

@@ -124,6 +124,8 @@ def search(
         if not _add_one(state, task):
             break
     _prune(state, progress)
+    if forensics.again(state, progress):
+        _prune(state, progress)
     prefer_one_curve(state, progress)
     named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
@@ -132,7 +134,7 @@ def search(
     return Search(
         state.data, state.noise, _baseline_alone(state, beginning),
         replace(state.fit, spread=remainder.spread), tuple(state.steps), tuple(state.faults),
-        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value, 1.0),
+        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
         min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
         remainder, named or Reviewed(state.fit, remainder), tuple(forensics.said),
     )  # fmt: skip
@@ -232,7 +234,9 @@ def _prune(state: State, progress: Progress) -> None:
     if _drawn(state) and len(state.steps) > 1:
         without = fit_without(state, state.steps[-1])
         between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
-    for step in list(state.steps[:-1]):
+    # The last has been joined by others only if a fault was found behind it.
+    joined = any(fault.behind == len(state.steps) for fault in state.faults)
+    for step in list(state.steps if joined and not _drawn(state) else state.steps[:-1]):
         effect = step.winner.lead.effect
         without = None if isinstance(effect, FreedParameter) else fit_without(state, step)
         if without is None:

@@ -8,8 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.between_readings import with_better_instants
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.evidence import Rival
@@ -24,6 +25,9 @@ _SLIP: Final = 0.1
 """Phase in rad, likewise."""
 _MISJUDGED: Final = 1.6
 """By how much the first guess of the noise may be too small; more is a misfit."""
+_AGAIN: Final = 0.95
+"""Of the noise: where a refit leaves less, it was no noise of the model before."""
+_ROUNDS: Final = 3
 _LEAST_STEP: Final = 0.1
 """Noise over step below which no model of a rounded reading is believed."""
 
@@ -56,12 +60,14 @@ class Step:
 class Fault:
     """A finding of the measurement's tests that counts, and its global p-value.
 
-    `behind` is how many effects had been added before.
+    `behind` is how many effects had been added before; `mask`, which readings have been left
+    out for it, in however many rounds; None for none.
     """
 
     finding: Finding
     p_value: float
     behind: int = 0
+    mask: BoolArray | None = None
 
 
 @dataclass
@@ -93,9 +99,9 @@ class State:
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
         """Take a new fit, and judge the noise by it."""
-        self.fit, self.data, self.noise = settled(
-            fit, data or self.data, noise or self.noise, self.holding
-        )
+        data, noise = data or self.data, noise or self.noise
+        fit = with_better_instants(fit, data, noise, self.holding)
+        self.fit, self.data, self.noise = settled(fit, data, noise, self.holding)
         if not fit.model.effects:
             self.bare = self.fit.value
 
@@ -136,4 +142,9 @@ def settled(
     # What is gross beside the first guess of the noise may be noise: it is if it is so anywhere.
     if is_gross(fit, data) and is_gross(better, finer):
         return fit, data, noise
+    for _ in range(_ROUNDS):
+        again = noise_left(better, finer, red=red)
+        if again.rms > _AGAIN * left.rms:
+            break
+        left, better = again, refine(fit.model, finer, again, better.value, held=held)
     return better, finer, left

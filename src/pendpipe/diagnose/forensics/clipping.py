@@ -15,7 +15,7 @@ from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import (
     Lattice,
-    find_lattice,
+    lattice_of,
     noise_before_rounding,
     whole_readings,
 )
@@ -61,7 +61,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if data.time_noise or samples.counts or data.used < 60:
         return nothing("clipping")
     raw = raw_readings(data, fit, samples)
-    lattice = find_lattice(raw.values, samples.step)
+    lattice = lattice_of(raw.values, samples)
     sides: tuple[Side, Side] = ("upper", "lower")
     ends = [_end(raw, lattice, side, noise.memory) for side in sides]
     p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))

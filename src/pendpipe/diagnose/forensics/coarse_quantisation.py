@@ -18,6 +18,8 @@ from pendpipe.estimate import Estimate
 
 _WELL_BELOW: Final = 0.25
 """Noise before rounding, in steps, above which the step does not rule."""
+_WHOLE: Final = 1e-9
+"""Part of the converter's step by which a spacing of whole bits may seem to be off."""
 _RANDOM: Final = 20.0
 """Amplitude in steps above which rounding errors are as good as random."""
 
@@ -34,8 +36,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     null is any noise above that. Where the amplitude stays above twenty steps the errors are
     pseudo-random, do the fit no harm, and are a property of the record.
 
-    Where the codes that come are a multiple of the converter's step apart, its lowest bits
-    do not move, and nothing need be measured.
+    Where the codes that come are several of the converter's steps apart, its lowest bits do not
+    move, or something before it has a coarser step, and nothing need be measured.
     """
     if samples.promised_step is not None:
         return _dead_bits(data, fit, samples)
@@ -72,25 +74,30 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
     """Codes that all lie on a coarser lattice; by chance one more would be with 1/times.
 
     With a noise of more than half the converter's step every code is as likely as its
-    neighbours, so that each reading tells ln(times) of likelihood.
+    neighbours, so that each reading tells ln(times) of likelihood. A lattice's place is read
+    off the codes themselves, and its spacing too where that is no whole number.
     """
     assert samples.step is not None
     assert samples.promised_step is not None
-    times = round(samples.step / samples.promised_step)
-    levels = len(np.unique(np.rint(samples.values / samples.step)))
+    times = samples.step / samples.promised_step
+    whole = abs(times - round(times)) < _WHOLE
+    free = len(np.unique(samples.values)) - (1 if whole else 2)
     amplitude = fit.at.sampled.amplitude
+    steps = f"the step is {samples.step:.3g} {data.unit}, where the converter's bits promise"
+    steps += f" {samples.promised_step:.3g}"
+    parameters = {
+        "step": Estimate(samples.step, 0.0, data.unit),
+        "promised": Estimate(samples.promised_step, 0.0, data.unit),
+    }
+    if whole:
+        parameters["dead_bits"] = Estimate(math.log2(times), 0.0, "")
     return Finding(
-        "coarse-quantisation", float(times) ** (1 - levels), 2.0 * data.used * math.log(times),
-        {
-            "step": Estimate(samples.step, 0.0, data.unit),
-            "promised": Estimate(samples.promised_step, 0.0, data.unit),
-            "dead_bits": Estimate(math.log2(times), 0.0, ""),
-        },
+        "coarse-quantisation", times**-free, 2.0 * data.used * math.log(times), parameters,
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(amplitude.min()), float(amplitude.max())),
         ),
-        summary=f"only one code in {times} comes: the step is {samples.step:.3g} {data.unit},"
-        f" where the converter's bits promise {samples.promised_step:.3g}",
-        also=("missing-codes",) if times == 2 else (),
+        summary=f"only one code in {times:.0f} comes: {steps}" if whole else
+        f"the codes that come are {times:.4g} apart, rounded to whole ones: {steps}",
+        also=("missing-codes",) if whole and round(times) == 2 else (),
     )  # fmt: skip

@@ -13,11 +13,11 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.lattice import (
     Lattice,
-    find_lattice,
+    lattice_of,
     noise_before_rounding,
     whole_readings,
 )
-from pendpipe.diagnose.forensics.local import local_residual, residual_of
+from pendpipe.diagnose.forensics.local import error_of, local_residual
 from pendpipe.diagnose.refine import Fit
 from pendpipe.dynamics.sampling import lagrange
 
@@ -89,7 +89,7 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     if part is not None:
         index = np.arange(part.start, part.stop)
         return Raw(
-            samples.values[part], residual_of(data, fit), sampled.phase, data.weight > 0.0,
+            samples.values[part], error_of(data, fit), sampled.phase, data.weight > 0.0,
             index, np.arange(len(data)),
         )  # fmt: skip
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
@@ -120,7 +120,7 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
         return None
     raw = raw_readings(data, fit, samples)
     values, residual, used = raw.values, raw.residual, raw.used
-    lattice = find_lattice(values, samples.step)
+    lattice = lattice_of(values, samples)
     if lattice is None:
         return None
     local = local_residual(raw.phase, residual, used)

@@ -15,8 +15,8 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import (
     Local,
+    error_of,
     local_residual,
-    residual_of,
     whitened_in_time,
 )
 from pendpipe.diagnose.forensics.tails import Tail, fit_tail
@@ -55,7 +55,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """
     if data.used < 60:
         return nothing("glitches")
-    residual, used = residual_of(data, fit), data.weight > 0.0
+    residual, used = error_of(data, fit), data.weight > 0.0
     local, smeared = _errors(data, fit, noise, residual, ~used)
     error = own_error(local)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)

@@ -22,8 +22,11 @@ _PLAINLY: Final = 0.6
 _LOOK: Final = 256
 _LEVELS: Final = 16
 """Different codes from which chance (2^-16 at most) puts no more on a coarser lattice."""
+_ROUNDS: Final = 4
 _OFF: Final = 0.05
 """Part of a step by which readings may be off their codes."""
+_ROUNDED: Final = 0.6
+"""Steps of the converter by which it moves a coarser step's readings: half of one, and a bit."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,8 @@ class Lattice:
         return np.asarray((value - self.origin) / self.step)
 
 
-def find_lattice(values: FloatArray, step: float | None) -> Lattice | None:
-    """Number the codes of readings; None where they lie on no lattice.
+def find_lattice(values: FloatArray, step: float | None, slack: float = _OFF) -> Lattice | None:
+    """Number the codes of readings; None where they lie on no lattice, but for a `slack`.
 
     The step is refined over the whole range, so that codes far from zero are counted right.
     """
@@ -66,17 +69,29 @@ def find_lattice(values: FloatArray, step: float | None) -> Lattice | None:
     centred = number - number.mean()
     refined = float(centred @ levels / (centred @ centred))
     origin = float(np.mean(levels - refined * number))
-    if np.max(np.abs(levels - origin - refined * number)) > _OFF * refined:
+    if np.max(np.abs(levels - origin - refined * number)) > slack * refined:
         return None
     shift = round(origin / refined)
     return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
 
 
+def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
+    """Number the codes of a recording's readings (or some of them), as `find_lattice`.
+
+    A coarser step that something has before the converter is rounded to the converter's own.
+    """
+    if samples.step is None or samples.promised_step is None:
+        return find_lattice(values, samples.step)
+    rounded = _ROUNDED * samples.promised_step / samples.step
+    return find_lattice(values, samples.step, max(rounded, _OFF))
+
+
 def with_true_step(samples: Samples) -> Samples:
-    """Take the step of the codes that come, where it is a multiple of the converter's.
+    """Take the step of the codes that come, where it is larger than the converter's.
 
     A converter whose lowest k bits do not move gives every 2^k-th code: its step is 2^k
-    times what its bits promise.
+    times what its bits promise. Where something before it has a step of its own, of any size,
+    the codes that come are that step's multiples, each rounded to the nearest code.
     """
     if samples.counts or samples.step is None:
         return samples
@@ -84,14 +99,49 @@ def with_true_step(samples: Samples) -> Samples:
     whole = np.rint(codes)
     if np.max(np.abs(codes[:_LOOK] - whole[:_LOOK])) > _OFF:
         return samples
-    if np.gcd.reduce(whole[:_LOOK].astype(np.int64)) < 2:
+    if np.diff(np.unique(whole[:_LOOK])).min(initial=np.inf) < 2.0:
         return samples
-    times = int(np.gcd.reduce(whole.astype(np.int64)))
-    if times < 2 or len(np.unique(whole)) < _LEVELS:
+    levels = np.unique(whole)
+    times = spacing_of(levels) if len(levels) >= _LEVELS else None
+    if times is None:
         return samples
     step = times * samples.step
     noise = max(samples.noise_rms, noise_rms(samples.values, step))
     return replace(samples, step=step, noise_rms=noise, promised_step=samples.step)
+
+
+def spacing_of(levels: FloatArray) -> float | None:
+    """How many steps the codes that come lie apart; None where they may lie anywhere.
+
+    Parameters
+    ----------
+    levels
+        Codes (whole numbers) that came, rising.
+
+    Returns
+    -------
+    float or None
+        Whole where all codes are its multiples (from one of them on); else the spacing of a
+        lattice of which they are the roundings.
+    """
+    gaps = np.diff(levels)
+    if len(gaps) < 2 or gaps.min() < 2.0:
+        return None
+    common = int(np.gcd.reduce(gaps.astype(np.int64)))
+    if common > 1:
+        return float(common)
+    # One spacing between neighbours, rounded down or up; further on two, three, ...
+    spacing = float(np.mean(gaps[gaps <= 1.5 * gaps.min()]))
+    number = np.append(0.0, np.cumsum(np.round(gaps / spacing)))
+    for _ in range(_ROUNDS):
+        centred = number - number.mean()
+        spacing = float(centred @ levels / (centred @ centred))
+        off = levels - spacing * number
+        if float(np.ptp(off)) < 2.0 * _ROUNDED:
+            return spacing
+        # A gap may have been counted wrong: the line through all of them counts better.
+        number = np.round((levels - off.mean()) / spacing)
+    return None
 
 
 def whole_readings(data: Data, samples: Samples) -> slice | None:

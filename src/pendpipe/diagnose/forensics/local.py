@@ -9,7 +9,7 @@ of the second and third harmonic where these are there).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -80,6 +80,16 @@ class Local:
 def residual_of(data: Data, fit: Fit) -> FloatArray:
     """Readings minus model, along the motion where they are out of phase; 0 where masked."""
     return np.asarray(unwrapped(data, fit.at)[0] * (data.weight > 0.0))
+
+
+def error_of(data: Data, fit: Fit) -> FloatArray:
+    """Readings minus the motion itself, the rounding's error with them; 0 where masked.
+
+    What rounds a reading is bounded by half a step, and is reckoned with by whoever asks for
+    codes or tails: taking its mean off first (`Data.residual`) would move a reading on the other
+    side of a code's edge by a whole step, and the motion to the middle of the code.
+    """
+    return residual_of(replace(data, lattice=None), fit)
 
 
 def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
