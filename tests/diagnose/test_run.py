@@ -12,6 +12,7 @@ from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.effects.baseline import OFFSET, OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.errors import InputError
 
 from .records import (
     FREQUENCY_HZ,
@@ -145,6 +146,13 @@ def test_a_right_prediction_is_consistent() -> None:
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert outcome.diagnosis.verdict == "consistent"
     assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
+
+
+@pytest.mark.parametrize("given", [{"c": 1.0}, {"mass": 1.0}, {"b": -0.1}])
+def test_what_cannot_be_held_is_refused_in_one_line(given: dict[str, float]) -> None:
+    """A friction that stops the pendulum at once, no parameter, and a gain of energy."""
+    with pytest.raises(InputError, match="; "):
+        diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
 
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])

@@ -69,9 +69,10 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.stages.diagnose import Question, refused_before
 
     keep_memory()
+    fixed = parse_fixed(arguments.fix, arguments.baseline)
     question = Question(
-        arguments.baseline, parse_fixed(arguments.fix), arguments.seed, arguments.level,
-        arguments.figures, arguments.record is not None,
+        arguments.baseline, fixed, arguments.seed, arguments.level, arguments.figures,
+        arguments.record is not None,
     )  # fmt: skip
     earlier = refused_before(arguments.refused)
     if earlier is not None:
