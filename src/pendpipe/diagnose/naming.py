@@ -114,7 +114,7 @@ def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
 def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:
     effect = lead.effect
     if isinstance(effect, FreedParameter):
-        held = [index for index in held if index != effect.index]
+        held = effect.without(held)
     sizes = np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
     shape = finer_shape(base, noise, lead)
     start = np.concatenate([base.value, sizes, np.asarray(shape, dtype=np.float64)])

@@ -215,7 +215,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     winner = rivals[0]
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
     if isinstance(winner.lead.effect, FreedParameter):
-        state.holding.remove(winner.lead.effect.index)
+        state.holding = winner.lead.effect.without(state.holding)
     state.settle(winner.fit)
     return True
 
