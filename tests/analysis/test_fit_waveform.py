@@ -195,6 +195,18 @@ def test_a_wrong_fix_is_refused(word: str) -> None:
         parse_fixed([word])
 
 
+def test_a_parameter_is_held_once() -> None:
+    with pytest.raises(InputError, match="a is held twice"):
+        parse_fixed(["a=0.02", "a=0.03"])
+
+
+@pytest.mark.parametrize("name", ["a", "c", "quality_factor_hysteretic"])
+def test_what_equation_3_lacks_is_not_held_beside_it(name: str) -> None:
+    """Its only loss is viscous: no drag, no Coulomb friction, no hysteresis."""
+    with pytest.raises(InputError, match=r"Eq\. 3.* has no .*; .*--baseline eq8"):
+        fitted(fixed={name: 0.01}, baseline="viscous")
+
+
 def test_b_and_its_parts_are_not_held_together() -> None:
     with pytest.raises(InputError, match="both held"):
         parse_fixed(["b=0.01", "quality_factor_viscous=200"])

@@ -186,12 +186,17 @@ def test_a_file_that_is_not_there_leaves_nothing(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("words", [["--fix", "mass=1"], ["--fix", "a=-1"]])
+@pytest.mark.parametrize("words", [
+    ["--fix", "mass=1"], ["--fix", "a=-1"], ["--fix", "a=0.01", "--fix", "a=0.02"],
+    ["--baseline", "viscous", "--fix", "c=1e-4"],
+])  # fmt: skip
 def test_a_parameter_that_cannot_be_held_is_a_usage_fault(
     linear: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["diagnose", str(linear), "--out", str(tmp_path / "out"), *words]) == 2
-    assert "--fix" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "--fix" in said
+    assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 

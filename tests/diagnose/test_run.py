@@ -10,8 +10,9 @@ from scipy.stats import binom
 
 from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.values import effect_parameters
-from pendpipe.effects.baseline import OFFSET, OMEGA, B
+from pendpipe.effects.baseline import OFFSET, OMEGA, B, pendulum_of
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 
 from .decays import rounded
@@ -169,6 +170,55 @@ def test_a_right_prediction_is_consistent() -> None:
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert outcome.diagnosis.verdict == "consistent"
     assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
+
+
+def quality_factor(rate: float) -> float:
+    """Of a part of b, 1/s, by itself."""
+    return float(np.pi * FREQUENCY_HZ / rate)
+
+
+@pytest.mark.parametrize("part", ["hysteretic", "viscous"])
+def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
+    """One part given by itself, and too large, is accused; b was free to be more, not less."""
+    name = f"quality_factor_{part}"
+    given = {name: quality_factor(1.2 * float(TRUTH[B]))}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == [f"parameter-{name}"]
+    least = outcome.diagnosis.baseline.parameters["b"]
+    assert least.at_bound
+    assert least.value == pytest.approx(1.2 * TRUTH[B], rel=1e-4)  # by the apparent frequency
+    found = outcome.diagnosis.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+@pytest.mark.parametrize(("part", "share"), [("hysteretic", 0.4), ("viscous", 0.6)])
+def test_a_part_of_the_loss_is_held_while_the_other_is_fitted(part: str, share: float) -> None:
+    rate = share * float(TRUTH[B])
+    given = {f"quality_factor_{part}": quality_factor(rate)}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert outcome.diagnosis.verdict == "consistent"
+    fit = outcome.search.baseline
+    kept = getattr(pendulum_of(fit.value), part)
+    assert kept == pytest.approx(rate, rel=1e-4)  # by the apparent frequency
+    found = outcome.diagnosis.baseline.parameters["b"]
+    assert 0.0 < abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
+    given = {"quality_factor_viscous": quality_factor(1.1 * float(LINEAR[B]))}
+    record = recording(other_engine(LINEAR), 4)
+    outcome = diagnose_recording(record, baseline="viscous", fixed=given)
+    names = [effect.identifier for effect in outcome.diagnosis.effects]
+    assert names == ["parameter-quality_factor_viscous"]
+    held = outcome.diagnosis.baseline.parameters["b"]
+    assert held.sd == 0.0
+
+
+@pytest.mark.parametrize("given", [{"c": 1.0}, {"mass": 1.0}, {"b": -0.1}])
+def test_what_cannot_be_held_is_refused_in_one_line(given: dict[str, float]) -> None:
+    """A friction that stops the pendulum at once, no parameter, and a gain of energy."""
+    with pytest.raises(InputError, match="; "):
+        diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
 
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])

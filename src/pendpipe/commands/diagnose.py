@@ -70,9 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.stages.diagnose import Question, refused_before
 
     keep_memory()
+    fixed = parse_fixed(arguments.fix, arguments.baseline)
     question = Question(
-        arguments.baseline, parse_fixed(arguments.fix), arguments.seed, arguments.level,
-        arguments.figures, arguments.record is not None,
+        arguments.baseline, fixed, arguments.seed, arguments.level, arguments.figures,
+        arguments.record is not None,
     )  # fmt: skip
     if Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a place for it.

@@ -67,7 +67,7 @@ def _fit(arguments: argparse.Namespace) -> None:
     from pendpipe.commands._motion import read_motion
     from pendpipe.files import write_json
 
-    fixed = parse_fixed(arguments.fix)
+    fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments)
     if arguments.turning_points is not None:
         points = read_turning_points(arguments.turning_points)

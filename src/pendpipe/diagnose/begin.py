@@ -19,6 +19,7 @@ from pendpipe.diagnose.data import Data, gather
 from pendpipe.diagnose.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.effects.held_parts import with_parts
 from pendpipe.effects.model import Model
 from pendpipe.physics.decay import time_at
 
@@ -74,13 +75,13 @@ def begin(
         counts=samples.counts, period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
     )  # fmt: skip
+    value = with_parts(value, parts)
     data = _far_from_the_stop(data, value)
     order = order_for(abs(angle), samples.unit)
-    data, model = _before_the_stop(data, value, order)
+    data, model = _before_the_stop(data, value, order, parts)
     data = replace(data, anchor=anchored(data, model.evaluate(value)))
-    return Beginning(
-        data, model, value, _held(held_rates, fixed, parts, baseline), data.noise_rms, points
-    )
+    held = _held(held_rates, fixed, parts, baseline)
+    return Beginning(data, model, value, held, data.noise_rms, points)
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
@@ -95,12 +96,14 @@ def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
     return data.first(keep) if _FEWEST < keep < len(data) else data
 
 
-def _before_the_stop(data: Data, value: FloatArray, order: int) -> tuple[Data, Model]:
+def _before_the_stop(
+    data: Data, value: FloatArray, order: int, parts: Mapping[str, float]
+) -> tuple[Data, Model]:
     """Leave readings at the end out until the start values move the pendulum to the last."""
     while True:
         model = Model(
             data.time_s, data.interval_s, order=order, fold=data.fold,
-            first_s=float(data.time_s[0]),
+            first_s=float(data.time_s[0]), parts=parts,
         )  # fmt: skip
         try:
             model.evaluate(value)
@@ -127,9 +130,10 @@ def _held(
     baseline: Baseline,
 ) -> tuple[int, ...]:  # fmt: skip
     index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
-    held = [index[name] for name in held_rates]
+    # Held parts of b are the model's matter.
+    held = [index[name] for name in held_rates if name != "b" or not parts]
     if "frequency" in fixed:
         held.append(OMEGA)
-    if parts or baseline == "viscous" or held_rates.get("b") == 0.0:
+    if baseline == "viscous" or held_rates.get("b") == 0.0:
         held.append(SHARE)
     return tuple(held)

@@ -31,7 +31,7 @@ _UNSURE: Final = (4.5, 0.01)
 """What `_FORM` and `MISSHAPEN` are to classes, to probabilities: with these, stated ones came
 true on opened challenges. Scans and optima add to the spread where little is gained, and most
 laws leave less of a large gain than the worst do."""
-_SIZE: Final = 6.0
+SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
 
 
@@ -138,7 +138,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
         worth = equivalent(trials.global_p_value(local), gain)
     else:
         # Too large for p-values: what trials and further sizes take off a large gain.
-        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - _SIZE * (sizes - 1)
+        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - SIZE * (sizes - 1)
     fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
     return worth - _SHAPE * max(fitted, 0) + _prior(effect, fit)
 
@@ -164,7 +164,7 @@ def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
     left = own - basis @ (basis.T @ own)
     squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
-    needless = squares < _SIZE
+    needless = squares < SIZE
     return float(squares[needless].sum()), max(int(np.count_nonzero(~needless)), 1)
 
 
@@ -198,6 +198,9 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     prior = np.array([rival.prior for rival in rivals])
     likelihood = np.array([rival.evidence for rival in rivals]) - prior
     best = float(likelihood.max())
-    logs = np.append(0.5 * (shrunk * (likelihood - best) + prior), 0.5 * (none - best))
+    # A parameter's law is the baseline's own: what it leaves is not a matter of its form.
+    own_form = np.array([rival.lead.effect.kind == "parameter" for rival in rivals])
+    worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
+    logs = np.append(0.5 * (worth + prior), 0.5 * (none - best))
     weights = np.exp(logs - logs.max())
     return np.asarray(weights / weights.sum())

@@ -86,11 +86,14 @@ def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]
         return []
     best = _rank(leads[0])
     near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.9 if gross else 0.3) * best]
-    if not gross:
-        return near[:most]
-    # Bearing and fluid are in every pendulum: they are asked whatever their first order says.
-    near = near[: most + 2]
-    return [*near, *(lead for lead in leads if lead.effect.expected and lead not in near)]
+    near = near[: most + 2 if gross else most]
+    # Asked whatever their first order says: what the user holds, which is little; and in a gross
+    # misfit bearing and fluid, which are in every pendulum.
+    asked = [
+        lead for lead in leads
+        if isinstance(lead.effect, FreedParameter) or (gross and lead.effect.expected)
+    ]  # fmt: skip
+    return [*near, *(lead for lead in asked if lead not in near)]
 
 
 def _rank(lead: Lead) -> float:
@@ -114,7 +117,7 @@ def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
 def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:
     effect = lead.effect
     if isinstance(effect, FreedParameter):
-        held = [index for index in held if index != effect.index]
+        held = effect.without(held)
     sizes = np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
     shape = finer_shape(base, noise, lead)
     start = np.concatenate([base.value, sizes, np.asarray(shape, dtype=np.float64)])

@@ -14,9 +14,10 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, C
+from pendpipe.effects.baseline import OMEGA, SHARE, B, C
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.held_parts import share_by_b
 from pendpipe.effects.model import Model
 
 _ROUNDS: Final = 14
@@ -111,7 +112,7 @@ def refine(
     fixed = {*held, *model.held()}
     free = np.array([k for k in range(model.size) if k not in fixed])
     low, high = model.bounds()
-    value = np.clip(start, low, high)
+    value = model.settled(np.clip(start, low, high))
     at = model.evaluate(value)
     residual, slip = _residual(data, noise, at, value)
     converged = False
@@ -165,7 +166,7 @@ def _tried(
     """Go along a step as far as it lowers chi^2; None where it does nowhere."""
     low, high = model.bounds()
     for shrink in (1.0, 0.3, 0.1, 0.02):
-        trial = np.clip(value + shrink * step, low, high)
+        trial = model.settled(np.clip(value + shrink * step, low, high))
         try:
             there = model.evaluate(trial)
         except NoMotionError:
@@ -190,6 +191,8 @@ def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> F
     columns[:-1] = noise.whiten(jacobian(model, value, at))
     columns[-1] = 0.0
     columns[-1, SHARE] = 1.0 / _SHARE_SD
+    # Where one part of b is held, b moves the share.
+    columns[:, B] += share_by_b(value, model.held_parts()) * columns[:, SHARE]
     return columns
 
 

@@ -9,8 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnose.begin import Beginning, begin
 from pendpipe.diagnose.fault_terms import in_catalogue_terms
 from pendpipe.diagnose.forensics.lattice import with_true_step
@@ -26,6 +28,8 @@ from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import parameters_of
 from pendpipe.diagnose.weighing import effect_named, fault_named
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
 LEVEL: Final = 0.01
@@ -70,10 +74,11 @@ def diagnose_recording(
     Raises
     ------
     InputError
-        If the recording can't be analysed.
+        If a parameter can't be held, or the recording can't be analysed.
     """
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
+    check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")
     points, part = measure_recording(recording.as_motion(place=place), place)
     return diagnose_decay(
@@ -85,7 +90,7 @@ def diagnose_recording(
 # Trials far from any motion overflow; they are looked at, and thrown away.
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def diagnose_decay(
-    part: Recording, points: Any, *, baseline: Baseline = "eq8",
+    part: Recording, points: TurningPoints, *, baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None, seed: int = 0, level: float = LEVEL,
     place: str | Path = "recording", provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent, whole: Recording | None = None,
@@ -94,16 +99,14 @@ def diagnose_decay(
 
     Of the `whole` recording that it was cut from only the time stamps are looked at.
     """
-    from pendpipe.effects.catalogue import CATALOGUE
-
     fixed = fixed or {}
+    check_fixed(fixed, baseline)
     samples = with_true_step(prepare(part, place))
-    beginning = begin(samples, points, baseline=baseline, fixed=fixed)
-    found = search(
-        beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
-        freed=freed_parameters(fixed), progress=progress,
-    )  # fmt: skip
-    found = with_likeliest(found, beginning)
+    try:
+        found, beginning = _searched(samples, points, baseline, fixed, level, seed, progress)
+    except NoMotionError as fault:
+        remedy = "cut it with --start and --stop, or change what is held with --fix"
+        raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
     named = _as_added(found, beginning)
     gap = gap_note(
         (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
@@ -131,6 +134,20 @@ def diagnose_decay(
         provenance=dict(provenance or {}),
     )  # fmt: skip
     return Outcome(diagnosis, found, beginning)
+
+
+def _searched(
+    samples: Samples, points: TurningPoints, baseline: Baseline, fixed: Mapping[str, float],
+    level: float, seed: int, progress: Progress,
+) -> tuple[Search, Beginning]:  # fmt: skip
+    from pendpipe.effects.catalogue import CATALOGUE
+
+    beginning = begin(samples, points, baseline=baseline, fixed=fixed)
+    found = search(
+        beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
+        freed=freed_parameters(fixed), progress=progress,
+    )  # fmt: skip
+    return with_likeliest(found, beginning), beginning
 
 
 def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:

@@ -117,7 +117,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     kept = _Kept(tangent_basis(fit), most)
     for effect, rows in zip(effects, shapes, strict=True):
         if isinstance(effect, FreedParameter):
-            kept.add(effect, rows, fit.jacobian[:, [effect.index]].T)
+            kept.add(effect, rows, effect.sensitivity(fit)[None])
             continue
         some = max(_AT_ONCE // effect.sizes, 1)
         for first in range(0, len(rows), some):

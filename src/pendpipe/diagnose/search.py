@@ -34,6 +34,7 @@ from pendpipe.diagnose.review import (
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.diagnose.task import Task, undrawn
 from pendpipe.diagnose.two_names import prefer_two_names
+from pendpipe.diagnose.wrong_parameters import doubt_curve, prefer_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
@@ -119,14 +120,9 @@ def search(
     forensics = Forensics(samples, level)
     task = Task(catalogue, freed, baseline, level, seed, forensics, progress)
     large_first(beginning, state, lambda part: _add_one(part, task, _MAIN))
-    while len(state.steps) < _MOST:
-        forensics.before(state, progress)
-        if not _add_one(state, task):
-            break
-    _prune(state, progress)
-    if forensics.again(state, progress):
-        _prune(state, progress)
-    prefer_one_curve(state, progress)
+    _add_all(state, task)
+    if doubt_curve(state, task):
+        _add_all(state, task)
     named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
     assert state.first is not None
@@ -138,6 +134,18 @@ def search(
         min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
         remainder, named or Reviewed(state.fit, remainder), tuple(forensics.said),
     )  # fmt: skip
+
+
+def _add_all(state: State, task: Task) -> None:
+    """Add effects until chance explains the rest, and put one curve for several if it does."""
+    while len(state.steps) < _MOST:
+        task.forensics.before(state, task.progress)
+        if not _add_one(state, task):
+            break
+    _prune(state, task.progress)
+    if task.forensics.again(state, task.progress):
+        _prune(state, task.progress)
+    prefer_one_curve(state, task.progress)
 
 
 def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
@@ -202,6 +210,8 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
         state.fit, state.data, state.noise, found, held=state.holding, gross=gross,
         origin=state.origin,
     )  # fmt: skip
+    if rivals:
+        rivals = prefer_parameters(state, rivals)
     if not gross and rivals:
         rivals = prefer_two_names(state, rivals, task)
     if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
@@ -217,7 +227,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     winner = rivals[0]
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
     if isinstance(winner.lead.effect, FreedParameter):
-        state.holding.remove(winner.lead.effect.index)
+        state.holding = winner.lead.effect.without(state.holding)
     state.settle(winner.fit)
     return True
 

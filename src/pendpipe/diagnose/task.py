@@ -82,7 +82,7 @@ class Task:
         """Score all that may be missing on what a state leaves (`state.now`)."""
         effects = [
             *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
-            *(entry for entry in self.freed if entry.index in state.holding),
+            *(entry for entry in self.freed if entry not in state.fit.model.effects),
         ]
         self.progress(f"scanning {len(effects)} effects")
         scanner = prepare(state.fit, state.data, state.noise, effects)

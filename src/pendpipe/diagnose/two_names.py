@@ -9,6 +9,7 @@ from typing import Final
 
 from pendpipe.diagnose.detect import Detection, detect, prepare
 from pendpipe.diagnose.evidence import Rival, form_spread
+from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.one_curve import BETTER
 from pendpipe.diagnose.refine import Fit
@@ -28,7 +29,8 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
 
     A curve bends far enough to follow some of both of two effects, and once it is drawn
     nothing is named on top of it. The margin is wider than that of `prefer_one_curve`, since
-    the names come after it, and beyond what their own scans take off.
+    the names come after it, and beyond what their own scans take off. A held parameter that is
+    wrong bends nothing by itself: a name beside it need only be as good as the curve.
     """
     curve = rivals[0]
     if not curve.drawn:
@@ -38,17 +40,26 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
     names = names or [rival for rival in _first(state) if rival.gain > least_gain]
     for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST]:
         task.progress(f"is it {name.identifier} and something else?")
-        second = max((rival.evidence for rival in _second(state, name, task)), default=0.0)
-        if name.evidence + second > curve.evidence + math.hypot(BETTER, form_spread(curve)):
+        if any(
+            name.evidence + second.evidence > curve.evidence + _margin(curve, name, second)
+            for second in _second(state, name, task)
+        ):
             return [name, *(rival for rival in rivals if rival is not name)]
     return list(rivals)
+
+
+def _margin(curve: Rival, *names: Rival) -> float:
+    """By how much two names must be better than a curve."""
+    if any(isinstance(name.lead.effect, FreedParameter) for name in names):
+        return 0.0
+    return math.hypot(BETTER, form_spread(curve))
 
 
 def _first(state: State) -> list[Rival]:
     """The best names, where curves alone were worth refitting."""
     assert state.now is not None
     leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
-    return _refitted(state.fit, replace(state.now, leads=leads), state, _FIRST)
+    return _refitted(state.fit, replace(state.now, leads=leads), state, state.holding, _FIRST)
 
 
 def _second(state: State, name: Rival, task: Task) -> list[Rival]:
@@ -58,15 +69,21 @@ def _second(state: State, name: Rival, task: Task) -> list[Rival]:
         for effect in applicable(task.catalogue, name.fit, task.baseline, state.data.unit)
         if effect.kind != "unnamed"
     ]
-    scanner = prepare(name.fit, state.data, state.noise, effects)
+    held = state.holding
+    if isinstance(name.lead.effect, FreedParameter):
+        held = name.lead.effect.without(held)
+    freed = [entry for entry in task.freed if entry not in name.fit.model.effects]
+    scanner = prepare(name.fit, state.data, state.noise, [*effects, *freed])
     found = detect(scanner, name.fit, seed=task.seed, known=state.now)
     if found.p_value > task.threshold:
         return []
-    return _refitted(name.fit, found, state, _SECOND)
+    return _refitted(name.fit, found, state, held, _SECOND)
 
 
-def _refitted(base: Fit, found: Detection, state: State, most: int) -> list[Rival]:
+def _refitted(
+    base: Fit, found: Detection, state: State, held: Sequence[int], most: int
+) -> list[Rival]:
     return refit_leads(
-        base, state.data, state.noise, found, held=state.holding, gross=False, most=most,
+        base, state.data, state.noise, found, held=held, gross=False, most=most,
         origin=state.origin,
     )  # fmt: skip

@@ -79,7 +79,7 @@ def _slope(fit: Fit, early: Model, index: int, step: float) -> FloatArray:
         moved = fit.value.copy()
         moved[index] += signed
         try:
-            there = _numbers(early, early.evaluate(moved))
+            there = _numbers(early, early.evaluate(early.settled(moved)))
         except NoMotionError:
             continue
         return np.asarray((there - numbers) / signed)
@@ -102,7 +102,8 @@ def _estimate(
 ) -> Estimate:
     value = float(fit.value[index])
     sd = math.sqrt(max(float(covariance[index, index]), 0.0))
-    at_bound = index in fit.free and index in (A, B, C) and value <= 0.0
+    lowest = float(fit.model.bounds()[0][index])
+    at_bound = index in fit.free and index in (A, B, C) and value <= lowest
     return Estimate(value, sd, unit, interval, at_bound)
 
 

@@ -169,7 +169,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     effect = step.winner.lead.effect
     held = list(found.held)
     model, value = found.improved.model.dropping(effect, found.improved.value)
-    if isinstance(effect, FreedParameter):
+    if isinstance(effect, FreedParameter) and effect.index is not None:
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
     bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
@@ -217,7 +217,7 @@ def refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> 
     """Refit a rival in the final model, from where it ended before."""
     effect = rival.lead.effect
     if isinstance(effect, FreedParameter):
-        held = [index for index in held if index != effect.index]
+        held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
     return _refined(without.model.adding(effect), found, held, start, rival.fit.value)

@@ -162,6 +162,8 @@ class Effect:
     """Twice the logarithm of how much likelier it is beforehand than others."""
     template: ClassVar[bool] = True
     """False where it has no template in the readings, and is found by a test of its own."""
+    releases: ClassVar[str | None] = None
+    """The held part of b ("hysteretic" or "viscous") that is free with it."""
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
 

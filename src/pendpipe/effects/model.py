@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -19,11 +20,13 @@ from pendpipe.effects.baseline import (
     OMEGA,
     START,
     TIME,
+    B,
     closed_form,
     pendulum_of,
 )
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
 from pendpipe.effects.evaluated import Evaluated, kick_sizes
+from pendpipe.effects.held_parts import held_indices, with_parts
 
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
@@ -51,6 +54,8 @@ class Model:
         When the first reading was taken, where the start is a virtual turning point before the
         release: the pendulum was let go at the last turning point before it. By default, at
         the start.
+    parts
+        The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
     """
 
     time_s: FloatArray
@@ -60,6 +65,7 @@ class Model:
     half_cycles: int | None = None
     fold: int = 1
     first_s: float = -math.inf
+    parts: Mapping[str, float] = field(default_factory=dict)
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     def adding(self, effect: Effect) -> Model:
@@ -101,6 +107,7 @@ class Model:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest values."""
         low, high = list(LOW), list(HIGH)
+        low[B] = sum(self.held_parts().values())
         duration = float(self.time_s[-1] - self.time_s[0])
         for effect in self.effects:
             for lowest, highest in effect.bounds(duration):
@@ -109,8 +116,18 @@ class Model:
         return np.array(low), np.array(high)
 
     def held(self) -> list[int]:
-        """Indices that are never fitted: the sizes of switches."""
-        return [place.start for effect, place in self.places() if effect.switch]
+        """Indices that are never fitted: sizes of switches, and what held parts of b settle."""
+        switches = [place.start for effect, place in self.places() if effect.switch]
+        return [*switches, *held_indices(self.held_parts())]
+
+    def held_parts(self) -> dict[str, float]:
+        """The parts of b that are held, without those that an effect sets free."""
+        free = {effect.releases for effect in self.effects}
+        return {part: rate for part, rate in self.parts.items() if part not in free}
+
+    def settled(self, value: FloatArray) -> FloatArray:
+        """The values with what follows from held parts of b."""
+        return with_parts(value, self.held_parts())
 
     def pendulum(self, value: FloatArray) -> Pendulum:
         """The baseline's constants, and when the first reading was taken."""

@@ -61,22 +61,16 @@ def diagnose_motion(
     """Diagnose a recording in rad (or m), with turning points found before where there are."""
     from pendpipe.analysis.turning_points import read_turning_points
     from pendpipe.diagnose.run import diagnose_decay, diagnose_recording
-    from pendpipe.dynamics.any_law import NoMotionError
-    from pendpipe.errors import NotAnalysableError
 
     asked: dict[str, Any] = {
         "baseline": question.baseline, "fixed": question.fixed, "seed": question.seed,
         "level": question.level, "place": place, "provenance": provenance, "progress": progress,
     }  # fmt: skip
-    try:
-        if turning_points is None:
-            return diagnose_recording(recording, **asked)
-        points = read_turning_points(turning_points)
-        part = recording.between(points.start_s, points.stop_s)
-        return diagnose_decay(part, points, whole=recording, **asked)
-    except NoMotionError as fault:
-        remedy = "cut it with --start and --stop, or change what is held with --fix"
-        raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
+    if turning_points is None:
+        return diagnose_recording(recording, **asked)
+    points = read_turning_points(turning_points)
+    part = recording.between(points.start_s, points.stop_s)
+    return diagnose_decay(part, points, whole=recording, **asked)
 
 
 def write_diagnosis(

@@ -33,6 +33,8 @@ def held_values(
     if baseline == "viscous":
         held |= {"a": 0.0, "c": 0.0}
     parts = loss_rates_of(fixed, frequency)
+    if parts and baseline == "viscous":
+        parts["hysteretic"] = 0.0
     if len(parts) == 2:
         held["b"] = parts["hysteretic"] + parts["viscous"]
     return held, parts

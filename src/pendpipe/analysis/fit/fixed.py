@@ -6,46 +6,73 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from pendpipe.analysis.fit.result import Baseline
 from pendpipe.errors import InputError
 
 NAMES: Final = (
     "a", "b", "c", "frequency", "amplitude", "offset",
     "quality_factor_hysteretic", "quality_factor_viscous",
 )  # fmt: skip
+_NOT_VISCOUS: Final = ("a", "c", "quality_factor_hysteretic")
+"""What Eq. 3 lacks: its only loss is viscous."""
 _POSITIVE: Final = ("frequency", "amplitude", "quality_factor_hysteretic", "quality_factor_viscous")
 
 
-def parse_fixed(words: Iterable[str]) -> dict[str, float]:
+def parse_fixed(words: Iterable[str], baseline: Baseline = "eq8") -> dict[str, float]:
     """Read ``NAME=VALUE`` words.
 
     Raises
     ------
     InputError
-        On an unknown name, a number that is none, or one that is impossible.
+        On a number that is none, a name that comes twice, and what `check_fixed` refuses.
     """
     fixed: dict[str, float] = {}
     for word in words:
         name, equals, text = word.partition("=")
-        if not equals or name not in NAMES:
-            raise InputError(
-                f"--fix {word}",
-                "this names no parameter",
-                f"use NAME=VALUE, NAME of {', '.join(NAMES)}",
-            )
+        if not equals:
+            raise _nameless(word)
+        if name in fixed:
+            raise InputError(f"--fix {word}", f"{name} is held twice", "give it once")
         try:
-            value = float(text)
+            fixed[name] = float(text)
         except ValueError:
             raise InputError(f"--fix {word}", f"'{text}' is no number", "give a number") from None
+    check_fixed(fixed, baseline)
+    return fixed
+
+
+def check_fixed(fixed: Mapping[str, float], baseline: Baseline) -> None:
+    """Refuse what can't be held.
+
+    Raises
+    ------
+    InputError
+        On a name that is no parameter's, a value that none can have, two that contradict each
+        other, or a parameter that the baseline lacks.
+    """
+    for name, value in fixed.items():
+        word = f"{name}={value:g}"
+        if name not in NAMES:
+            raise _nameless(word)
         least = 0.0 if name != "offset" else -math.inf
         if not math.isfinite(value) or value < least or (name in _POSITIVE and value == 0.0):
-            raise InputError(f"--fix {word}", f"{name} can't be {text}", "give a possible value")
-        fixed[name] = value
+            raise InputError(f"--fix {word}", f"{name} can't be {value:g}", "give a possible value")
+        if baseline == "viscous" and name in _NOT_VISCOUS:
+            raise InputError(
+                f"--fix {word}", f"the viscous baseline (Eq. 3) has no {name}",
+                "leave it out, or use --baseline eq8",
+            )  # fmt: skip
     quality_factors = [name for name in fixed if name.startswith("quality_factor")]
     if "b" in fixed and quality_factors:
         raise InputError(
             "--fix", f"b and {quality_factors[0]} are both held", "hold one of the two"
         )
-    return fixed
+
+
+def _nameless(word: str) -> InputError:
+    return InputError(
+        f"--fix {word}", "this names no parameter", f"use NAME=VALUE, NAME of {', '.join(NAMES)}"
+    )
 
 
 def loss_rates_of(fixed: Mapping[str, float], frequency: float) -> dict[str, float]:

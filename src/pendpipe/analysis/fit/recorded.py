@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from pendpipe.analysis.fit.by_points import fit_points
+from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.recording import Recording
@@ -45,8 +46,9 @@ def fit_recording(
     Raises
     ------
     InputError
-        If the recording can't be analysed; see `find_turning_points`.
+        If a parameter can't be held, or the recording can't be analysed; see `find_turning_points`.
     """
+    check_fixed(fixed or {}, baseline)
     if method == "turning-points":
         if points is None:
             from pendpipe.analysis.turning_points import find_turning_points
