@@ -25,7 +25,7 @@ from pendpipe.challenge.singles import draw_sized
 from pendpipe.challenge.sizing import Sized
 from pendpipe.challenge.workers import workers
 
-SLOW: Final = ("offset-drift", "equilibrium-creep")
+SLOW: Final = ("offset-drift", "equilibrium-creep", "equilibrium-step")
 STEEPNESS: Final = (0.3, 0.6, 0.9, 1.2, 1.5)
 """Exponents of the red part; the truth lies between 0.3 and 1.5, or there is none."""
 STRENGTHS: Final = (0.0, *np.geomspace(1 / 30, 30.0, 21))
@@ -68,7 +68,7 @@ def likelihoods(
         For each of `STRENGTHS`.
     """
     values, vectors = np.linalg.eigh(slow.T @ slow)
-    kept = values > 1e-10 * values[-1]
+    kept = values > 1e-10 * values.max(initial=0.0)
     values = values[kept]
     basis = slow @ (vectors[:, kept] / np.sqrt(values))
     both = np.column_stack([columns / np.linalg.norm(columns, axis=0), residual])
