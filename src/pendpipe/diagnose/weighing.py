@@ -33,10 +33,6 @@ _CLEAN: Final = 5.0
 class's: one lone name in thirteen is wrong then, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
-_FAR: Final = 100.0
-"""In chi^2: who is so far behind has no probability."""
-_PART: Final = 0.1
-"""Part of the gain that no fit which merely stopped early is behind."""
 _OF_THE_REST: Final = ("jitter", "broadband-drive", "coloured-noise")
 """Faults that are seen in what a model leaves: a curve's own misfit looks like any of them."""
 _SAME: Final = 0.02
@@ -178,24 +174,15 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     same = abs(gain - step.winner.gain) < _SAME * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
+    # Even whom the search left far behind: how far that is depends on the noise and on the other
+    # effects, and both were others then.
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
-        if _far_behind(rival, step.winner):
-            # It stays as far behind.
-            more = gain - step.winner.gain
-            rivals.append(rival.reaching(rival.fit, rival.gain + more))
-            continue
         fit = found.improved if own else refitted(without, found, held, rival)
         if fit is not None:
             rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
-
-
-def _far_behind(rival: Rival, winner: Rival) -> bool:
-    """Whether no better fit could bring a rival near the winner."""
-    behind = winner.gain - rival.gain
-    return behind > _FAR and (rival.fit.converged or behind > _PART * winner.gain)
 
 
 def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArray) -> Fit | None:
