@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -24,7 +24,7 @@ from pendpipe.diagnose.search import Search, search
 from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import parameters_of
-from pendpipe.diagnose.weighing import effect_named, fault_named
+from pendpipe.diagnose.weighing import Weighed, effect_named, fault_named
 from pendpipe.recording import Recording
 
 LEVEL: Final = 0.01
@@ -102,8 +102,8 @@ def diagnose_decay(
         beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
         freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
-    found = with_likeliest(found, beginning)
-    named = _as_added(found, beginning)
+    found, weighed = with_likeliest(found, beginning)
+    named = _as_added(found, weighed)
     gap = gap_note(
         (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
     )  # fmt: skip
@@ -132,10 +132,10 @@ def diagnose_decay(
     return Outcome(diagnosis, found, beginning)
 
 
-def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:
+def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[Named, ...]:
     """Name effects and faults in the order in which they were added."""
-    effects = [(place, effect_named(found, beginning, step)) for place, step in
-               enumerate(found.steps)]  # fmt: skip
+    effects = [(place, effect_named(found, step, each)) for place, (step, each) in
+               enumerate(zip(found.steps, weighed, strict=True))]  # fmt: skip
     faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.
     return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))

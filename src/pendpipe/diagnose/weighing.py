@@ -63,6 +63,7 @@ class Weighed(NamedTuple):
 def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     """Weigh one effect against its rivals with all the others in the model."""
     effect = step.winner.lead.effect
+    found = beside(found, effect)
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
@@ -82,13 +83,19 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     return Weighed(without, gain, tuple(mates), weights)
 
 
-def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
+def beside(found: Search, effect: Effect) -> Search:
+    """What has been found, as an effect is judged beside it."""
+    if effect.kind == "unnamed":
+        return found
+    # A curve drawn over what the names leave could imitate any of them.
+    return replace(found, improved=found.named.fit, remainder=found.named.remainder)
+
+
+def effect_named(found: Search, step: Step, weighed: Weighed) -> Named:
     """One effect, with what is said of it in the end."""
     effect = step.winner.lead.effect
-    if effect.kind != "unnamed":
-        # A curve drawn over what the names leave could imitate any of them.
-        found = replace(found, improved=found.named.fit, remainder=found.named.remainder)
-    without, gain, mates, weights = weigh(found, beginning, step)
+    found = beside(found, effect)
+    without, gain, mates, weights = weighed
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
         with_instants(
