@@ -33,6 +33,8 @@ true on opened challenges. Scans and optima add to the spread where little is ga
 laws leave less of a large gain than the worst do."""
 SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
+_FAR: Final = 100.0
+"""In chi^2: what is known beforehand makes nobody who is so far behind the more probable."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,9 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
     needless, sizes = _needed_sizes(fit, lead.effect)
     gain -= needless
     if gain <= 0.0:
-        return 0.0
+        # What makes a model worse is worth that much less than nothing: a rival that comes back
+        # under another noise (`Rival.reaching`) must not be credited with it.
+        return gain
     effect = lead.effect
     if effect.switch:
         # Its size is predicted: a free one would have had to be found.
@@ -201,6 +205,23 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     # A parameter's law is the baseline's own: what it leaves is not a matter of its form.
     own_form = np.array([rival.lead.effect.kind == "parameter" for rival in rivals])
     worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
-    logs = np.append(0.5 * (worth + prior), 0.5 * (none - best))
+    logs = _in_order(0.5 * (worth + prior), rivals)
+    logs = np.append(logs, 0.5 * (none - best))
     weights = np.exp(logs - logs.max())
     return np.asarray(weights / weights.sum())
+
+
+def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
+    """Log probabilities, none above that of a name whose evidence is far better.
+
+    Where a gain is large, its differences are worth so little that what is known beforehand
+    would raise whom the readings reject above whom they do not. Curves, which follow any law,
+    keep down none but curves.
+    """
+    evidence = np.array([rival.evidence for rival in rivals])
+    drawn = np.array([rival.drawn for rival in rivals])
+    lowered = []
+    for log, rival in zip(logs, rivals, strict=True):
+        better = (evidence > rival.evidence + _FAR) & (rival.drawn | ~drawn)
+        lowered.append(np.min(logs[better], initial=log))
+    return np.array(lowered)

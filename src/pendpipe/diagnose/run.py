@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -27,7 +27,7 @@ from pendpipe.diagnose.search import Search, search
 from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
 from pendpipe.diagnose.values import parameters_of
-from pendpipe.diagnose.weighing import effect_named, fault_named
+from pendpipe.diagnose.weighing import Weighed, effect_named, fault_named
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -103,11 +103,13 @@ def diagnose_decay(
     check_fixed(fixed, baseline)
     samples = with_true_step(prepare(part, place))
     try:
-        found, beginning = _searched(samples, points, baseline, fixed, level, seed, progress)
+        found, weighed, beginning = _searched(
+            samples, points, baseline, fixed, level, seed, progress
+        )
     except NoMotionError as fault:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
-    named = _as_added(found, beginning)
+    named = _as_added(found, weighed)
     gap = gap_note(
         (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
     )  # fmt: skip
@@ -139,7 +141,7 @@ def diagnose_decay(
 def _searched(
     samples: Samples, points: TurningPoints, baseline: Baseline, fixed: Mapping[str, float],
     level: float, seed: int, progress: Progress,
-) -> tuple[Search, Beginning]:  # fmt: skip
+) -> tuple[Search, tuple[Weighed, ...], Beginning]:  # fmt: skip
     from pendpipe.effects.catalogue import CATALOGUE
 
     beginning = begin(samples, points, baseline=baseline, fixed=fixed)
@@ -147,13 +149,13 @@ def _searched(
         beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
         freed=freed_parameters(fixed), progress=progress,
     )  # fmt: skip
-    return with_likeliest(found, beginning), beginning
+    return *with_likeliest(found, beginning), beginning
 
 
-def _as_added(found: Search, beginning: Beginning) -> tuple[Named, ...]:
+def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[Named, ...]:
     """Name effects and faults in the order in which they were added."""
-    effects = [(place, effect_named(found, beginning, step)) for place, step in
-               enumerate(found.steps)]  # fmt: skip
+    effects = [(place, effect_named(found, step, each)) for place, (step, each) in
+               enumerate(zip(found.steps, weighed, strict=True))]  # fmt: skip
     faults = [(fault.behind, in_catalogue_terms(fault_named(found, fault), found.data))
               for fault in found.faults]  # fmt: skip
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.

@@ -33,10 +33,6 @@ _CLEAN: Final = 5.0
 class's: one lone name in thirteen is wrong then, as on opened challenges."""
 _LISTED: Final = 0.05
 """Probability from which a curve without a name is listed beside names."""
-_FAR: Final = 100.0
-"""In chi^2: who is so far behind has no probability."""
-_PART: Final = 0.1
-"""Part of the gain that no fit which merely stopped early is behind."""
 _OF_THE_REST: Final = ("jitter", "broadband-drive", "coloured-noise")
 """Faults that are seen in what a model leaves: a curve's own misfit looks like any of them."""
 _SAME: Final = 0.02
@@ -67,6 +63,7 @@ class Weighed(NamedTuple):
 def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     """Weigh one effect against its rivals with all the others in the model."""
     effect = step.winner.lead.effect
+    found = beside(found, effect)
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
@@ -86,13 +83,19 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     return Weighed(without, gain, tuple(mates), weights)
 
 
-def effect_named(found: Search, beginning: Beginning, step: Step) -> Named:
+def beside(found: Search, effect: Effect) -> Search:
+    """What has been found, as an effect is judged beside it."""
+    if effect.kind == "unnamed":
+        return found
+    # A curve drawn over what the names leave could imitate any of them.
+    return replace(found, improved=found.named.fit, remainder=found.named.remainder)
+
+
+def effect_named(found: Search, step: Step, weighed: Weighed) -> Named:
     """One effect, with what is said of it in the end."""
     effect = step.winner.lead.effect
-    if effect.kind != "unnamed":
-        # A curve drawn over what the names leave could imitate any of them.
-        found = replace(found, improved=found.named.fit, remainder=found.named.remainder)
-    without, gain, mates, weights = weigh(found, beginning, step)
+    found = beside(found, effect)
+    without, gain, mates, weights = weighed
     return Named(
         effect.identifier, effect.name, effect.kind, effect.equation,
         with_instants(
@@ -178,24 +181,15 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     same = abs(gain - step.winner.gain) < _SAME * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
+    # Even whom the search left far behind: how far that is depends on the noise and on the other
+    # effects, and both were others then.
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
-        if _far_behind(rival, step.winner):
-            # It stays as far behind.
-            more = gain - step.winner.gain
-            rivals.append(rival.reaching(rival.fit, rival.gain + more))
-            continue
         fit = found.improved if own else refitted(without, found, held, rival)
         if fit is not None:
             rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
-
-
-def _far_behind(rival: Rival, winner: Rival) -> bool:
-    """Whether no better fit could bring a rival near the winner."""
-    behind = winner.gain - rival.gain
-    return behind > _FAR and (rival.fit.converged or behind > _PART * winner.gain)
 
 
 def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArray) -> Fit | None:

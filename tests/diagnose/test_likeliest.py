@@ -1,0 +1,135 @@
+"""The name that is reported is the likeliest in the end, whatever was taken first."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnose import diagnose_recording, likeliest
+from pendpipe.diagnose.likeliest import with_likeliest
+from pendpipe.diagnose.run import Outcome
+from pendpipe.diagnose.search import Search
+from pendpipe.diagnose.state import Step
+from pendpipe.diagnose.weighing import Weighed, weigh
+from pendpipe.effects.baseline import B
+
+from .records import TRUTH, diagnosed, other_engine, recording
+from .test_one_curve import pulled
+
+
+@functools.cache
+def magnet() -> Outcome:
+    """A torque of no catalogue, drawn as a curve."""
+    return diagnose_recording(recording(pulled(), 5))
+
+
+@functools.cache
+def wrong_loss() -> Outcome:
+    """A prediction with a wrong b: nothing is missing."""
+    given = {"b": 1.1 * float(TRUTH[B])}
+    return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+
+
+def having_taken(outcome: Outcome, name: str) -> Search:
+    """The same search, had it added another of the effects that it refitted."""
+    found = outcome.search
+    (step,) = found.steps
+    first = next(rival for rival in step.rivals if rival.identifier == name)
+    rest = tuple(rival for rival in step.rivals if rival is not first)
+    held = found.held
+    if step.winner.lead.effect.kind == "parameter":
+        held = (*held, B)
+    return replace(
+        found, improved=first.fit, steps=(replace(step, rivals=(first, *rest)),), held=held,
+        named=found.named._replace(fit=first.fit),
+    )  # fmt: skip
+
+
+def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
+    """Who leads in the end where another was taken first, and all probabilities."""
+    found, (weighed,) = with_likeliest(having_taken(outcome, name), outcome.beginning)
+    (step,) = found.steps
+    own, *others = weighed.weights[:-1].tolist()
+    mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
+    return step, own, mates, found
+
+
+@pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
+def test_a_likelier_name_takes_the_place_of_what_was_taken_first(taken: str) -> None:
+    """All follow the swings of a pendulum whose torque is sin x: that it is, is known."""
+    step, own, mates, found = led(diagnosed("circular-error"), taken)
+    assert step.winner.identifier == "circular-error"
+    assert own > max(mates.values())
+    assert taken in mates
+    assert [effect.identifier for effect in found.improved.model.effects] == ["circular-error"]
+    assert found.improved.chi2 == pytest.approx(diagnosed("circular-error").search.improved.chi2)
+
+
+@pytest.mark.parametrize(("name", "taken"), [("frequency-drift", "cubic-stiffness"),
+                                             ("frequency-drift", "clock-drift"),
+                                             ("sensor-cubic", "sensor-cubic")])  # fmt: skip
+def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
+    step, own, mates, _ = led(diagnosed(name), taken)
+    assert step.winner.identifier == taken
+    assert 1.5 * own >= max(mates.values())
+
+
+@pytest.mark.parametrize(("odds", "leads"), [(1.0, "circular-error"), (19.0, "circular-error"),
+                                             (21.0, "unnamed-restoring")])  # fmt: skip
+def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
+    odds: float, leads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Curves follow any law: names go before them, but not where that is told from the name."""
+
+    def weighed(*asked: Any) -> Weighed:
+        found = weigh(*asked)
+        curve = [mate for mate in found.mates if mate.identifier == "unnamed-restoring"]
+        return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
+
+    monkeypatch.setattr(likeliest, "weigh", weighed)
+    outcome = diagnosed("circular-error")
+    found, _ = with_likeliest(outcome.search, outcome.beginning)
+    assert [effect.identifier for effect in found.improved.model.effects] == [leads]
+    assert found.steps[0].winner.identifier == leads
+
+
+def test_the_likelier_of_two_curves_is_drawn() -> None:
+    step, own, mates, _ = led(magnet(), "unnamed-measurement")
+    assert step.winner.identifier == "unnamed-restoring"
+    assert own > max(mates.values())
+
+
+def test_a_wrong_parameter_takes_the_place_of_missing_physics() -> None:
+    """It is fitted then, and comes out right."""
+    taken = next(
+        rival.identifier for rival in wrong_loss().search.steps[0].rivals
+        if rival.lead.effect.kind != "parameter"
+    )  # fmt: skip
+    step, _, _, found = led(wrong_loss(), taken)
+    assert step.winner.identifier == "parameter-b"
+    assert B not in found.held
+    sd = float(found.improved.covariance()[B, B]) ** 0.5
+    assert abs(found.improved.value[B] - TRUTH[B]) < 4.0 * sd
+
+
+def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without the second effect the model is that of the new first alone."""
+    outcome = diagnosed("two")
+    first = outcome.search.steps[0]
+    other = first.rivals[1]
+    monkeypatch.setattr(
+        likeliest, "_likeliest", lambda _, step, __: other if step is first else None
+    )
+    found, _ = with_likeliest(outcome.search, outcome.beginning)
+    assert found.steps[0].winner is other
+    assert found.steps[1].before is other.fit
+    assert found.steps[1].winner is outcome.search.steps[1].winner
+    assert {effect.identifier for effect in found.improved.model.effects} == {
+        other.identifier, found.steps[1].winner.identifier
+    }  # fmt: skip
