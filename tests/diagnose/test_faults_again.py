@@ -80,7 +80,7 @@ def test_a_range_that_ends_is_said_once() -> None:
     found = diagnose_recording(record).diagnosis
     (effect,) = found.effects
     assert effect.identifier == "clipping"
-    assert effect.parameters["high"].value == pytest.approx(level, rel=1e-6)
+    assert effect.parameters["upper_level"].value == pytest.approx(level, rel=1e-6)
     assert effect.parameters["number"].value == np.count_nonzero(clipped_at(level) == level)
     assert effect.delta_chi2 > 1e3
     assert found.p_value < 1e-6

@@ -11,6 +11,7 @@ import pytest
 
 from pendpipe.diagnose import diagnose_recording, likeliest
 from pendpipe.diagnose.likeliest import with_likeliest
+from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.run import Outcome
 from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Step
@@ -43,9 +44,11 @@ def having_taken(outcome: Outcome, name: str) -> Search:
     held = found.held
     if step.winner.lead.effect.kind == "parameter":
         held = (*held, B)
+    # Its refit was judged by the noise of that moment.
+    fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
     return replace(
-        found, improved=first.fit, steps=(replace(step, rivals=(first, *rest)),), held=held,
-        named=found.named._replace(fit=first.fit),
+        found, improved=fit, steps=(replace(step, rivals=(first, *rest)),), held=held,
+        named=found.named._replace(fit=fit),
     )  # fmt: skip
 
 

@@ -19,7 +19,6 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
-from pendpipe.recording import Recording
 
 from .records import (
     INSTANT_S,
@@ -27,9 +26,7 @@ from .records import (
     TIME_S,
     TRUTH,
     null_fit,
-    other_engine,
     recording,
-    white,
 )
 
 JUMP_RAD = 1e-3
@@ -104,15 +101,3 @@ def test_a_curve_that_follows_better_does_not_put_a_name_down() -> None:
     name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
     drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)
     assert named > drawn
-
-
-def test_a_clipped_record_is_called_clipped_though_the_readings_that_show_it_are_masked() -> None:
-    """What is left tells it from nothing: its rivals stay where they were when it was found."""
-    end, step = 0.12, 1e-5
-    clipped = np.minimum(other_engine(TRUTH) + white(4), end)
-    rounded = step * np.round(clipped / step)
-    outcome = diagnose_recording(Recording(TIME_S, rounded, "angle_rad"))
-    effects = outcome.diagnosis.effects
-    assert effects[0].delta_chi2 < 9.0 < outcome.search.steps[0].winner.gain
-    assert {effect.identifier for effect in effects} == {"clipping"}
-    assert effects[0].indistinguishable == ()

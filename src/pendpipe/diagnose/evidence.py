@@ -33,6 +33,8 @@ true on opened challenges. Scans and optima add to the spread where little is ga
 laws leave less of a large gain than the worst do."""
 SIZE: Final = 6.0
 """What a further size takes off a gain too large for p-values."""
+NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
+"""A curve has no shapes to try."""
 _FAR: Final = 100.0
 """In chi^2: what is known beforehand makes nobody who is so far behind the more probable."""
 
@@ -63,7 +65,12 @@ class Rival:
     left: float = 1.0
 
     def reaching(self, fit: Fit, gain: float) -> Rival:
-        """Return it refitted where nothing but noise is left, its scan charged as before."""
+        """Return it refitted where nothing but noise is left, its scan charged as before.
+
+        A curve has no scan; it is charged for the mixtures that it needs now.
+        """
+        if isinstance(self.lead.effect, Curve):
+            return Rival(self.lead, fit, gain, evidence(self.lead, fit, gain, NO_SCAN))
         charged = self.gain / self.left - self.evidence
         return Rival(self.lead, fit, gain, gain - charged)
 

@@ -13,9 +13,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.evidence import MISSHAPEN, Rival, evidence, ranked
+from pendpipe.diagnose.evidence import MISSHAPEN, NO_SCAN, Rival, evidence, ranked
 from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.review import stands_apart
@@ -37,8 +36,6 @@ _PART: Final = 0.5
 _EACH: Final = 2.0
 _REST: Final = 1e-4
 """Part of the gain that further names must add to be more than a correction of the first."""
-_NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
-"""A curve has no shapes to try."""
 
 
 def prefer_one_curve(state: State, progress: Progress) -> None:
@@ -125,7 +122,7 @@ def _rival(bare: Fit, fit: Fit) -> Rival:
     curve = fit.model.effects[-1]
     gain = bare.chi2 - fit.chi2
     lead = Lead(curve, (), gain, 0.0)
-    return Rival(lead, fit, gain, evidence(lead, fit, gain, _NO_SCAN))
+    return Rival(lead, fit, gain, evidence(lead, fit, gain, NO_SCAN))
 
 
 def cost(fit: Fit) -> float:

@@ -41,7 +41,7 @@ from pendpipe.effects.baseline import C
 from pendpipe.effects.closer_curves import CLOSER_CURVES
 
 _MOST: Final = 6
-NEEDED: Final = 9.0
+_NEEDED: Final = 9.0
 """Delta chi^2 below which an effect that others have joined is dropped again."""
 _PART: Final = 0.15
 """Part of a gross misfit that an effect must explain to be worth naming."""
@@ -216,7 +216,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
         rivals = prefer_two_names(state, rivals, task)
     if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
         return False
-    if not rivals or rivals[0].gain <= max(NEEDED, share * state.fit.chi2 if gross else 0.0):
+    if not rivals or rivals[0].gain <= max(_NEEDED, share * state.fit.chi2 if gross else 0.0):
         return False
     step = Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit)
     if gross and state.steps and not credible(step, state, task.level):
@@ -251,7 +251,7 @@ def _prune(state: State, progress: Progress) -> None:
         without = None if isinstance(effect, FreedParameter) else fit_without(state, step)
         if without is None:
             continue
-        needed = NEEDED if stands_apart(effect, state.fit) else max(NEEDED, between)
+        needed = _NEEDED if stands_apart(effect, state.fit) else max(_NEEDED, between)
         if without.chi2 - state.fit.chi2 < needed:
             progress(f"{effect.identifier} is needless now")
             state.fit = without

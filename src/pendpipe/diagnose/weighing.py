@@ -19,7 +19,7 @@ from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.review import stands_apart
-from pendpipe.diagnose.search import NEEDED, Search
+from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
@@ -180,9 +180,6 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     gain = without.chi2 - found.improved.chi2
     same = abs(gain - step.winner.gain) < _SAME * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
-        return without, step.rivals
-    if gain < NEEDED:
-        # The readings that told of it are masked now: what they said when it was found decides.
         return without, step.rivals
     # Even whom the search left far behind: how far that is depends on the noise and on the other
     # effects, and both were others then.
