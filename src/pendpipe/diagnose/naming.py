@@ -86,10 +86,12 @@ def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]
         return []
     best = _rank(leads[0])
     near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.9 if gross else 0.3) * best]
-    # So many names: curves, which lead wherever a misfit bends, take no name's place.
-    names = [lead for lead in near if lead.effect.kind != "unnamed"]
-    names = names[: most + 2 if gross else most]
-    near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
+    if gross:
+        near = near[: most + 2]
+    else:
+        # So many names: curves, which lead wherever a misfit bends, take no name's place.
+        names = [lead for lead in near if lead.effect.kind != "unnamed"][:most]
+        near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
     # Asked whatever their first order says: what the user holds, which is little; and in a gross
     # misfit bearing and fluid, which are in every pendulum.
     asked = [
