@@ -100,7 +100,10 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
     except InputError as fault:
         if not Path(arguments.file).is_file():
             raise
-        return _not_analysable(arguments, question, str(fault), provenance)
+        from pendpipe.stages.refusal import within_results
+
+        reason = within_results(fault, arguments.refused)
+        return _not_analysable(arguments, question, reason, provenance)
     content = write_diagnosis(arguments.out, outcome, question, _say)
     for warning in content["warnings"]:
         print(f"{arguments.file}: {warning}", file=sys.stderr)

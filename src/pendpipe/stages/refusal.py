@@ -52,13 +52,21 @@ def run_stage(
     try:
         work()
     except InputError as fault:
+        reason = within_results(fault, refused)
         write_json(
-            refused,
-            {"schema_version": 1, "record": record, "stage": stage, "reason": str(fault)},
+            refused, {"schema_version": 1, "record": record, "stage": stage, "reason": reason}
         )
-        _write_stubs(outputs, str(fault))
+        _write_stubs(outputs, reason)
         print(f"pendpipe: {record} is refused: {fault}", file=sys.stderr)
     return 0
+
+
+def within_results(fault: InputError, refused: Path | None) -> str:
+    """What is written of a fault: a campaign's own files go by ``record/name``.
+
+    Results name no path of the machine they were made on.
+    """
+    return str(fault) if refused is None else str(fault).replace(f"{refused.parent.parent}/", "")
 
 
 def reason_of(refused: Path, *, before: str | None = None) -> str | None:
