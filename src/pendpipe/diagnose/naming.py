@@ -47,7 +47,9 @@ def refit_leads(
     fits: list[tuple[Lead, Fit]] = []
     for lead in _worth_refitting(detection, gross, most):
         fit = _refitted(base, data, noise, lead, held)
-        if base.slip_rad > _LOST and len(fits) < _FROM_AFAR:
+        lost = base.slip_rad > _LOST and len(fits) < _FROM_AFAR
+        # With the baseline's friction a law may not get through to the end.
+        if lost or (gross and fit is None):
             fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
         if fit is not None and _believable(base, fit, lead.effect):
             fits.append((lead, fit))

@@ -176,16 +176,16 @@ class Rates:
     pace: FloatArray
 
 
-def rates(law: Law, motion: Motion, *, lenient: bool = False) -> Rates:
+def rates(law: Law, motion: Motion, *, largest: float | None = None) -> Rates:
     """Return the rates of a law along a given (perhaps wrong) motion.
 
-    `lenient` bounds them where the pendulum would not turn, for a search on its way.
+    `largest` bounds g, and g cos(psi) where the pendulum would not turn, for a search on its way.
     """
     omega, clock = motion.angular_frequency, motion.clock
     g = motion.upwards * law(motion) / (omega * omega * motion.amplitude)
     free = 1.0 - g * clock.cosine
-    if lenient:
-        g = np.nan_to_num(np.clip(g, -_LARGEST, _LARGEST))
+    if largest is not None:
+        g = np.nan_to_num(np.clip(g, -largest, largest))
         least = 1.0 - _STEEPEST
         steep = 1.0 - g * clock.cosine < least
         g = np.where(steep, np.copysign(_STEEPEST, g), g)
@@ -227,10 +227,12 @@ def follow(
     motion = Motion(clock, angular_frequency, log_amplitude, time, upwards)
     steepness: FloatArray | None = None
     before = math.inf
+    # Where the equilibrium is not far off, larger g are but on the way, and lead astray.
+    largest = _STEEPEST
     for _ in range(_ROUNDS):
-        now = rates(law, motion, lenient=True)
+        now = rates(law, motion, largest=largest)
         if steepness is None:
-            steepness = _steepness(law, motion, now)
+            steepness = _steepness(law, motion, now, largest)
         off = origin + jumps + clock.integral(now.loss) - motion.log_amplitude
         change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
         late = start_s + delays + clock.integral(now.pace) - motion.time_s
@@ -239,8 +241,12 @@ def follow(
             clock, angular_frequency, motion.log_amplitude + change, motion.time_s + late, upwards
         )
         if error < _TOLERANCE:
-            rates(law, motion)
-            return motion
+            there = rates(law, motion)
+            if np.allclose(there.pace, rates(law, motion, largest=largest).pace, rtol=1e-12):
+                return motion
+            largest, steepness, error = _LARGEST, None, math.inf
+            before = error
+            continue
         if not error < 1e3:
             break
         if error > 0.5 * before:
@@ -249,13 +255,13 @@ def follow(
     raise NoMotionError("the motion can't be followed")
 
 
-def _steepness(law: Law, motion: Motion, now: Rates) -> FloatArray:
+def _steepness(law: Law, motion: Motion, now: Rates, largest: float) -> FloatArray:
     """Derivative of d ln r/d psi by ln r."""
     moved = Motion(
         motion.clock, motion.angular_frequency, motion.log_amplitude + _STEP, motion.time_s,
         motion.upwards,
     )  # fmt: skip
-    return np.asarray((rates(law, moved, lenient=True).loss - now.loss) / _STEP)
+    return np.asarray((rates(law, moved, largest=largest).loss - now.loss) / _STEP)
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:
