@@ -19,6 +19,7 @@ from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State
+from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.cubic_stiffness import CubicStiffness
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -56,6 +57,10 @@ def test_a_fault_is_found_and_no_other(fault: str, clean: FloatArray) -> None:
     assert list(findings) == [test]
     assert findings[test].delta_chi2 > 10.0
     assert findings[test].summary
+    told = findings[test].parameters
+    effects = [effect for effect in CATALOGUE if effect.identifier == test]
+    declared = {p.name: p.unit_in("rad") for effect in effects for p in effect.parameters}
+    assert all(told[name].unit == unit for name, unit in declared.items() if name in told)
 
 
 def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
@@ -102,8 +107,8 @@ def test_a_step_of_the_level_is_no_glitch(clean: FloatArray) -> None:
 def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None:
     readings = rounded(np.clip(clean + white(generator(), AIR.count), -0.125, 0.13), STEP_16)
     finding = found(fitted(AIR, readings))["clipping"]
-    assert finding.parameters["high"].value == pytest.approx(0.13, abs=STEP_16)
-    assert finding.parameters["low"].value == pytest.approx(-0.125, abs=STEP_16)
+    assert finding.parameters["upper_level"].value == pytest.approx(0.13, abs=STEP_16)
+    assert finding.parameters["lower_level"].value == pytest.approx(-0.125, abs=STEP_16)
     assert finding.mask is not None
     assert np.array_equal(finding.mask, (readings > 0.1299) | (readings < -0.1249))
     ends = [round(level / STEP_16) for level in (0.13, -0.125)]
@@ -183,7 +188,7 @@ def test_a_random_torque_is_measured(clean: FloatArray) -> None:
     pulls = []
     for seed in range(4):
         finding = found(FAULTS["torque of 1e-8"].make(clean, generator(seed)))["broadband-drive"]
-        estimate = finding.parameters["S_a"]
+        estimate = finding.parameters["acceleration_density"]
         pulls.append((estimate.value - 1e-8) / estimate.sd)
     assert np.mean(np.abs(pulls)) < 2.0
 
@@ -285,7 +290,7 @@ def test_the_range_behind_means_of_readings_is_judged() -> None:
     findings = found(record)
     assert list(findings) == ["clipping"]
     clipping = findings["clipping"]
-    assert clipping.parameters["high"].value == pytest.approx(0.15, abs=STEP_16)
+    assert clipping.parameters["upper_level"].value == pytest.approx(0.15, abs=STEP_16)
     assert clipping.mask is not None
     assert clipping.mask.shape == record.data.values.shape
     assert 20 < np.count_nonzero(clipping.mask) < 0.1 * len(record.data)

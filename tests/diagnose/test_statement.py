@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.fault_terms import in_catalogue_terms
 from pendpipe.diagnose.held_out import HeldOut
 from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.result import Judged, Named
@@ -31,10 +28,6 @@ def said(effect: Named, gain: float = 50.0) -> str:
     before, after = Judged({}, 2e-4, 4.0), Judged({}, 1e-4, 1.0)
     held = HeldOut(1000.0, 1000.0 + gain, 5.0)
     return statement("eq8", before, after, [effect], held, 1e-4, 0.5, 0.01)
-
-
-def readings(unit: str = "rad") -> Data:
-    return Data(np.arange(10.0), np.zeros(10), 1.0, True, np.ones(10), unit=unit)
 
 
 def test_a_model_that_predicts_worse_is_said_to() -> None:
@@ -63,30 +56,6 @@ def test_a_pure_number_has_no_unit() -> None:
         assert parameter.unit_in("rad") == ""
     unit = by_identifier("amplitude-step").parameters[0].unit_in("m")
     assert "s = 0.01 +- 0.001)" in said(named("amplitude-step", s=Estimate(0.01, 0.001, unit)))
-
-
-@pytest.mark.parametrize("unit", ["rad", "m"])
-@pytest.mark.parametrize(
-    ("identifier", "own", "name"),
-    [
-        ("broadband-drive", "S_a", "acceleration_density"),
-        ("clipping", "high", "upper_level"),
-        ("clipping", "low", "lower_level"),
-        ("jitter", "sigma_t", "sigma_t"),
-    ],
-)
-def test_a_fault_is_told_as_the_simulation_asks_for_it(
-    identifier: str, own: str, name: str, unit: str
-) -> None:
-    fault = named(identifier, **{own: Estimate(0.1, 0.01, "its own")})
-    told = in_catalogue_terms(fault, readings(unit)).parameters
-    declared = {p.name: p.unit_in(unit) for p in by_identifier(identifier).parameters}
-    assert told == {name: Estimate(0.1, 0.01, declared[name])}
-
-
-def test_what_a_test_measures_beside_the_catalogue_keeps_its_name() -> None:
-    fault = named("glitches", share=Estimate(0.01, 0.001, ""))
-    assert in_catalogue_terms(fault, readings()).parameters == fault.parameters
 
 
 def test_lost_samples_are_told_by_the_time_by_which_later_readings_are_late() -> None:

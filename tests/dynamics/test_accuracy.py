@@ -121,6 +121,7 @@ def test_to_the_stop(multiple: float, h: float, q: float, g: float) -> None:
 
 
 @given(pendulums(), st.integers(200, 5000))
+@example((Eq8(1.0, 0.0, 0.0, 0.0, 7.821237238076335e-05), 1.0), 4071)
 @settings(max_examples=80, deadline=None)
 def test_map_and_clock_agree_over_long_records(drawn: tuple[Eq8, float], count: int) -> None:
     model, y = drawn
@@ -130,10 +131,13 @@ def test_map_and_clock_agree_over_long_records(drawn: tuple[Eq8, float], count: 
     assert by_map.stopped == by_clock.stopped
     w = model.angular_frequency
     np.testing.assert_allclose(by_map.time_s * w, by_clock.time_s * w, atol=1e-9, rtol=1e-14)
-    np.testing.assert_allclose(by_map.angle_rad, by_clock.angle_rad, rtol=1e-9, atol=1e-13 * y)
+    # Each half cycle rounds the amplitude, and a constant loss always the same way: a unit in
+    # the last place each (pure Coulomb friction: the map is exact to 1e-15, the clock to 2e-13).
+    rounding = count * np.finfo(float).eps * y
+    np.testing.assert_allclose(by_map.angle_rad, by_clock.angle_rad, rtol=1e-9, atol=rounding)
     time = np.linspace(0.0, by_clock.time_s[-1] * 1.01, 3001)
     envelope = np.interp(time, by_clock.time_s, np.abs(by_clock.angle_rad))
     difference = sample(model, Release(0.0, y), time) - sample(
         model, Release(0.0, y), time, method="clock"
     )
-    assert np.max(np.abs(difference) / (envelope + 1e-4 * y)) < 1e-9
+    assert np.all(np.abs(difference) < 1e-9 * (envelope + 1e-4 * y) + rounding)

@@ -189,7 +189,10 @@ class Forensics:
         number = sum(each.number for each in lost)
         found = Finding(
             "dropped-samples", 0.0, state.fit.chi2 - fit.chi2,
-            {"samples": Estimate(float(number), 0.0, "")},
+            {
+                "d": Estimate(number * interval, 0.0, "s"),
+                "samples": Estimate(float(number), 0.0, ""),
+            },
             Location(time_s=(lost[0].time_s, lost[-1].time_s)),
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )  # fmt: skip

@@ -14,7 +14,6 @@ from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnose.begin import Beginning, begin
-from pendpipe.diagnose.fault_terms import in_catalogue_terms
 from pendpipe.diagnose.forensics.lattice import with_true_step
 from pendpipe.diagnose.forensics.time_stamps import gap_note
 from pendpipe.diagnose.freed import freed_parameters
@@ -156,8 +155,7 @@ def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[Named, ...]:
     """Name effects and faults in the order in which they were added."""
     effects = [(place, effect_named(found, step, each)) for place, (step, each) in
                enumerate(zip(found.steps, weighed, strict=True))]  # fmt: skip
-    faults = [(fault.behind, in_catalogue_terms(fault_named(found, fault), found.data))
-              for fault in found.faults]  # fmt: skip
+    faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.
     return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))
 

@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.clock import Clock
 
 _TOLERANCE: Final = 1e-9
 _ROUNDS: Final = 25
@@ -36,80 +36,6 @@ _LARGEST: Final = 4.0
 
 class NoMotionError(ArithmeticError):
     """The law stops the pendulum, or drives it away, before the end that was asked for."""
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The nodes of the phase: Chebyshev-Lobatto in each half cycle, ends included.
-
-    Parameters
-    ----------
-    count
-        How many half cycles.
-    order
-        Intervals between the nodes of one half cycle.
-    """
-
-    count: int
-    order: int = 16
-
-    @property
-    def psi(self) -> FloatArray:
-        """Phase of each node, shape (count, order + 1)."""
-        return _phases(self.count, self.order)[0]
-
-    @property
-    def cosine(self) -> FloatArray:
-        """cos(psi), shape (count, order + 1)."""
-        return _phases(self.count, self.order)[1]
-
-    @property
-    def sine(self) -> FloatArray:
-        """sin(psi), shape (count, order + 1); exactly zero at the turning points."""
-        return _phases(self.count, self.order)[2]
-
-    @property
-    def _sign(self) -> FloatArray:
-        return _phases(self.count, self.order)[3]
-
-    def integral(self, rate: FloatArray) -> FloatArray:
-        """Integrate over the phase from psi = 0; shape (..., count, order + 1) as `rate`."""
-        parts = rate @ _integration(self.order).T
-        parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1], axis=-1)[..., None]
-        return np.asarray(parts)
-
-
-@lru_cache(maxsize=8)
-def _phases(count: int, order: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Phase, cosine and sine of each node, and the sign of each half cycle; not to be written."""
-    sign = np.asarray(1.0 - 2.0 * (np.arange(count) % 2)[:, None], dtype=np.float64)
-    psi: FloatArray = math.pi * (np.arange(count)[:, None] + _nodes(order))
-    cosine: FloatArray = sign * np.cos(math.pi * _nodes(order))
-    sine = np.sin(math.pi * _nodes(order))
-    sine[[0, -1]] = 0.0
-    sine = np.asarray(sign * sine)
-    for each in (psi, cosine, sine, sign):
-        each.flags.writeable = False
-    return psi, cosine, sine, sign
-
-
-@lru_cache
-def _nodes(order: int) -> FloatArray:
-    """Chebyshev-Lobatto points on [0, 1]."""
-    return np.asarray(0.5 - 0.5 * np.cos(math.pi * np.arange(order + 1) / order))
-
-
-@lru_cache
-def _integration(order: int) -> FloatArray:
-    """The matrix that integrates from the first node to each, over a half turn."""
-    # The polynomial through the values is integrated exactly; Chebyshev's basis keeps the
-    # matrix well conditioned.
-    from numpy.polynomial import chebyshev
-
-    z = 2.0 * _nodes(order) - 1.0
-    analysis = np.linalg.inv(chebyshev.chebvander(z, order))
-    integrals = np.stack([chebyshev.chebint(column, lbnd=-1.0) for column in analysis.T], axis=1)
-    return np.asarray(0.5 * math.pi * chebyshev.chebvander(z, order + 1) @ integrals)
 
 
 @dataclass(frozen=True)
@@ -138,7 +64,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         amplitude = np.exp(self.log_amplitude)
-        side = self.upwards * self.clock._sign
+        side = self.upwards * self.clock.side
         put = object.__setattr__
         put(self, "amplitude", amplitude)
         put(self, "angle", self.upwards * amplitude * self.clock.cosine)
@@ -176,23 +102,41 @@ class Rates:
     pace: FloatArray
 
 
-def rates(law: Law, motion: Motion, *, largest: float | None = None) -> Rates:
-    """Return the rates of a law along a given (perhaps wrong) motion.
+def rates(law: Law, motion: Motion) -> Rates:
+    """Return the rates of a law along a motion.
 
-    `largest` bounds g, and g cos(psi) where the pendulum would not turn, for a search on its way.
+    Raises
+    ------
+    NoMotionError
+        Where it does not turn.
     """
-    omega, clock = motion.angular_frequency, motion.clock
-    g = motion.upwards * law(motion) / (omega * omega * motion.amplitude)
-    free = 1.0 - g * clock.cosine
-    if largest is not None:
-        g = np.nan_to_num(np.clip(g, -largest, largest))
-        least = 1.0 - _STEEPEST
-        steep = 1.0 - g * clock.cosine < least
-        g = np.where(steep, np.copysign(_STEEPEST, g), g)
-        free = np.maximum(1.0 - g * clock.cosine, least)
-    elif not np.all(np.abs(g) <= _LARGEST) or np.min(free) < 1.0 - _STEEPEST:
+    return _rates(_turning(law, motion), motion)
+
+
+def _turning(law: Law, motion: Motion) -> FloatArray:
+    """G of a law, with which the pendulum turns."""
+    g = _pull(law, motion)
+    if not np.all(np.abs(g) <= _LARGEST) or np.max(g * motion.clock.cosine) > _STEEPEST:
         raise NoMotionError("the pendulum does not turn")
-    return Rates(-g * clock.sine / free, 1.0 / (omega * free))
+    return g
+
+
+def _bounded_rates(law: Law, motion: Motion, largest: float) -> Rates:
+    """The same along a motion that may be wrong: with g bounded, for a search on its way."""
+    g = np.nan_to_num(np.clip(_pull(law, motion), -largest, largest))
+    steep = g * motion.clock.cosine > _STEEPEST
+    return _rates(np.where(steep, np.copysign(_STEEPEST, g), g), motion)
+
+
+def _pull(law: Law, motion: Motion) -> FloatArray:
+    """G = f/(omega^2 r)."""
+    omega = motion.angular_frequency
+    return np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
+
+
+def _rates(g: FloatArray, motion: Motion) -> Rates:
+    free = 1.0 - g * motion.clock.cosine
+    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free))
 
 
 def follow(
@@ -223,30 +167,38 @@ def follow(
     origin = math.log(abs(start_rad))
     log_amplitude = guess.log_amplitude + (origin - guess.log_amplitude[0, 0])
     time = guess.time_s + (start_s - guess.time_s[0, 0])
-    jumps, delays = (0.0, 0.0) if reset is None else reset
     motion = Motion(clock, angular_frequency, log_amplitude, time, upwards)
+    jumps, delays = (0.0, 0.0) if reset is None else reset
+    # Larger g are but on the way, and lead astray, unless the equilibrium is far off.
+    for largest in (_STEEPEST, _LARGEST):
+        motion = _solved(law, motion, origin + jumps, start_s + delays, largest)
+        if np.max(np.abs(_turning(law, motion))) <= largest:
+            break
+    return motion
+
+
+def _solved(
+    law: Law, motion: Motion, log_start: FloatArray | float, start_s: FloatArray | float,
+    largest: float,
+) -> Motion:  # fmt: skip
+    """Iterate a motion until it is that of the law with bounded g."""
+    clock, omega = motion.clock, motion.angular_frequency
     steepness: FloatArray | None = None
     before = math.inf
-    # Where the equilibrium is not far off, larger g are but on the way, and lead astray.
-    largest = _STEEPEST
     for _ in range(_ROUNDS):
-        now = rates(law, motion, largest=largest)
+        now = _bounded_rates(law, motion, largest)
         if steepness is None:
-            steepness = _steepness(law, motion, now, largest)
-        off = origin + jumps + clock.integral(now.loss) - motion.log_amplitude
+            more = _bounded_rates(law, _larger(motion), largest)
+            steepness = np.asarray((more.loss - now.loss) / _STEP)
+        off = log_start + clock.integral(now.loss) - motion.log_amplitude
         change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
-        late = start_s + delays + clock.integral(now.pace) - motion.time_s
-        error = max(float(np.max(np.abs(change))), angular_frequency * float(np.max(np.abs(late))))
+        late = start_s + clock.integral(now.pace) - motion.time_s
+        error = max(float(np.max(np.abs(change))), omega * float(np.max(np.abs(late))))
         motion = Motion(
-            clock, angular_frequency, motion.log_amplitude + change, motion.time_s + late, upwards
+            clock, omega, motion.log_amplitude + change, motion.time_s + late, motion.upwards
         )
         if error < _TOLERANCE:
-            there = rates(law, motion)
-            if np.allclose(there.pace, rates(law, motion, largest=largest).pace, rtol=1e-12):
-                return motion
-            largest, steepness, error = _LARGEST, None, math.inf
-            before = error
-            continue
+            return motion
         if not error < 1e3:
             break
         if error > 0.5 * before:
@@ -255,13 +207,12 @@ def follow(
     raise NoMotionError("the motion can't be followed")
 
 
-def _steepness(law: Law, motion: Motion, now: Rates, largest: float) -> FloatArray:
-    """Derivative of d ln r/d psi by ln r."""
-    moved = Motion(
+def _larger(motion: Motion) -> Motion:
+    """The motion with a little more of ln r, for differences."""
+    return Motion(
         motion.clock, motion.angular_frequency, motion.log_amplitude + _STEP, motion.time_s,
         motion.upwards,
     )  # fmt: skip
-    return np.asarray((rates(law, moved, largest=largest).loss - now.loss) / _STEP)
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:
@@ -283,11 +234,7 @@ class Tangent:
 
     def __init__(self, law: Law, motion: Motion) -> None:
         self.motion, self.rates = motion, rates(law, motion)
-        moved = Motion(
-            motion.clock, motion.angular_frequency, motion.log_amplitude + _STEP, motion.time_s,
-            motion.upwards,
-        )  # fmt: skip
-        other = rates(law, moved)
+        other = rates(law, _larger(motion))
         self._steepness = (other.loss - self.rates.loss) / _STEP
         self._pace = (other.pace - self.rates.pace) / _STEP
         growth = motion.clock.integral(self._steepness)

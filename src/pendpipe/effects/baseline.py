@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Clock, Motion
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.clock import Clock
 from pendpipe.effects.effect import Pendulum
 
 BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")

@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.any_law import Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.clock import Clock
 from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects.baseline import (
     BASELINE,

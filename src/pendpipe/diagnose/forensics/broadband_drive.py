@@ -165,7 +165,7 @@ def _described(
     floor = math.sqrt(best / (8.0 * omega**2 * linear))
     return Finding(
         "broadband-drive", p_value, gain,
-        {"S_a": Estimate(best, sd, "rad^2/(s^4 Hz)")},
+        {"acceleration_density": Estimate(best, sd, f"({data.unit}/s^2)^2/Hz")},
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(sampled.amplitude.min()), float(sampled.amplitude.max())),

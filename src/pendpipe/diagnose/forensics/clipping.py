@@ -145,9 +145,7 @@ def _described(
     step = lattice.step if lattice is not None else 0.0
     number, mask = _clipped(data, samples, ends, step)
     for end in ends:
-        parameters["high" if end.side == "upper" else "low"] = Estimate(
-            end.level, step / math.sqrt(12.0), data.unit
-        )
+        parameters[f"{end.side}_level"] = Estimate(end.level, step / math.sqrt(12.0), data.unit)
         if lattice is not None:
             codes.append(round(float(lattice.position(np.array(end.level)))))
     parameters["number"] = Estimate(float(number), 0.0, "")
