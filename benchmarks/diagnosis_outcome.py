@@ -44,6 +44,12 @@ def in_class(entry: Outcome) -> bool:
     return any(right & set(names) for names in classes(entry)[:1])
 
 
+def in_a_class(entry: Outcome) -> bool:
+    """Whether the class of any effect that was reported holds the truth."""
+    right = set(entry["right"][0])
+    return any(right & set(names) for names in classes(entry))
+
+
 def first(entry: Outcome) -> bool:
     """Whether the first name is the truth."""
     return bool(entry["effects"]) and entry["effects"][0][0] in entry["right"][0]
@@ -58,3 +64,8 @@ def oracle_in_class(entry: Outcome) -> bool:
 def oracle_first(entry: Outcome) -> bool:
     """Whether the oracle's first name is the truth."""
     return oracle_found(entry) and entry["oracle"]["named"] in entry["right"][0]
+
+
+def oracle_tells_apart(entry: Outcome) -> bool:
+    """Whether nothing but the truth is in the oracle's class."""
+    return oracle_first(entry) and len(entry["oracle"]["class"]) == 1

@@ -12,11 +12,13 @@ from benchmarks.diagnosis_outcome import (
     classes,
     first,
     found,
+    in_a_class,
     in_class,
     of,
     oracle_first,
     oracle_found,
     oracle_in_class,
+    oracle_tells_apart,
     share,
 )
 
@@ -91,10 +93,15 @@ def _nameable(singles: Sequence[Outcome]) -> str:
     """The same of those that the oracle itself can name."""
     held = [entry for entry in singles if oracle_in_class(entry)]
     led = [entry for entry in singles if oracle_first(entry)]
+    alone = [entry for entry in singles if oracle_tells_apart(entry)]
     return (
-        "Of those that the oracle's own class holds it is in the class in"
+        "Where more than one effect was reported, the first one's class is asked; the class of"
+        f" any of them holds the truth in {share(sum(map(in_a_class, singles)), len(singles))}."
+        " Of those that the oracle's own class holds it is in the class in"
         f" {share(sum(map(in_class, held)), len(held))}; of those that the oracle names, first in"
-        f" {share(sum(map(first, led)), len(led))}."
+        f" {share(sum(map(first, led)), len(led))}; of those that the oracle can name (its class"
+        f" holds nothing else), first in {share(sum(map(first, alone)), len(alone))} and in the"
+        f" class in {share(sum(map(in_class, alone)), len(alone))}."
     )
 
 

@@ -107,3 +107,24 @@ def test_the_covariance_is_the_scatter_of_repeated_records() -> None:
     scatter = np.mean(np.square(pulls), axis=0)
     assert np.all(scatter > chi2.ppf(2e-4, 30) / 30.0)
     assert np.all(scatter < chi2.isf(2e-4, 30) / 30.0)
+
+
+@pytest.mark.parametrize("start", [0.7, 1.4, 2.0])
+def test_friction_that_took_another_laws_place_is_found_from_nothing(start: float) -> None:
+    """Coulomb and quadratic losses imitate Stribeck's, and all must change at once.
+
+    The exchange leaves the motion as it is, but friction changes the frequency in second
+    order, so that no straight step lowers chi^2 by what it promises.
+    """
+    time_s = np.arange(3600) * INTERVAL_S
+    effect = by_identifier("stribeck-friction")
+    truth = np.array([2e-4, 1.2e-3, 1e-6, 0.5, 6.09, 0.0389, -0.25, 0.006, 0.0063, 0.0345])
+    model = Model(time_s, INTERVAL_S, (effect,))
+    readings = model.reading(truth)
+    readings += 2e-5 * np.random.default_rng(5).standard_normal(len(time_s))
+    data, noise = prepared(readings, time_s, 2e-5)
+    from_truth = refine(model, data, noise, truth)
+    without = refine(Model(time_s, INTERVAL_S), data, noise, truth[:-2])
+    assert without.chi2 - from_truth.chi2 > 100.0
+    found = refine(model, data, noise, np.append(without.value, [0.0, start * truth[-1]]))
+    assert found.chi2 == pytest.approx(from_truth.chi2, abs=1.0)

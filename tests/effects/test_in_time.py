@@ -237,3 +237,16 @@ def test_a_slow_creep_has_hardly_begun(identifier: str, values: tuple[float, ...
     went = abs(float(np.mean(moved[-28:]) - np.mean(moved[:28])))
     told = by_identifier(identifier).displacement(np.array(values), float(TIME[-1]))
     assert told == pytest.approx(went, rel=0.05)
+
+
+@pytest.mark.parametrize("samples", [1.0, -1.0, 3.0])
+def test_samples_are_lost_whole(samples: float) -> None:
+    """A tenth of one is lost where ten are read for each that is told, as rarely as that."""
+    effect = by_identifier("dropped-samples")
+    span = evaluated("dropped-samples", (0.0, 30.0), baseline(b=0.01), TIME).span
+
+    def cost(part: float) -> float:
+        return effect.improbable(np.array([part * samples * 0.04, 30.0]), span)
+
+    assert cost(1.0) == 0.0
+    assert cost(0.1 / abs(samples)) == pytest.approx(2.0 * math.log(10.0))

@@ -20,12 +20,16 @@ from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.refine import Fit, pulled, refine
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 
 _MOST: Final = 9
 _NEAR: Final = 16.0
+_MORE: Final = 3
+_BEHIND: Final = 0.3
+_BEHIND_WIDE: Final = 0.6
+"""Part of the best score by which a refit may make up."""
 _ALIKE: Final = 0.98
 _LARGEST: Final = 0.5
 """Of the first amplitude: what an effect may add to the reading."""
@@ -45,7 +49,7 @@ def refit_leads(
 ) -> list[Rival]:  # fmt: skip
     """Refit the leading effects nonlinearly; the best first."""
     fits: list[tuple[Lead, Fit]] = []
-    for lead in _worth_refitting(detection, gross, most):
+    for lead in _worth_refitting(detection, gross, most, wide=bool(pulled(base))):
         fit = _refitted(base, data, noise, lead, held)
         lost = base.slip_rad > _LOST and len(fits) < _FROM_AFAR
         # With the baseline's friction a law may not get through to the end.
@@ -74,25 +78,31 @@ def _named_first(rivals: list[Rival]) -> list[Rival]:
         if rival.lead.effect.kind != "unnamed"
         and rival.gain > (_SOME if rival.lead.effect.expected else _MUCH) * best
     ]  # fmt: skip
-    # What must be there anyway goes before what merely fits a trifle better.
-    named.sort(key=lambda rival: -rival.lead.effect.prior if rival.gain > _ALIKE * best else 0.0)
+    # What is likelier beforehand goes before what merely fits a trifle better.
+    named.sort(key=lambda rival: (0, -rival.prior) if rival.gain > _ALIKE * best else (1, 0.0))
     # Bearing and fluid are there in any case, and what else bends is judged with them.
     named.sort(key=lambda rival: not rival.lead.effect.expected)
     return [*named, *(rival for rival in rivals if rival not in named)]
 
 
-def _worth_refitting(detection: Detection, gross: bool, most: int) -> list[Lead]:
-    """The leads that may win, or be in the winner's class."""
+def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -> list[Lead]:
+    """The leads that may win, or be in the winner's class.
+
+    They are more (`wide`) where the base has a value at its bound: beside an effect that lets
+    go of it, the refit gains far more than the score, which holds it there.
+    """
     leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
     if not leads:
         return []
     best = _rank(leads[0])
-    near = [lead for lead in leads if _rank(lead) > best - _NEAR - (0.9 if gross else 0.3) * best]
+    part = 0.9 if gross else _BEHIND_WIDE if wide else _BEHIND
+    near = [lead for lead in leads if _rank(lead) > best - _NEAR - part * best]
     if gross:
         near = near[: most + 2]
     else:
         # So many names: curves, which lead wherever a misfit bends, take no name's place.
-        names = [lead for lead in near if lead.effect.kind != "unnamed"][:most]
+        names = [lead for lead in near if lead.effect.kind != "unnamed"]
+        names = names[: most + _MORE if wide else most]
         near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
     # Asked whatever their first order says: what the user holds, which is little; and in a gross
     # misfit bearing and fluid, which are in every pendulum.

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.bounded import bounded_least_squares
+from pendpipe.diagnose.climb import SETTLED, Climb
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.unwrapped import unwrapped
-from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, B, C
-from pendpipe.effects.derivatives import jacobian
+from pendpipe.effects.baseline import C
 from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.held_parts import share_by_b
 from pendpipe.effects.model import Model
 
 _ROUNDS: Final = 14
-_SETTLED: Final = 0.02
-"""Of chi^2: a step that promises less is the last."""
 _PULL: Final = 3.0
 """Standard deviations beyond a bound from which it is the bound that is believed."""
-_SHARE_SD: Final = 0.3
-"""The hysteretic share of b is hardly seen in one record: any between 0 and 1 may be."""
 
 
 @dataclass(frozen=True)
@@ -111,32 +103,27 @@ def refine(
     """
     fixed = {*held, *model.held()}
     free = np.array([k for k in range(model.size) if k not in fixed])
-    low, high = model.bounds()
-    value = model.settled(np.clip(start, low, high))
-    at = model.evaluate(value)
-    residual, slip = _residual(data, noise, at, value)
+    climb = Climb(model, data, noise)
+    here = climb.start(start)
     converged = False
     for _ in range(rounds):
-        columns = _jacobian(model, noise, value, at)
-        step = _step(columns, residual, free, value, low, high)
-        promised = float(residual @ residual - np.sum((residual - columns @ step) ** 2))
-        tried = _tried(model, data, noise, value, step, residual)
+        step = climb.step(here, free)
+        promised = here.chi2 - float(np.sum((here.residual - here.columns @ step) ** 2))
+        tried = climb.tried(here, step, free)
         if tried is None and C in free:
             # More friction would stop it before the last reading: the others go first.
-            step = _step(columns, residual, free[free != C], value, low, high)
-            tried = _tried(model, data, noise, value, step, residual)
+            others = free[free != C]
+            tried = climb.tried(here, climb.step(here, others), others)
         if tried is None:
-            converged = promised < 10.0 * _SETTLED
+            converged = promised < 10.0 * SETTLED
             break
-        gained = float(residual @ residual - tried.residual @ tried.residual)
-        value, at, residual, slip = tried
-        if promised < _SETTLED or (gained < _SETTLED and promised < 1.0):
+        gained, here = here.chi2 - tried.chi2, tried
+        if promised < SETTLED or (gained < SETTLED and promised < 1.0):
             converged = True
             break
-    columns = _jacobian(model, noise, value, at)
     return Fit(
-        model, value, float(residual @ residual), residual, columns, at, tuple(free.tolist()),
-        converged, slip,
+        model, here.value, here.chi2, here.residual, here.columns, here.at,
+        tuple(free.tolist()), converged, here.slip_rad,
     )  # fmt: skip
 
 
@@ -148,73 +135,4 @@ def misfit(model: Model, data: Data, noise: Noise, value: FloatArray) -> float:
     NoMotionError
         If the model can't be evaluated there.
     """
-    residual, _ = _residual(data, noise, model.evaluate(value), value)
-    return float(residual @ residual)
-
-
-class _Tried(NamedTuple):
-    value: FloatArray
-    at: Evaluated
-    residual: FloatArray
-    slip_rad: float
-
-
-def _tried(
-    model: Model, data: Data, noise: Noise, value: FloatArray, step: FloatArray,
-    residual: FloatArray,
-) -> _Tried | None:  # fmt: skip
-    """Go along a step as far as it lowers chi^2; None where it does nowhere."""
-    low, high = model.bounds()
-    for shrink in (1.0, 0.3, 0.1, 0.02):
-        trial = model.settled(np.clip(value + shrink * step, low, high))
-        try:
-            there = model.evaluate(trial)
-        except NoMotionError:
-            continue
-        new, slip = _residual(data, noise, there, trial)
-        if new @ new < residual @ residual + 0.5 * _SETTLED:
-            return _Tried(trial, there, new, slip)
-    return None
-
-
-def _residual(
-    data: Data, noise: Noise, at: Evaluated, value: FloatArray
-) -> tuple[FloatArray, float]:
-    """The whitened residual with the prior's entry, and the largest slip of the phase."""
-    plain, slip = unwrapped(data, at)
-    prior = (0.5 - value[SHARE]) / _SHARE_SD
-    return np.append(noise.whiten(plain), prior), slip
-
-
-def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:
-    columns = np.empty((len(at.reading) + 1, model.size))
-    columns[:-1] = noise.whiten(jacobian(model, value, at))
-    columns[-1] = 0.0
-    columns[-1, SHARE] = 1.0 / _SHARE_SD
-    # Where one part of b is held, b moves the share.
-    columns[:, B] += share_by_b(value, model.held_parts()) * columns[:, SHARE]
-    return columns
-
-
-def _step(
-    jacobian: FloatArray, residual: FloatArray, free: FloatArray, value: FloatArray,
-    low: FloatArray, high: FloatArray,
-) -> FloatArray:  # fmt: skip
-    """The Gauss-Newton step, the best within the bounds."""
-    step = np.zeros(len(value))
-    part = jacobian[:, free]
-    if not np.all(np.isfinite(part)):
-        raise NoMotionError("its derivatives are out of reach")
-    scale = np.linalg.norm(part, axis=0)
-    scale[scale == 0.0] = 1.0
-    left, small = np.linalg.qr(part / scale)
-    right = left.T @ residual
-    solved = np.linalg.lstsq(small, right, rcond=1e-11)[0]
-    floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
-    if np.any(solved < floor) or np.any(solved > ceiling):
-        solved = bounded_least_squares(small, right, floor, ceiling)
-    step[free] = solved / scale
-    limit = 0.05 * value[OMEGA]
-    if abs(step[OMEGA]) > limit:
-        step *= limit / abs(step[OMEGA])
-    return step
+    return Climb(model, data, noise).place(value).chi2

@@ -70,6 +70,15 @@ class DroppedSamples(Effect):
         """Return d behind the instant."""
         return np.asarray(values[0] * reading_step(time_s, values[1]))
 
+    def improbable(self, values: FloatArray, span: Span) -> float:
+        """Return what a part of a sample costs.
+
+        Samples are lost whole. Less than one is lost where the instrument itself reads n times
+        as fast as it tells, which is the less likely the larger n: by 1/n.
+        """
+        part = abs(float(values[0])) / span.interval_s
+        return -2.0 * math.log(min(max(part, 1e-6), 1.0))
+
     def shapes(self, span: Span) -> list[tuple[float]]:
         """Instants."""
         return instants(span, 64)
