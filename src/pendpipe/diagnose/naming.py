@@ -78,8 +78,9 @@ def _named_first(rivals: list[Rival]) -> list[Rival]:
         if rival.lead.effect.kind != "unnamed"
         and rival.gain > (_SOME if rival.lead.effect.expected else _MUCH) * best
     ]  # fmt: skip
-    # What is likelier beforehand goes before what merely fits a trifle better.
-    named.sort(key=lambda rival: (0, -rival.prior) if rival.gain > _ALIKE * best else (1, 0.0))
+    # What is likelier beforehand goes before a name that merely fits a trifle better.
+    near = _ALIKE * max((rival.gain for rival in named), default=0.0)
+    named.sort(key=lambda rival: (0, -rival.prior) if rival.gain > near else (1, 0.0))
     # Bearing and fluid are there in any case, and what else bends is judged with them.
     named.sort(key=lambda rival: not rival.lead.effect.expected)
     return [*named, *(rival for rival in rivals if rival not in named)]
