@@ -35,6 +35,7 @@ RIG = "profcarter-adip/adip_pend_data.mat"
 STRING = "jiarui-phy180/AAAtAmp3.txt"
 SHIP = "kvlcc2-roll-decay/model_test_21337.csv"
 SPRING = "filo0509-spring/molla_durissima_discopieno_14.91945_0.2016_1.csv"
+VIDEO = "tylertian-phy180/lab1_data.txt"
 ROD, GAP = "yfysiks-encoder/data2_14.csv", "yfysiks-encoder/data2_12.csv"
 
 
@@ -122,6 +123,13 @@ def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
     # Known: quadratic drag and Coulomb friction in near equal measure, at 1.2 rad and below.
     drag, friction = fit.value[A] * 1.2, fit.value[C] / 1.2
     assert 0.2 < friction / drag < 5.0
+
+
+def test_the_sine_goes_before_a_clock_that_fits_a_trifle_better() -> None:
+    """At 1 rad of amplitude and without Eq. 3's quadratic drag a drift of the clock gains more."""
+    named = diagnose_recording(whole(VIDEO), baseline="viscous").diagnosis.effects
+    assert [effect.identifier for effect in named[:2]] == ["circular-error", "quadratic-drag"]
+    assert named[0].probability > 0.5
 
 
 def test_a_gap_of_the_time_stamps_is_said_with_its_place_and_length() -> None:

@@ -1,0 +1,44 @@
+"""Who is refitted, and who goes first where a misfit is gross."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.detect import Detection, Lead
+from pendpipe.diagnose.evidence import NO_SCAN
+from pendpipe.diagnose.naming import refit_leads
+from pendpipe.diagnose.refine import pulled, refine
+from pendpipe.effects.baseline import A, C
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
+
+from .records import INTERVAL_S, LINEAR, TIME_S, TRUTH, prepared, white
+
+
+def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
+    """A scan's answer, the p-values too small to matter."""
+    leads = [Lead(by_identifier(name), shape, score, 0.0)
+             for name, (score, shape) in scores.items()]  # fmt: skip
+    return Detection(tuple(leads), 0.0, NO_SCAN)
+
+
+@pytest.mark.parametrize(("others", "at_a_bound"), [(LINEAR, True), (TRUTH, False)])
+def test_what_a_bound_holds_back_is_asked_though_it_scores_half(
+    others: FloatArray, at_a_bound: bool
+) -> None:
+    """A loss between b and a asks for a negative c, which the score holds at zero."""
+    power = by_identifier("power-law-damping")
+    truth = np.concatenate([others, [5e-4, 1.4, 1.0]])
+    readings = Model(TIME_S, INTERVAL_S, (power,)).reading(truth)
+    data, noise = prepared(readings + white(3))
+    base = refine(Model(TIME_S, INTERVAL_S), data, noise, others)
+    assert ({A, C} & set(pulled(base)) != set()) == at_a_bound
+    rivals = refit_leads(
+        base, data, noise,
+        _detection({"damping-drift": (100.0, (40.0,)), "power-law-damping": (50.0, (1.5, 0.0))}),
+        held=(), gross=False, origin=base.value,
+    )  # fmt: skip
+    asked = {rival.identifier for rival in rivals}
+    assert ("power-law-damping" in asked) == at_a_bound
