@@ -126,7 +126,7 @@ def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
 
 
 def test_the_sine_goes_before_a_clock_that_fits_a_trifle_better() -> None:
-    """At 1 rad of amplitude and without Eq. 3's quadratic drag a drift of the clock gains more."""
+    """At 0.7 rad and without Eq. 3's quadratic drag a drift of the clock gains more."""
     named = diagnose_recording(whole(VIDEO), baseline="viscous").diagnosis.effects
     assert [effect.identifier for effect in named[:2]] == ["circular-error", "quadratic-drag"]
     assert named[0].probability > 0.5
