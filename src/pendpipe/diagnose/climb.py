@@ -34,7 +34,17 @@ _SHARE_SD: Final = 0.3
 
 @dataclass(frozen=True)
 class Place:
-    """Values with what they give; shapes are those of `refine.Fit`."""
+    """Values with what they give; shapes are those of `refine.Fit`.
+
+    Parameters
+    ----------
+    value
+        Of the model.
+    at, residual, slip_rad
+        The model there, the whitened residual, and the largest slip of the phase.
+    model, noise
+        From which the Jacobian is worked out, where it is asked for.
+    """
 
     value: FloatArray
     at: Evaluated

@@ -27,9 +27,11 @@ from pendpipe.effects import Effect
 _MOST: Final = 9
 _NEAR: Final = 16.0
 _MORE: Final = 3
+"""Names beyond these where a bound holds scores back."""
 _BEHIND: Final = 0.3
+"""Part of the best score that a refit may make up for."""
 _BEHIND_WIDE: Final = 0.6
-"""Part of the best score by which a refit may make up."""
+"""The same where a bound holds scores back."""
 _ALIKE: Final = 0.98
 _LARGEST: Final = 0.5
 """Of the first amplitude: what an effect may add to the reading."""
