@@ -8,10 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from pendpipe.diagnose.noise import white_noise
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.noise import Noise, white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.evaluated import Evaluated
 from pendpipe.effects.model import Model
 
 from .records import (
@@ -109,6 +112,15 @@ def test_the_covariance_is_the_scatter_of_repeated_records() -> None:
     assert np.all(scatter < chi2.isf(2e-4, 30) / 30.0)
 
 
+def _with_stribeck() -> tuple[Model, Data, Noise, FloatArray]:
+    """A model with Stribeck's friction, its readings and their noise, and its values."""
+    time_s = np.arange(3600) * INTERVAL_S
+    truth = np.array([2e-4, 1.2e-3, 1e-6, 0.5, 6.09, 0.0389, -0.25, 0.006, 0.0063, 0.0345])
+    model = Model(time_s, INTERVAL_S, (by_identifier("stribeck-friction"),))
+    data, noise = prepared(model.reading(truth) + white(5, 3600, 2e-5), time_s, 2e-5)
+    return model, data, noise, truth
+
+
 @pytest.mark.parametrize("start", [0.7, 1.4, 2.0])
 def test_friction_that_took_another_laws_place_is_found_from_nothing(start: float) -> None:
     """Coulomb and quadratic losses imitate Stribeck's, and all must change at once.
@@ -116,15 +128,54 @@ def test_friction_that_took_another_laws_place_is_found_from_nothing(start: floa
     The exchange leaves the motion as it is, but friction changes the frequency in second
     order, so that no straight step lowers chi^2 by what it promises.
     """
-    time_s = np.arange(3600) * INTERVAL_S
-    effect = by_identifier("stribeck-friction")
-    truth = np.array([2e-4, 1.2e-3, 1e-6, 0.5, 6.09, 0.0389, -0.25, 0.006, 0.0063, 0.0345])
-    model = Model(time_s, INTERVAL_S, (effect,))
-    readings = model.reading(truth)
-    readings += 2e-5 * np.random.default_rng(5).standard_normal(len(time_s))
-    data, noise = prepared(readings, time_s, 2e-5)
+    model, data, noise, truth = _with_stribeck()
     from_truth = refine(model, data, noise, truth)
-    without = refine(Model(time_s, INTERVAL_S), data, noise, truth[:-2])
+    without = refine(model.bare(), data, noise, truth[:-2])
     assert without.chi2 - from_truth.chi2 > 100.0
     found = refine(model, data, noise, np.append(without.value, [0.0, start * truth[-1]]))
     assert found.chi2 == pytest.approx(from_truth.chi2, abs=1.0)
+
+
+@pytest.mark.parametrize("identifier", ["circular-error", "cubic-stiffness", "second-mode"])
+@pytest.mark.parametrize("within", [10.0, 1e3, 1e5])
+def test_what_is_given_up_would_have_been_of_no_use(identifier: str, within: float) -> None:
+    """A limit of chi^2 spoils no fit that gets below it."""
+    effect = by_identifier(identifier)
+    shape = {"second-mode": [2.0, 30.0]}.get(identifier, [])
+    sizes = [1.0] if effect.switch else [0.0] * effect.sizes
+    fit, data, noise = null_fit()
+    truth = fit.value.copy()
+    truth[START] = 0.3
+    start = np.concatenate([truth, sizes, shape])
+    model = fit.model.adding(effect)
+    whole = refine(model, data, noise, start)
+    of_use = fit.chi2 + within
+    limited = refine(model, data, noise, start, of_use=of_use)
+    # The motion is followed from the last one that was asked, to 1e-9.
+    assert limited.chi2 >= whole.chi2 * (1.0 - 1e-6)
+    if whole.chi2 < of_use:
+        assert limited.chi2 == pytest.approx(whole.chi2)
+    else:
+        assert limited.chi2 > of_use
+
+
+def test_a_hopeless_fit_is_left_after_a_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow change of the damping is not what Stribeck's friction leaves: its fit creeps."""
+    model, data, noise, truth = _with_stribeck()
+    without = refine(model.bare(), data, noise, truth[:-2])
+    drift = model.bare().adding(by_identifier("damping-drift"))
+    start = np.append(without.value, [0.0, 100.0])
+    asked: list[float] = []
+    evaluate = Model.evaluate
+
+    def counted(self: Model, value: FloatArray) -> Evaluated:
+        asked.append(float(value[START]))
+        return evaluate(self, value)
+
+    monkeypatch.setattr(Model, "evaluate", counted)
+    whole = refine(drift, data, noise, start)
+    spent = len(asked)
+    of_use = whole.chi2 - 30.0
+    limited = refine(drift, data, noise, start, of_use=of_use)
+    assert of_use < limited.chi2 < without.chi2 - 70.0
+    assert len(asked) - spent < 0.7 * spent

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.closer_curves import CLOSER_CURVES
+from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import CURVES
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.effects.manual import page
 from pendpipe.effects.model import Model
@@ -204,6 +207,19 @@ def test_derivatives_by_the_baselines_values(identifier: str) -> None:
         expected = numerical(model, value, index, step)
         error = np.linalg.norm(found[:, index] - expected)
         assert error < 0.025 * np.linalg.norm(expected), index
+
+
+@pytest.mark.parametrize("kind", [*CURVES, *CLOSER_CURVES], ids=lambda kind: kind.__name__)
+def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
+    """So that their derivatives are the same wherever they are asked on one motion."""
+    model = Model(RECORD, 0.05)
+    at = model.evaluate(BASE)
+    curve = kind(at.span)
+    rng = np.random.default_rng(4)
+    values, change = rng.standard_normal((2, curve.count))
+    found = jacobian(model.adding(curve), np.append(BASE, values), at)[:, len(BASE) :]
+    moved = response(curve, values, values + change, at, model.pendulum(BASE))
+    assert found @ change == pytest.approx(moved, abs=1e-6 * np.max(np.abs(moved)))
 
 
 def projected(effect: Effect, shape: tuple[float, ...], model: Model, basis: Floats) -> Floats:

@@ -250,3 +250,6 @@ def test_samples_are_lost_whole(samples: float) -> None:
 
     assert cost(1.0) == 0.0
     assert cost(0.1 / abs(samples)) == pytest.approx(2.0 * math.log(10.0))
+    # One of the ten readings of a mean is a whole one.
+    span = span._replace(fold=10)
+    assert cost(0.1) == pytest.approx(0.0, abs=1e-12)

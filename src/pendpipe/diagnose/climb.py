@@ -28,6 +28,8 @@ _PARTS: Final = (0.3, 0.1, 0.02)
 """Of a step that does not lower chi^2."""
 _BENT_PARTS: Final = (1.0, 0.3)
 """The same where everything else follows what is not linear."""
+_MUCH: Final = 0.5
+"""Part of what a step has promised with which one is content."""
 _SHARE_SD: Final = 0.3
 """The hysteretic share of b is hardly seen in one record: any between 0 and 1 may be."""
 
@@ -75,6 +77,7 @@ class Climb:
         self._scales = self._shapes[self._low[self._shapes] > 0.0]
         self._stay = np.zeros(model.size, dtype=bool)
         self._stay[np.setdiff1d(self._shapes, self._scales)] = True
+        self._factored: _Factored | None = None
 
     def start(self, value: FloatArray) -> Place:
         """The place of values, within the bounds."""
@@ -86,30 +89,38 @@ class Climb:
         residual, slip = _residual(self._data, self._noise, at, value)
         return Place(value, at, residual, slip, self._model, self._noise)
 
-    def step(self, here: Place, free: IntArray) -> FloatArray:
-        """The best step of the free values, if the model were linear."""
+    def step(self, here: Place, free: IntArray, columns: FloatArray | None = None) -> FloatArray:
+        """The best step of the free values, if the model were linear, of these `columns`."""
         low, high = self._low.copy(), self._high.copy()
         # The readings are linear in a scale over a part of it at most; and while the effect's
         # size is still small, a step may ask for any change of it.
         scales = self._scales
         low[scales] = np.maximum(low[scales], here.value[scales] / _FACTOR)
         high[scales] = np.minimum(high[scales], here.value[scales] * _FACTOR)
-        return _step(here.columns, here.residual, free, here.value, low, high)
+        columns = here.columns if columns is None else columns
+        if self._factored is None or not self._factored.is_of(columns, free):
+            self._factored = _Factored.of(columns, free)
+        return _step(self._factored, here.residual, here.value, low, high)
 
-    def tried(self, here: Place, step: FloatArray, free: IntArray) -> Place | None:
-        """Go along a step as far as it lowers chi^2; None where it does nowhere."""
+    def tried(self, here: Place, step: FloatArray, free: IntArray, promised: float) -> Place | None:
+        """Go along a step as far as it lowers chi^2; None where it does nowhere.
+
+        `promised` is what it would take off, if the model were linear.
+        """
         enough = here.chi2 + 0.5 * SETTLED
         whole = self._reached(here.value + step)
         if whole is not None and whole.chi2 < enough:
             return whole
-        shorter = (self._reached(here.value + part * step) for part in _PARTS)
         bent = (self._followed(here, part * step, free) for part in _BENT_PARTS)
-        found = [
-            next((there for there in way if there is not None and there.chi2 < enough), None)
-            for way in (shorter, bent)
-        ]  # fmt: skip
-        lower = [there for there in found if there is not None]
-        return min(lower, key=lambda there: there.chi2, default=None)
+        shorter = (self._reached(here.value + part * step) for part in _PARTS)
+        lowest: Place | None = None
+        for way in (bent, shorter):
+            found = next((there for there in way if there and there.chi2 < enough), None)
+            if found and (lowest is None or found.chi2 < lowest.chi2):
+                lowest = found
+            if lowest and here.chi2 - lowest.chi2 > _MUCH * promised:
+                break
+        return lowest
 
     def _followed(self, here: Place, step: FloatArray, free: IntArray) -> Place | None:
         """Go along a step, and bring sizes and baseline to where it has taken the scales, if any.
@@ -164,23 +175,41 @@ def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> F
     return columns
 
 
+@dataclass(frozen=True)
+class _Factored:
+    """The columns of the free values, at unit length, as an orthonormal basis and the rest."""
+
+    columns: FloatArray
+    free: IntArray
+    scale: FloatArray
+    basis: FloatArray
+    triangle: FloatArray
+
+    @classmethod
+    def of(cls, columns: FloatArray, free: IntArray) -> _Factored:
+        """Factor them."""
+        part = columns[:, free]
+        if not np.all(np.isfinite(part)):
+            raise NoMotionError("its derivatives are out of reach")
+        scale = np.linalg.norm(part, axis=0)
+        scale[scale == 0.0] = 1.0
+        return cls(columns, free, scale, *np.linalg.qr(part / scale))
+
+    def is_of(self, columns: FloatArray, free: IntArray) -> bool:
+        """Whether these are what was factored."""
+        return columns is self.columns and np.array_equal(free, self.free)
+
+
 def _step(
-    jacobian: FloatArray, residual: FloatArray, free: IntArray, value: FloatArray,
-    low: FloatArray, high: FloatArray,
-) -> FloatArray:  # fmt: skip
+    factored: _Factored, residual: FloatArray, value: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
     """The Gauss-Newton step, the best within the bounds."""
-    step = np.zeros(len(value))
-    part = jacobian[:, free]
-    if not np.all(np.isfinite(part)):
-        raise NoMotionError("its derivatives are out of reach")
-    scale = np.linalg.norm(part, axis=0)
-    scale[scale == 0.0] = 1.0
-    left, small = np.linalg.qr(part / scale)
-    right = left.T @ residual
-    solved = np.linalg.lstsq(small, right, rcond=1e-11)[0]
+    step, free, scale = np.zeros(len(value)), factored.free, factored.scale
+    right = factored.basis.T @ residual
+    solved = np.linalg.lstsq(factored.triangle, right, rcond=1e-11)[0]
     floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
     if np.any(solved < floor) or np.any(solved > ceiling):
-        solved = bounded_least_squares(small, right, floor, ceiling)
+        solved = bounded_least_squares(factored.triangle, right, floor, ceiling)
     step[free] = solved / scale
     limit = 0.05 * value[OMEGA]
     if abs(step[OMEGA]) > limit:

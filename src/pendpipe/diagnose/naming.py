@@ -20,7 +20,7 @@ from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.refine import Fit, pulled, refine
+from pendpipe.diagnose.refine import ROUNDS, Fit, Refining, pulled, refine
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 
@@ -32,6 +32,12 @@ _BEHIND: Final = 0.3
 """Part of the best score that a refit may make up for."""
 _BEHIND_WIDE: Final = 0.6
 """The same where a bound holds scores back."""
+_FIRST_ROUNDS: Final = 4
+"""After how many the refits are compared."""
+_LITTLE: Final = 0.3
+"""Of chi^2: what two rounds must gain for rivals' refits to go on."""
+_OUT_OF_REACH: Final = 0.1
+"""Part of the best gain by which a refit may end behind it, with `_NEAR`, and be of use."""
 _ALIKE: Final = 0.98
 _LARGEST: Final = 0.5
 """Of the first amplitude: what an effect may add to the reading."""
@@ -50,9 +56,9 @@ def refit_leads(
     gross: bool, origin: FloatArray, most: int = _MOST,
 ) -> list[Rival]:  # fmt: skip
     """Refit the leading effects nonlinearly; the best first."""
+    leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
-    for lead in _worth_refitting(detection, gross, most, wide=bool(pulled(base))):
-        fit = _refitted(base, data, noise, lead, held)
+    for lead, fit in _refitted(base, data, noise, leads, held):
         lost = base.slip_rad > _LOST and len(fits) < _FROM_AFAR
         # With the baseline's friction a law may not get through to the end.
         if lost or (gross and fit is None):
@@ -134,7 +140,36 @@ def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     return effect.displacement(own, span.duration_s) < _LARGEST * span.first_amplitude
 
 
-def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]) -> Fit | None:
+def _refitted(
+    base: Fit, data: Data, noise: Noise, leads: Sequence[Lead], held: Sequence[int]
+) -> list[tuple[Lead, Fit | None]]:
+    """Each lead's refit; none is followed any longer that can't come near the best."""
+    refits = [_refitting(base, data, noise, lead, held) for lead in leads]
+    best = min((refit.chi2 for refit in refits if refit), default=base.chi2)
+    needed = of_use(best, base.chi2 - best)
+    return [
+        (lead, _ended(refit, needed) if refit else None)
+        for lead, refit in zip(leads, refits, strict=True)
+    ]
+
+
+def of_use(best: float, gain: float) -> float:
+    """Return the chi^2 that a rival must come down to, if the best's is `best` by a `gain`."""
+    return best + _NEAR + _OUT_OF_REACH * gain
+
+
+def _ended(refit: Refining, needed: float) -> Fit | None:
+    try:
+        refit.go(ROUNDS - _FIRST_ROUNDS, needed)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+    return refit.fit
+
+
+def _refitting(
+    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
+) -> Refining | None:
+    """The first rounds of a lead's refit; None where they fail."""
     effect = lead.effect
     if isinstance(effect, FreedParameter):
         held = effect.without(held)
@@ -142,9 +177,12 @@ def _refitted(base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[in
     shape = finer_shape(base, noise, lead)
     start = np.concatenate([base.value, sizes, np.asarray(shape, dtype=np.float64)])
     try:
-        return refine(base.model.adding(effect), data, noise, start, held=held)
+        model = base.model.adding(effect)
+        refit = Refining(model, data, noise, start, held=held, little=_LITTLE)
+        refit.go(_FIRST_ROUNDS)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
+    return refit
 
 
 def _from_afar(

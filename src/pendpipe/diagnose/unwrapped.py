@@ -15,6 +15,8 @@ from pendpipe.effects.evaluated import Evaluated
 _SLIP: Final = 0.15
 """Phase in rad, and part of the amplitude, from which the plain difference is no longer used."""
 
+_SLIGHT: Final = 0.05
+"""Of the amplitude: residuals that no phase or ratio of 0.1 leaves."""
 _WHOLE: Final = 0.6
 """Part of a cycle's readings that must be there."""
 _CHANCE: Final = 5.0
@@ -61,9 +63,11 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     residual
         Shape (n,).
     slip_rad
-        The largest phase between model and readings.
+        The largest phase between model and readings; 0 where it is seen to be slight.
     """
     plain = data.residual(at.reading)
+    if _in_phase(data, at, plain):
+        return plain, 0.0
     log_ratio, phase, centre = alignment(data, at, plain)
     slip = float(np.max(np.abs(phase), initial=0.0))
     if slip < _SLIP and np.max(np.abs(log_ratio), initial=0.0) < _SLIP:
@@ -76,6 +80,22 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     omega = sampled.motion.angular_frequency
     linear = sampled.angle * by_log + sampled.velocity / omega * by_phase
     return plain + sampled.angle - moved + linear, slip
+
+
+def _in_phase(data: Data, at: Evaluated, plain: FloatArray) -> bool:
+    """Whether no reading is far enough from the model for the phase to be, in any cycle."""
+    sampled = at.sampled
+    if np.max(np.abs(plain) * data.weight) > _SLIGHT * np.min(sampled.amplitude):
+        return False
+    return abs(_turned(data, at)) < math.pi
+
+
+def _turned(data: Data, at: Evaluated) -> float:
+    """By how much the readings are ahead at the anchor, whole turns counted; 0 without one."""
+    if data.anchor is None:
+        return 0.0
+    when, turned = data.anchor
+    return turned - float(np.interp(when, at.sampled.time_s, at.sampled.phase))
 
 
 def alignment(data: Data, at: Evaluated, plain: FloatArray) -> Alignment:
@@ -95,11 +115,9 @@ def alignment(data: Data, at: Evaluated, plain: FloatArray) -> Alignment:
         return _NO_CYCLES
     if len(found.number) < 2:
         return _NO_CYCLES
-    phase, expected = found.phase, 0.0
-    if data.anchor is not None:
-        when, turned = data.anchor
-        expected = turned - float(np.interp(when, sampled.time_s, sampled.phase))
-    phase = phase - 2.0 * math.pi * np.round((phase[0] - expected) / (2.0 * math.pi))
+    phase = found.phase
+    turns = np.round((phase[0] - _turned(data, at)) / (2.0 * math.pi))
+    phase = phase - 2.0 * math.pi * turns
     ratio = np.log(np.maximum(np.hypot(found.cosine, found.sine), 1e-3))
     # What noise alone can do is no slip.
     chance = _CHANCE * data.noise_rms / np.sqrt(np.maximum(found.strength, 1e-300))

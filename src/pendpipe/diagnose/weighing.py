@@ -16,6 +16,7 @@ from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabili
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.location import locate
+from pendpipe.diagnose.naming import of_use
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.review import stands_apart
@@ -183,23 +184,27 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         return without, step.rivals
     # Even whom the search left far behind: how far that is depends on the noise and on the other
     # effects, and both were others then.
+    needed = without.chi2 if found.remainder.systematic else of_use(found.improved.chi2, gain)
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
-        fit = found.improved if own else refitted(without, found, held, rival)
+        fit = found.improved if own else refitted(without, found, held, rival, needed)
         if fit is not None:
             rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
 
 
-def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArray) -> Fit | None:
+def _refined(
+    model: Model, found: Search, held: Sequence[int], *starts: FloatArray,
+    needed: float = math.inf,
+) -> Fit | None:  # fmt: skip
     """The best fit of a model from several starts; None if it can't move from any."""
     fits = []
     for start in starts:
         if len(start) != model.size:
             continue
         try:
-            fits.append(refine(model, found.data, found.noise, start, held=held))
+            fits.append(refine(model, found.data, found.noise, start, held=held, of_use=needed))
         except (NoMotionError, np.linalg.LinAlgError):
             continue
         if fits[-1].converged and not is_gross(fits[-1], found.data):
@@ -207,11 +212,15 @@ def _refined(model: Model, found: Search, held: Sequence[int], *starts: FloatArr
     return min(fits, key=lambda fit: fit.chi2, default=None)
 
 
-def refitted(without: Fit, found: Search, held: Sequence[int], rival: Rival) -> Fit | None:
-    """Refit a rival in the final model, from where it ended before."""
+def refitted(
+    without: Fit, found: Search, held: Sequence[int], rival: Rival, needed: float = math.inf
+) -> Fit | None:
+    """Refit a rival in the final model, from where it ended before, if chi^2 may get as low."""
     effect = rival.lead.effect
     if isinstance(effect, FreedParameter):
         held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
-    return _refined(without.model.adding(effect), found, held, start, rival.fit.value)
+    return _refined(
+        without.model.adding(effect), found, held, start, rival.fit.value, needed=needed
+    )

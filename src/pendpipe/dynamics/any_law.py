@@ -197,7 +197,9 @@ def _solved(
         motion = Motion(
             clock, omega, motion.log_amplitude + change, motion.time_s + late, motion.upwards
         )
-        if error < _TOLERANCE:
+        # The next change will be smaller by what this one is smaller than the last.
+        smaller = min(error / before, 1.0) if before < math.inf else 1.0
+        if error * smaller < _TOLERANCE:
             return motion
         if not error < 1e3:
             break

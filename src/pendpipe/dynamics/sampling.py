@@ -100,6 +100,8 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
 
 def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) -> Sampled:
     """Read motions on one clock, each from its time on (the first from ever)."""
+    if len(pieces) == 1:
+        return sample_motion(pieces[0][1], time_s)
     starts = np.array([start for start, _ in pieces[1:]])
     which = np.searchsorted(starts, time_s)
     parts = [

@@ -7,10 +7,11 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion, rates
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.effects.curve import Curve
 from pendpipe.effects.effect import Effect, Pendulum, Span
 from pendpipe.effects.evaluated import Evaluated
 from pendpipe.effects.model import Model
-from pendpipe.effects.responses import response
+from pendpipe.effects.responses import response, responses
 
 
 def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
@@ -27,9 +28,20 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     columns[:, TIME] = -sampled.velocity
     columns[:, OFFSET] = 1.0
     for effect, place in model.places():
+        if isinstance(effect, Curve):
+            columns[:, place] = _by_mixtures(effect, at, pendulum).T
+            continue
         for index in range(effect.count):
             columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
     return columns
+
+
+def _by_mixtures(curve: Curve, at: Evaluated, pendulum: Pendulum) -> FloatArray:
+    """Derivatives by a curve's mixtures, shape (mixtures, n): it is linear in them."""
+    small = curve.small(at.span)
+    none = np.zeros(curve.count)
+    one_each = [(none, row) for row in small * np.eye(curve.count)]
+    return responses(curve, one_each, at, pendulum) / small
 
 
 def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> FloatArray:

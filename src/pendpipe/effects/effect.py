@@ -101,6 +101,8 @@ class Span(NamedTuple):
     first_amplitude: float
     last_amplitude: float
     offset: float = 0.0
+    fold: int = 1
+    """How many recorded readings each of those that are analysed is the mean of."""
 
     @property
     def duration_s(self) -> float:

@@ -139,6 +139,7 @@ class Model:
         return Span(
             float(self.time_s[0]), float(self.time_s[-1]), self.interval_s, self.pendulum(value),
             float(sampled.amplitude[0]), float(sampled.amplitude[-1]), float(value[OFFSET]),
+            self.fold,
         )  # fmt: skip
 
     def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:

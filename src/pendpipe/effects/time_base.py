@@ -74,11 +74,9 @@ class DroppedSamples(Effect):
         """Return what a part of a sample costs.
 
         Samples are lost whole. Less than one is lost where the instrument itself reads n times
-        as fast as it tells, which is the less likely the larger n: by 1/n. Samples are those
-        that are analysed, so that one of a mean of n readings counts as a part as well; lost
-        samples that tests of their own find are mended before this is asked.
+        as fast as it tells, which is the less likely the larger n: by 1/n.
         """
-        part = abs(float(values[0])) / span.interval_s
+        part = abs(float(values[0])) * span.fold / span.interval_s
         return -2.0 * math.log(min(max(part, 1e-6), 1.0))
 
     def shapes(self, span: Span) -> list[tuple[float]]:
