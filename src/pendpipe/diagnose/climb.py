@@ -102,6 +102,10 @@ class Climb:
             self._factored = _Factored.of(columns, free)
         return _step(self._factored, here.residual, here.value, low, high)
 
+    def forget(self) -> None:
+        """Keep no columns beyond those of the places."""
+        self._factored = None
+
     def tried(self, here: Place, step: FloatArray, free: IntArray, promised: float) -> Place | None:
         """Go along a step as far as it lowers chi^2; None where it does nowhere.
 

@@ -16,31 +16,21 @@ from pendpipe.diagnose.evidence import (
     evidence,
     ranked,
 )
-from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.refine import ROUNDS, Fit, Refining, pulled, refine
+from pendpipe.diagnose.refine import Fit, pulled, refine
+from pendpipe.diagnose.refits import NEAR, believable, side_by_side
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects import Effect
 
 _MOST: Final = 9
-_NEAR: Final = 16.0
 _MORE: Final = 3
 """Names beyond these where a bound holds scores back."""
 _BEHIND: Final = 0.3
 """Part of the best score that a refit may make up for."""
 _BEHIND_WIDE: Final = 0.6
 """The same where a bound holds scores back."""
-_FIRST_ROUNDS: Final = 4
-"""After how many the refits are compared."""
-_LITTLE: Final = 0.3
-"""Of chi^2: what two rounds must gain for rivals' refits to go on."""
-_OUT_OF_REACH: Final = 0.1
-"""Part of the best gain by which a refit may end behind it, with `_NEAR`, and be of use."""
 _ALIKE: Final = 0.98
-_LARGEST: Final = 0.5
-"""Of the first amplitude: what an effect may add to the reading."""
 _LOST: Final = 1.0
 """Phase in rad from which a model has lost the motion."""
 _FROM_AFAR: Final = 4
@@ -58,12 +48,12 @@ def refit_leads(
     """Refit the leading effects nonlinearly; the best first."""
     leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
-    for lead, fit in _refitted(base, data, noise, leads, held):
+    for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
         lost = base.slip_rad > _LOST and len(fits) < _FROM_AFAR
         # With the baseline's friction a law may not get through to the end.
         if lost or (gross and fit is None):
             fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
-        if fit is not None and _believable(base, fit, lead.effect):
+        if fit is not None and believable(base, fit, lead.effect):
             fits.append((lead, fit))
     if not fits:
         return []
@@ -105,7 +95,7 @@ def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -
         return []
     best = _rank(leads[0])
     part = 0.9 if gross else _BEHIND_WIDE if wide else _BEHIND
-    near = [lead for lead in leads if _rank(lead) > best - _NEAR - part * best]
+    near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
     if gross:
         near = near[: most + 2]
     else:
@@ -124,65 +114,6 @@ def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -
 
 def _rank(lead: Lead) -> float:
     return equivalent(lead.p_value, lead.score) + lead.effect.prior
-
-
-def _believable(base: Fit, fit: Fit, effect: Effect) -> bool:
-    """Whether displacements that an effect adds are smaller than the motion itself.
-
-    Two tones of nearly one frequency can take each other's place: a second that is as large
-    as the first describes a change of phase, and no second mode.
-    """
-    first = len(base.value) + effect.switch
-    own = fit.value[first:]
-    if not effect.believable(own):
-        return False
-    span = base.at.span
-    return effect.displacement(own, span.duration_s) < _LARGEST * span.first_amplitude
-
-
-def _refitted(
-    base: Fit, data: Data, noise: Noise, leads: Sequence[Lead], held: Sequence[int]
-) -> list[tuple[Lead, Fit | None]]:
-    """Each lead's refit; none is followed any longer that can't come near the best."""
-    refits = [_refitting(base, data, noise, lead, held) for lead in leads]
-    best = min((refit.chi2 for refit in refits if refit), default=base.chi2)
-    needed = of_use(best, base.chi2 - best)
-    return [
-        (lead, _ended(refit, needed) if refit else None)
-        for lead, refit in zip(leads, refits, strict=True)
-    ]
-
-
-def of_use(best: float, gain: float) -> float:
-    """Return the chi^2 that a rival must come down to, if the best's is `best` by a `gain`."""
-    return best + _NEAR + _OUT_OF_REACH * gain
-
-
-def _ended(refit: Refining, needed: float) -> Fit | None:
-    try:
-        refit.go(ROUNDS - _FIRST_ROUNDS, needed)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
-    return refit.fit
-
-
-def _refitting(
-    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
-) -> Refining | None:
-    """The first rounds of a lead's refit; None where they fail."""
-    effect = lead.effect
-    if isinstance(effect, FreedParameter):
-        held = effect.without(held)
-    sizes = np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
-    shape = finer_shape(base, noise, lead)
-    start = np.concatenate([base.value, sizes, np.asarray(shape, dtype=np.float64)])
-    try:
-        model = base.model.adding(effect)
-        refit = Refining(model, data, noise, start, held=held, little=_LITTLE)
-        refit.go(_FIRST_ROUNDS)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
-    return refit
 
 
 def _from_afar(

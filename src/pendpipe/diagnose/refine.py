@@ -122,7 +122,7 @@ def refine(
 
     Where model and readings are out of phase by much, the residual is taken along the
     motion (amplitude and unwrapped phase, cycle by cycle), so that it stays linear. A fit that
-    can't come down to a chi^2 `of_use` is given up.
+    can't come down to a chi^2 `of_use` is left where it is.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def refine(
 class Refining:
     """A refit that can be left and gone on with; parameters are those of `refine`.
 
-    Two rounds that gain less than `little` are the last.
+    Two rounds that gain less than `little` are the last, and so are three that creep.
     """
 
     def __init__(
@@ -170,13 +170,14 @@ class Refining:
         rounds
             How many.
         of_use
-            A chi^2 above which the fit is of no use: it is given up where as many rounds as are
-            left, if they gain what the last ones have, won't bring it there.
+            A chi^2 above which the fit is of no use: it is left where it is where as many rounds
+            as are left, if they gain what the last ones have, won't bring it there.
         """
         for left in range(rounds, 0, -1):
             if self._ended or self._hopeless(left, of_use):
-                return
+                break
             self._round()
+        self._climb.forget()
 
     def _hopeless(self, left: int, of_use: float) -> bool:
         last = self._gains[-_LAST:]
@@ -187,6 +188,7 @@ class Refining:
         step = climb.step(here, free)
         promised = _promised(here, here.columns, step)
         tried = climb.tried(here, step, free, promised)
+        straight = tried is not None
         if tried is None and C in free:
             # More friction would stop it before the last reading: the others go first.
             others = free[free != C]
@@ -200,7 +202,7 @@ class Refining:
         self._gains.append(gained)
         if promised < SETTLED or (gained < SETTLED and promised < 1.0):
             self._ended = self._converged = True
-        elif abs(promised - gained) < _AS_PROMISED * promised:
+        elif straight and abs(promised - gained) < _AS_PROMISED * promised:
             self._settle(here)
         self._ended |= self._stalls()
 

@@ -13,11 +13,10 @@ from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.one_curve import BETTER
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.refits import OF_A_CURVE
 from pendpipe.diagnose.state import State
 from pendpipe.diagnose.task import Task, applicable
 
-_PART: Final = 0.4
-"""Of the curve's gain: what a name must explain by itself to be one of two."""
 _FIRST: Final = 2
 """How many names are tried."""
 _SECOND: Final = 3
@@ -35,7 +34,7 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
     curve = rivals[0]
     if not curve.drawn:
         return list(rivals)
-    least_gain = _PART * curve.gain
+    least_gain = OF_A_CURVE * curve.gain
     names = [rival for rival in rivals if not rival.drawn and rival.gain > least_gain]
     names = names or [rival for rival in _first(state) if rival.gain > least_gain]
     for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST]:

@@ -16,7 +16,7 @@ _SLIP: Final = 0.15
 """Phase in rad, and part of the amplitude, from which the plain difference is no longer used."""
 
 _SLIGHT: Final = 0.05
-"""Of the amplitude: residuals that no phase or ratio of 0.1 leaves."""
+"""Of the amplitude: residuals that no phase or ratio of 0.1 leaves in a full cycle."""
 _WHOLE: Final = 0.6
 """Part of a cycle's readings that must be there."""
 _CHANCE: Final = 5.0

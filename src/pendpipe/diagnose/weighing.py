@@ -16,8 +16,8 @@ from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabili
 from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.location import locate
-from pendpipe.diagnose.naming import of_use
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.refits import limit_of_use
 from pendpipe.diagnose.result import Named
 from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.search import Search
@@ -184,11 +184,13 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         return without, step.rivals
     # Even whom the search left far behind: how far that is depends on the noise and on the other
     # effects, and both were others then.
-    needed = without.chi2 if found.remainder.systematic else of_use(found.improved.chi2, gain)
+    of_use = without.chi2
+    if not found.remainder.systematic:
+        of_use = limit_of_use(found.improved.chi2, gain, drawn=step.winner.drawn)
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
-        fit = found.improved if own else refitted(without, found, held, rival, needed)
+        fit = found.improved if own else refitted(without, found, held, rival, of_use)
         if fit is not None:
             rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
@@ -196,7 +198,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
 
 def _refined(
     model: Model, found: Search, held: Sequence[int], *starts: FloatArray,
-    needed: float = math.inf,
+    of_use: float = math.inf,
 ) -> Fit | None:  # fmt: skip
     """The best fit of a model from several starts; None if it can't move from any."""
     fits = []
@@ -204,7 +206,7 @@ def _refined(
         if len(start) != model.size:
             continue
         try:
-            fits.append(refine(model, found.data, found.noise, start, held=held, of_use=needed))
+            fits.append(refine(model, found.data, found.noise, start, held=held, of_use=of_use))
         except (NoMotionError, np.linalg.LinAlgError):
             continue
         if fits[-1].converged and not is_gross(fits[-1], found.data):
@@ -213,14 +215,14 @@ def _refined(
 
 
 def refitted(
-    without: Fit, found: Search, held: Sequence[int], rival: Rival, needed: float = math.inf
+    without: Fit, found: Search, held: Sequence[int], rival: Rival, of_use: float = math.inf
 ) -> Fit | None:
-    """Refit a rival in the final model, from where it ended before, if chi^2 may get as low."""
+    """Refit a rival in the final model, from where it ended before, as far as it is of use."""
     effect = rival.lead.effect
     if isinstance(effect, FreedParameter):
         held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
     return _refined(
-        without.model.adding(effect), found, held, start, rival.fit.value, needed=needed
+        without.model.adding(effect), found, held, start, rival.fit.value, of_use=of_use
     )
