@@ -82,6 +82,18 @@ def prepared(
     return data, white_noise(data, rms)
 
 
+def stribeck_record() -> tuple[Model, Data, Noise, FloatArray]:
+    """A model with Stribeck's friction, its readings and their noise, and its values.
+
+    Coulomb and quadratic losses take its place, and the refits of other losses creep.
+    """
+    time_s = np.arange(3600) * INTERVAL_S
+    truth = np.array([2e-4, 1.2e-3, 1e-6, 0.5, 6.09, 0.0389, -0.25, 0.006, 0.0063, 0.0345])
+    model = Model(time_s, INTERVAL_S, (by_identifier("stribeck-friction"),))
+    data, noise = prepared(model.reading(truth) + white(5, 3600, 2e-5), time_s, 2e-5)
+    return model, data, noise, truth
+
+
 @functools.cache
 def null_fit(seed: int = 3) -> tuple[Fit, Data, Noise]:
     """Eq. 8 fitted to itself with noise, from the truth."""
