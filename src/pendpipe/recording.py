@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
@@ -28,9 +29,12 @@ GOOD, SUSPECT, MISSING = 0, 1, 2
 """The values of ``quality``: a good sample, a suspect one, a row that marks a gap."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False, repr=False)
 class Recording:
     """Samples of one channel against time.
+
+    Give the readings as `angle_rad`, `volts` (with the sensor's `volts_per_radian`, where it
+    is known) or `displacement_m`; readers of files give `values` and `quantity` instead.
 
     Parameters
     ----------
@@ -49,6 +53,24 @@ class Recording:
         The step between neighbouring readings in the unit of `values`, where known.
     notes
         What a reader guessed or noticed, a clause each, for the user to see.
+    angle_rad, volts, displacement_m
+        The readings by the name of their quantity; exactly one of these or `values`.
+    volts_per_radian
+        The sensor's constant, kept in the metadata.
+
+    Raises
+    ------
+    InputError
+        If `time_s` and the readings differ in length, times do not rise, readings are not
+        finite, or not exactly one quantity is given.
+
+    Examples
+    --------
+    >>> recording = Recording(time_s=[0.0, 0.1, 0.2], angle_rad=[0.30, 0.28, 0.22])
+    >>> recording
+    Recording(3 samples of angle_rad, 0 to 0.2 s)
+    >>> recording.values
+    array([0.3 , 0.28, 0.22])
     """
 
     time_s: FloatArray
@@ -58,6 +80,50 @@ class Recording:
     metadata: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
     notes: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        time_s: ArrayLike,
+        values: ArrayLike | None = None,
+        quantity: Quantity | None = None,
+        quality: ByteArray | None = None,
+        metadata: Mapping[str, str] | None = None,
+        resolution: float | None = None,
+        notes: tuple[str, ...] = (),
+        *,
+        angle_rad: ArrayLike | None = None,
+        volts: ArrayLike | None = None,
+        displacement_m: ArrayLike | None = None,
+        volts_per_radian: float | None = None,
+    ) -> None:
+        named = {"angle_rad": angle_rad, "volts": volts, "displacement_m": displacement_m}
+        given = [(name, readings) for name, readings in named.items() if readings is not None]
+        metadata = dict(metadata or {})
+        if volts_per_radian is not None:
+            metadata["volts_per_radian"] = repr(float(volts_per_radian))
+        if values is None:
+            quantity, values = _the_only(given)
+        elif given or quantity not in QUANTITIES:
+            raise InputError(
+                "Recording", f"values of quantity {quantity!r}", f"use {', '.join(QUANTITIES)}"
+            )
+        times, readings = _column("time_s", time_s), _column(quantity, values)
+        if len(times) != len(readings):
+            raise InputError(
+                "Recording",
+                f"{len(times)} times and {len(readings)} readings",
+                "give one time for each reading",
+            )
+        fields = (times, readings, quantity, quality, metadata, resolution, notes)
+        for name, value in zip(self.__dataclass_fields__, fields, strict=True):
+            object.__setattr__(self, name, value)
+        if given:
+            check("Recording", self)
+
+    def __repr__(self) -> str:
+        """Return the size and span; the samples are in `time_s` and `values`."""
+        span = f", {self.time_s[0]:.6g} to {self.time_s[-1]:.6g} s" if len(self) else ""
+        return f"Recording({len(self)} samples of {self.quantity}{span})"
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -135,6 +201,28 @@ class Recording:
             resolution=None if self.resolution is None else self.resolution / abs(constant),
             metadata={**self.metadata, "volts_per_radian": repr(float(constant))},
         )
+
+
+def _the_only(given: list[tuple[str, ArrayLike]]) -> tuple[Quantity, ArrayLike]:
+    """Return the one quantity whose readings were given."""
+    if len(given) != 1:
+        found = ", ".join(name for name, _ in given) or "none"
+        raise InputError(
+            "Recording", f"exactly one quantity is needed, not {found}", "give angle_rad=..."
+        )
+    name, readings = given[0]
+    return QUANTITIES[QUANTITIES.index(name)], readings
+
+
+def _column(name: str, values: ArrayLike) -> FloatArray:
+    """Return readings as a one-dimensional array of numbers."""
+    try:
+        column = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("Recording", f"{name} holds no numbers", "give numbers") from None
+    if column.ndim != 1:
+        raise InputError("Recording", f"{name} has {column.ndim} dimensions", "give one column")
+    return column
 
 
 def write_plain(path: str | Path, recording: Recording) -> None:
@@ -249,7 +337,7 @@ def _quality(place: Path, column: FloatArray, first_line: int) -> ByteArray:
     return column.astype(np.uint8)
 
 
-def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> None:
+def check(place: str | Path, recording: Recording, *, first_line: int | None = None) -> None:
     """Refuse a recording whose samples can't be true.
 
     Parameters
@@ -259,8 +347,11 @@ def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> No
     recording
         What was read from it.
     first_line
-        The line of the first sample, so that the message can name the row.
+        The line of the first sample in a file, so that the message can name the row; without
+        it the message counts samples from 0, as Python does.
     """
+    row = f"{place}, sample" if first_line is None else f"{place}, line"
+    first = first_line or 0
     time, values = recording.time_s, recording.values
     if len(time) == 0:
         raise InputError(place, "there are no samples", "record again, or give another file")
@@ -269,20 +360,18 @@ def check(place: str | Path, recording: Recording, *, first_line: int = 1) -> No
         marked = recording.quality == MISSING
         odd = np.flatnonzero(recording.quality > MISSING)
         if odd.size:
-            raise InputError(
-                f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "mend the row"
-            )
+            raise InputError(f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "mend the row")
     bad = np.flatnonzero(~np.isfinite(time) | (~np.isfinite(values) & ~marked))
     if bad.size:
         raise InputError(
-            f"{place}, line {first_line + bad[0]}",
+            f"{row} {first + bad[0]}",
             f"{bad.size} value(s) that are NaN or infinite",
             "drop the rows, or mark them with quality 2",
         )
     falls = np.flatnonzero(np.diff(time) <= 0)
     if falls.size:
         raise InputError(
-            f"{place}, line {first_line + falls[0] + 1}",
+            f"{row} {first + falls[0] + 1}",
             f"time_s does not rise ({time[falls[0]]:.9g} is followed by {time[falls[0] + 1]:.9g})",
             "sort the rows by time and drop repeated ones",
         )

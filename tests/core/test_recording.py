@@ -88,3 +88,27 @@ def test_volts_without_a_sensor_constant_are_no_angles() -> None:
     recording = Recording(np.arange(3.0), np.zeros(3), "volts")
     with pytest.raises(InputError, match="no sensor constant"):
         recording.as_motion()
+
+
+def test_arrays_in_memory_are_a_recording() -> None:
+    recording = Recording(time_s=[0, 1, 2], volts=[0.1, 0.2, 0.1], volts_per_radian=2.0)
+    assert recording.values.dtype == np.float64
+    np.testing.assert_array_equal(recording.as_motion().values, [0.05, 0.1, 0.05])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ({"angle_rad": [1.0, 2.0]}, "3 times and 2 readings"),
+        ({"angle_rad": [1.0, 2.0, 3.0], "volts": [1.0, 2.0, 3.0]}, "exactly one quantity"),
+        ({}, "exactly one quantity is needed, not none"),
+        ({"values": [1.0, 2.0, 3.0], "quantity": "deg"}, "quantity 'deg'"),
+        ({"angle_rad": ["a", "b", "c"]}, "angle_rad holds no numbers"),
+        ({"angle_rad": [1.0, float("nan"), 3.0]}, "sample 1: 1 value"),
+        ({"time_s": [2.0, 1.0, 0.0], "angle_rad": [1.0, 2.0, 3.0]}, "time_s does not rise"),
+        ({"time_s": [[0.0, 1.0]], "angle_rad": [1.0, 2.0]}, "2 dimensions"),
+    ],
+)
+def test_arrays_that_are_no_recording_are_refused(arguments: dict, problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        Recording(**({"time_s": [0.0, 1.0, 2.0]} | arguments))
