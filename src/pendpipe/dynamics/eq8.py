@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from pendpipe.dynamics.engine import NO_LIMIT, directions_of, run
-from pendpipe.dynamics.model import Eq8
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.laws import Autonomous
-    from pendpipe.dynamics.model import Release
+    from pendpipe.dynamics.model import Eq8, Release
 
 Method = Literal["map", "clock"]
 """``"map"`` tabulates the half-cycle map and is the fast way; ``"clock"`` solves every half cycle
@@ -44,14 +42,14 @@ class TurningPoints:
 
 
 def turning_points(
-    model: Eq8 | Autonomous,
+    model: Eq8,
     release: Release,
     *,
     count: int | None = None,
     until_s: float | None = None,
     method: Method = "map",
 ) -> TurningPoints:
-    """Return the turning points of Eq. 8, or of any autonomous law (`laws.Autonomous`).
+    """Return the turning points of Eq. 8.
 
     Parameters
     ----------
@@ -70,7 +68,7 @@ def turning_points(
     ValueError
         If there is no end to the motion asked for, or `model` is overdamped.
     """
-    if count is None and until_s is None and not _comes_to_rest(model):
+    if count is None and until_s is None and model.coulomb == 0.0:
         message = "give count or until_s: without Coulomb friction the motion has no end"
         raise ValueError(message)
     if count is not None and count < 1:
@@ -82,8 +80,6 @@ def turning_points(
     if not end_s >= release.time_s:
         message = f"until_s is {end_s}, before the release at {release.time_s}"
         raise ValueError(message)
-    if not isinstance(model, Eq8):
-        return _autonomous_turning_points(model, release, most, end_s, method)
     room = 1024 if math.isinf(end_s) else _half_cycles(model, release, end_s) + 16
     while True:
         turning = np.empty((2, min(most, room)))
@@ -107,27 +103,6 @@ def _check_method(method: str) -> None:
     if method not in ("map", "clock"):
         message = f'method must be "map" or "clock", not {method!r}'
         raise ValueError(message)
-
-
-def _comes_to_rest(model: Eq8 | Autonomous) -> bool:
-    """Say whether friction is left at rest at the equilibrium."""
-    if isinstance(model, Eq8):
-        return model.coulomb > 0.0
-    return model.sticks(0.0) and bool(model.friction(np.zeros(1), np.zeros(1))[0] > 0.0)
-
-
-def _autonomous_turning_points(
-    law: Autonomous, release: Release, most: int, end_s: float, method: Method
-) -> TurningPoints:
-    """Return turning points by `autonomous.follow`."""
-    from pendpipe.dynamics.autonomous import follow
-
-    motion = follow(law, release, most, end_s, tabulate=method == "map")
-    kept = int(np.searchsorted(motion.time_s, end_s, side="right"))
-    angle_rad = motion.angle_rad[:kept] + release.offset_rad
-    stopped = motion.stopped and kept == motion.time_s.size
-    rest_rad = float(angle_rad[-1]) if stopped else math.nan
-    return TurningPoints(motion.time_s[:kept], angle_rad, stopped, rest_rad)
 
 
 def _half_cycles(model: Eq8, release: Release, until_s: float) -> int:
@@ -175,9 +150,9 @@ def turning_points_with_jacobian(
 
 
 def sample(
-    model: Eq8 | Autonomous, release: Release, time_s: FloatArray, *, method: Method = "map"
+    model: Eq8, release: Release, time_s: FloatArray, *, method: Method = "map"
 ) -> FloatArray:
-    """Return the readings of Eq. 8, or of an autonomous law, at given times; rad, with offset.
+    """Return the readings of Eq. 8 at given times; rad, with offset.
 
     Parameters
     ----------
@@ -196,13 +171,8 @@ def sample(
     """
     times = checked_times(time_s, release)
     _check_method(method)
-    if not isinstance(model, Eq8) and times.size:
-        from pendpipe.dynamics.autonomous import follow
-
-        motion = follow(model, release, NO_LIMIT, float(times[-1]), tabulate=method == "map")
-        return motion.sample(times) + release.offset_rad
     angle_rad = np.empty(times.size)
-    if isinstance(model, Eq8) and times.size:
+    if times.size:
         until_s = float(times[-1])
         run(
             model,
