@@ -2,8 +2,10 @@
 
 This is the only type that crosses from acquisition and formats to the analysis. The
 plain form is a CSV (contract of the project): a header with ``time_s`` and one of
-``angle_rad``, ``volts``, ``displacement_m``, optionally ``quality``, and before it any
-number of lines ``# key: value``.
+``angle_rad``, ``volts``, ``displacement_m``, ``reading``, optionally ``quality``, and before
+it any number of lines ``# key: value``. A ``reading`` is anything else that swings (counts,
+pixels, m/s^2, light), in the unit that ``# unit: counts`` gives: Q, period and relative decay
+need no constant of the sensor.
 """
 
 from __future__ import annotations
@@ -21,10 +23,12 @@ from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
 
-Quantity = Literal["angle_rad", "volts", "displacement_m"]
-QUANTITIES: Final = ("angle_rad", "volts", "displacement_m")
+Quantity = Literal["angle_rad", "volts", "displacement_m", "reading"]
+QUANTITIES: Final = ("angle_rad", "volts", "displacement_m", "reading")
 UNITS: Final[Mapping[str, str]] = {"angle_rad": "rad", "volts": "V", "displacement_m": "m"}
 
+_WEAK: Final = "weak_guess_"
+"""Metadata of a plain file that are guesses: a copy must not look surer than the original."""
 GOOD, SUSPECT, MISSING = 0, 1, 2
 """The values of ``quality``: a good sample, a suspect one, a row that marks a gap."""
 
@@ -43,7 +47,8 @@ class Recording:
     values
         The readings, shape (n,), in the unit of `quantity`; NaN where `quality` is 2.
     quantity
-        What `values` are: ``"angle_rad"``, ``"volts"`` or ``"displacement_m"``.
+        What `values` are: ``"angle_rad"``, ``"volts"``, ``"displacement_m"``, or
+        ``"reading"`` where they are none of these; their unit is then ``metadata["unit"]``.
     quality
         0 good, 1 suspect, 2 missing, shape (n,); ``None`` when all are good.
     metadata
@@ -53,6 +58,9 @@ class Recording:
         The step between neighbouring readings in the unit of `values`, where known.
     notes
         What a reader guessed or noticed, a clause each, for the user to see.
+    weak_guesses
+        What it guessed on slender grounds, with the option that overrides it: whoever
+        prints an answer prints these first.
     angle_rad, volts, displacement_m
         The readings by the name of their quantity; exactly one of these or `values`.
     volts_per_radian
@@ -80,6 +88,7 @@ class Recording:
     metadata: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
     notes: tuple[str, ...] = ()
+    weak_guesses: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -90,6 +99,7 @@ class Recording:
         metadata: Mapping[str, str] | None = None,
         resolution: float | None = None,
         notes: tuple[str, ...] = (),
+        weak_guesses: tuple[str, ...] = (),
         *,
         angle_rad: ArrayLike | None = None,
         volts: ArrayLike | None = None,
@@ -114,7 +124,8 @@ class Recording:
                 f"{len(times)} times and {len(readings)} readings",
                 "give one time for each reading",
             )
-        fields = (times, readings, quantity, quality, metadata, resolution, notes)
+        told = notes, weak_guesses
+        fields = (times, readings, quantity, quality, metadata, resolution, *told)
         for name, value in zip(self.__dataclass_fields__, fields, strict=True):
             object.__setattr__(self, name, value)
         if given:
@@ -130,8 +141,8 @@ class Recording:
 
     @property
     def unit(self) -> str:
-        """The unit of `values`."""
-        return UNITS[self.quantity]
+        """The unit of `values`; ``"1"`` where nobody knows it."""
+        return UNITS.get(self.quantity) or self.metadata.get("unit") or "1"
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -171,7 +182,11 @@ class Recording:
     def as_motion(
         self, volts_per_radian: float | None = None, place: str | Path = "recording"
     ) -> Recording:
-        """Return the same recording in radians (or metres), volts divided by V/rad.
+        """Return the same recording in radians where the sensor's constant is known.
+
+        Anything else stays in its own unit: metres, volts without a constant, counts,
+        pixels. The analysis is the same, and Q and the period need no constant; but the
+        amplitude, a and c are then in that unit and no angle, so that sin x does not apply.
 
         Parameters
         ----------
@@ -183,16 +198,19 @@ class Recording:
         Raises
         ------
         InputError
-            If the readings are volts and no sensor constant is known.
+            If the recording's own constant is no number, or 0.
         """
         if self.quantity != "volts":
             return self
         constant = volts_per_radian or self.number("volts_per_radian", place)
+        if constant is None:
+            guess = "no sensor constant: a, c and the amplitude are in volts (--volts-per-radian)"
+            if guess in self.weak_guesses:
+                return self
+            return replace(self, weak_guesses=(*self.weak_guesses, guess))
         if not constant:
             raise InputError(
-                place,
-                "the readings are volts and no sensor constant is known",
-                "give --volts-per-radian (see pendpipe calibrate)",
+                place, "the sensor constant is 0", "give --volts-per-radian (see calibrate)"
             )
         return replace(
             self,
@@ -235,6 +253,8 @@ def write_plain(path: str | Path, recording: Recording) -> None:
     with replaced(path) as stream:
         for key, value in recording.metadata.items():
             stream.write(f"# {key}: {' '.join(str(value).split())}\n")
+        for number, guess in enumerate(recording.weak_guesses, start=1):
+            stream.write(f"# {_WEAK}{number}: {' '.join(guess.split())}\n")
         stream.write(",".join(columns) + "\n")
         stream.writelines(",".join(row) + "\n" for row in zip(*rows, strict=True))
 
@@ -273,7 +293,8 @@ def read_plain(path: str | Path) -> Recording:
         values=np.ascontiguousarray(table[:, 1]),
         quantity=quantity,
         quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
-        metadata=metadata,
+        metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
+        weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
     )
     check(place, recording, first_line=first + 2)
     return replace(recording, resolution=converter_step(recording, place))

@@ -84,10 +84,17 @@ def test_a_faulty_file_is_refused_in_one_line(tmp_path: Path, name: str) -> None
     assert "\n" not in message
 
 
-def test_volts_without_a_sensor_constant_are_no_angles() -> None:
+def test_volts_without_a_sensor_constant_stay_volts_and_say_so() -> None:
     recording = Recording(np.arange(3.0), np.zeros(3), "volts")
-    with pytest.raises(InputError, match="no sensor constant"):
-        recording.as_motion()
+    motion = recording.as_motion()
+    assert motion.unit == "V"
+    assert "--volts-per-radian" in motion.weak_guesses[0]
+    assert motion.as_motion().weak_guesses == motion.weak_guesses
+    assert recording.as_motion(2.0).unit == "rad"
+    with pytest.raises(InputError, match="the sensor constant is 0"):
+        Recording(
+            np.arange(3.0), np.zeros(3), "volts", metadata={"volts_per_radian": "0"}
+        ).as_motion()
 
 
 def test_arrays_in_memory_are_a_recording() -> None:
@@ -112,3 +119,20 @@ def test_arrays_in_memory_are_a_recording() -> None:
 def test_arrays_that_are_no_recording_are_refused(arguments: dict, problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         Recording(**({"time_s": [0.0, 1.0, 2.0]} | arguments))
+
+
+def test_a_reading_of_any_unit_keeps_it_in_the_plain_form(tmp_path: Path) -> None:
+    recording = Recording(
+        np.arange(3.0),
+        np.array([4.0, 5.0, 6.0]),
+        "reading",
+        metadata={"unit": "counts"},
+        weak_guesses=("the column is a guess",),
+    )
+    write_plain(tmp_path / "counts.csv", recording)
+    again = read_plain(tmp_path / "counts.csv")
+    assert (again.quantity, again.unit) == ("reading", "counts")
+    assert again.as_motion() is again
+    assert again.weak_guesses == recording.weak_guesses
+    assert dict(again.metadata) == {"unit": "counts"}
+    np.testing.assert_array_equal(again.values, recording.values)

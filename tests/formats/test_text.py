@@ -252,7 +252,7 @@ def test_a_fault_is_one_line_with_its_place(
 def test_a_plain_header_without_a_reading_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(table(TIME, ANGLE, head="time_s,temperature\n"))
-    with pytest.raises(InputError, match="angle_rad, volts, displacement_m is needed"):
+    with pytest.raises(InputError, match="angle_rad, volts, displacement_m, reading is needed"):
         read(path)
 
 
