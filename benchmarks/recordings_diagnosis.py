@@ -92,10 +92,21 @@ def diagnose_viscous(root: Path, results: Path) -> None:
         folder = results / name / "viscous"
         if not (folder / "diagnosis.json").is_file():
             subprocess.run(
-                [sys.executable, "-m", "pendpipe.cli", "diagnose", source[name],
-                 "--out", str(folder), "--baseline", "viscous", "--no-figures"],
-                cwd=root, check=False,
-            )  # fmt: skip
+                [
+                    sys.executable,
+                    "-m",
+                    "pendpipe.cli",
+                    "diagnose",
+                    source[name],
+                    "--out",
+                    str(folder),
+                    "--baseline",
+                    "viscous",
+                    "--no-figures",
+                ],
+                cwd=root,
+                check=False,
+            )
 
 
 def row(name: str, content: Mapping[str, Any], items: tuple[Known, ...]) -> str:

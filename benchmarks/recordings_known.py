@@ -96,7 +96,9 @@ KNOWN: Mapping[str, tuple[Known, ...]] = {
     "data2_14": (CIRCULAR, STIFFENING),
     "data2_20": (CIRCULAR, STIFFENING),
     "data2_12": (
-        CIRCULAR, STIFFENING, Known("a gap of 13 s in the time column", warned("of 13.")),
+        CIRCULAR,
+        STIFFENING,
+        Known("a gap of 13 s in the time column", warned("of 13.")),
     ),
     "adip": (CIRCULAR,),
     "AAAtAmp3": (CIRCULAR, WANDER),
@@ -111,7 +113,7 @@ KNOWN: Mapping[str, tuple[Known, ...]] = {
     "real_pend_h_1": (CIRCULAR,),
     "real_linear_h_1": (Known("isochronous", isochronous),),
     "damping_angle": (CIRCULAR, Known("one tracking error", by_name("glitches"))),
-}  # fmt: skip
+}
 """What the README knows beside a, b and c."""
 KNOWN_VISCOUS: Mapping[str, tuple[Known, ...]] = {
     "1.3_100mA": (COULOMB,),

@@ -120,43 +120,94 @@ def speed(clean: FloatArray) -> FloatArray:
 
 
 FAULTS = {
-    "one glitch, 9 sd": Fault("glitches", _with(lambda clean, generator: (
-        clean + white(generator, AIR.count)
-        + 9.0 * NOISE * (np.arange(AIR.count) == generator.integers(AIR.count))
-    ))),
-    "20 glitches, 12 sd": Fault("glitches", _with(lambda clean, generator: (
-        clean + white(generator, AIR.count) + 12.0 * NOISE * np.isin(
-            np.arange(AIR.count), generator.choice(AIR.count, 20, replace=False)
-        ) * generator.choice([-1.0, 1.0], AIR.count)
-    ))),
-    "clipped above 0.155 rad": Fault("clipping", _with(lambda clean, generator: rounded(
-        np.minimum(clean + white(generator, AIR.count), 0.155), STEP_16
-    ))),
-    "clipped on both sides": Fault("clipping", _with(lambda clean, generator: np.clip(
-        clean + white(generator, AIR.count), -0.12, 0.14
-    ))),
-    "three codes missing": Fault("missing-codes", _with(lambda clean, generator: _avoided(
-        clean + 10.0 * white(generator, AIR.count), (-13, 20, 33)
-    ))),
-    "bit 3 stuck": Fault("missing-codes", _with(lambda clean, generator: STEP_16 * (
-        np.round((clean + white(generator, AIR.count)) / STEP_16).astype(np.int64) & ~8
-    ))),
-    "step of 10 noises": Fault("coarse-quantisation", _with(lambda clean, generator: rounded(
-        clean + white(generator, AIR.count), STEP_12
-    ))),
-    "jitter of 0.2 ms": Fault("jitter", _with(lambda clean, generator: (
-        clean + white(generator, AIR.count)
-        + 2e-4 * speed(clean) * generator.standard_normal(AIR.count)
-    ))),
-    "jitter of 2 ms, 12 bit": Fault("jitter", _with(lambda clean, generator: rounded(
-        clean + white(generator, AIR.count)
-        + 2e-3 * speed(clean) * generator.standard_normal(AIR.count), STEP_12
-    ))),
-    "memory 0.5": Fault("coloured-noise", _with(lambda clean, generator: (
-        clean + remembered(generator, AIR.count, 0.5)
-    ))),
-    "torque of 1e-8": Fault("broadband-drive", _with(lambda clean, generator: (
-        clean + white(generator, AIR.count) + wandering(generator, AIR.count, 1e-8)
-    ))),
+    "one glitch, 9 sd": Fault(
+        "glitches",
+        _with(
+            lambda clean, generator: (
+                clean
+                + white(generator, AIR.count)
+                + 9.0 * NOISE * (np.arange(AIR.count) == generator.integers(AIR.count))
+            )
+        ),
+    ),
+    "20 glitches, 12 sd": Fault(
+        "glitches",
+        _with(
+            lambda clean, generator: (
+                clean
+                + white(generator, AIR.count)
+                + 12.0
+                * NOISE
+                * np.isin(np.arange(AIR.count), generator.choice(AIR.count, 20, replace=False))
+                * generator.choice([-1.0, 1.0], AIR.count)
+            )
+        ),
+    ),
+    "clipped above 0.155 rad": Fault(
+        "clipping",
+        _with(
+            lambda clean, generator: rounded(
+                np.minimum(clean + white(generator, AIR.count), 0.155), STEP_16
+            )
+        ),
+    ),
+    "clipped on both sides": Fault(
+        "clipping",
+        _with(lambda clean, generator: np.clip(clean + white(generator, AIR.count), -0.12, 0.14)),
+    ),
+    "three codes missing": Fault(
+        "missing-codes",
+        _with(
+            lambda clean, generator: _avoided(
+                clean + 10.0 * white(generator, AIR.count), (-13, 20, 33)
+            )
+        ),
+    ),
+    "bit 3 stuck": Fault(
+        "missing-codes",
+        _with(
+            lambda clean, generator: (
+                STEP_16
+                * (np.round((clean + white(generator, AIR.count)) / STEP_16).astype(np.int64) & ~8)
+            )
+        ),
+    ),
+    "step of 10 noises": Fault(
+        "coarse-quantisation",
+        _with(lambda clean, generator: rounded(clean + white(generator, AIR.count), STEP_12)),
+    ),
+    "jitter of 0.2 ms": Fault(
+        "jitter",
+        _with(
+            lambda clean, generator: (
+                clean
+                + white(generator, AIR.count)
+                + 2e-4 * speed(clean) * generator.standard_normal(AIR.count)
+            )
+        ),
+    ),
+    "jitter of 2 ms, 12 bit": Fault(
+        "jitter",
+        _with(
+            lambda clean, generator: rounded(
+                clean
+                + white(generator, AIR.count)
+                + 2e-3 * speed(clean) * generator.standard_normal(AIR.count),
+                STEP_12,
+            )
+        ),
+    ),
+    "memory 0.5": Fault(
+        "coloured-noise",
+        _with(lambda clean, generator: clean + remembered(generator, AIR.count, 0.5)),
+    ),
+    "torque of 1e-8": Fault(
+        "broadband-drive",
+        _with(
+            lambda clean, generator: (
+                clean + white(generator, AIR.count) + wandering(generator, AIR.count, 1e-8)
+            )
+        ),
+    ),
     "stamps late by 0.4 ms": Fault("time-stamps", _stamped),
-}  # fmt: skip
+}

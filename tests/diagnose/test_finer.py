@@ -23,9 +23,13 @@ NOISE = 1e-4
 
 @pytest.mark.parametrize(
     ("identifier", "size"),
-    [("impulse", 1e-3), ("equilibrium-step", 5e-5), ("amplitude-step", 3e-3),
-     ("dropped-samples", 4e-4)],
-)  # fmt: skip
+    [
+        ("impulse", 1e-3),
+        ("equilibrium-step", 5e-5),
+        ("amplitude-step", 3e-3),
+        ("dropped-samples", 4e-4),
+    ],
+)
 @pytest.mark.parametrize("instant", [41.3, 120.6])
 def test_an_instant_is_found_from_the_nearest_row(
     identifier: str, size: float, instant: float
@@ -53,9 +57,14 @@ def test_an_instant_is_found_from_the_nearest_row(
 def test_effects_that_vary_slowly_need_no_closer_look() -> None:
     model = Model(TIME, 0.05)
     data = gather(
-        TIME, model.reading(BASE), step=None, unit="rad", counts=False, period_s=1.1,
+        TIME,
+        model.reading(BASE),
+        step=None,
+        unit="rad",
+        counts=False,
+        period_s=1.1,
         noise_rms=NOISE,
-    )  # fmt: skip
+    )
     noise = white_noise(data, NOISE)
     base = refine(model, data, noise, BASE)
     lead = Lead(by_identifier("frequency-step"), (70.0,), 0.0, 1.0)

@@ -249,9 +249,15 @@ def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
     """Means of several readings, as the diagnosis takes them of a very long record."""
     record = fitted(pendulum, readings)
     data = gather(
-        record.samples.time_s, readings, step=record.samples.step, unit="rad", counts=False,
-        period_s=1.0 / FREQUENCY_HZ, noise_rms=record.samples.noise_rms, most=5000,
-    )  # fmt: skip
+        record.samples.time_s,
+        readings,
+        step=record.samples.step,
+        unit="rad",
+        counts=False,
+        period_s=1.0 / FREQUENCY_HZ,
+        noise_rms=record.samples.noise_rms,
+        most=5000,
+    )
     assert len(data) < pendulum.count // 3
     model = Model(data.time_s, data.interval_s)
     noise = white_noise(data, record.noise.rms * math.sqrt(len(data) / pendulum.count))

@@ -47,9 +47,12 @@ def having_taken(outcome: Outcome, name: str) -> Search:
     # Its refit was judged by the noise of that moment.
     fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
     return replace(
-        found, improved=fit, steps=(replace(step, rivals=(first, *rest)),), held=held,
+        found,
+        improved=fit,
+        steps=(replace(step, rivals=(first, *rest)),),
+        held=held,
         named=found.named._replace(fit=fit),
-    )  # fmt: skip
+    )
 
 
 def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
@@ -72,17 +75,24 @@ def test_a_likelier_name_takes_the_place_of_what_was_taken_first(taken: str) -> 
     assert found.improved.chi2 == pytest.approx(diagnosed("circular-error").search.improved.chi2)
 
 
-@pytest.mark.parametrize(("name", "taken"), [("frequency-drift", "cubic-stiffness"),
-                                             ("frequency-drift", "clock-drift"),
-                                             ("sensor-cubic", "sensor-cubic")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("frequency-drift", "cubic-stiffness"),
+        ("frequency-drift", "clock-drift"),
+        ("sensor-cubic", "sensor-cubic"),
+    ],
+)
 def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
     step, own, mates, _ = led(diagnosed(name), taken)
     assert step.winner.identifier == taken
     assert 1.5 * own >= max(mates.values())
 
 
-@pytest.mark.parametrize(("odds", "leads"), [(1.0, "circular-error"), (19.0, "circular-error"),
-                                             (21.0, "unnamed-restoring")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("odds", "leads"),
+    [(1.0, "circular-error"), (19.0, "circular-error"), (21.0, "unnamed-restoring")],
+)
 def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     odds: float, leads: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,9 +119,10 @@ def test_the_likelier_of_two_curves_is_drawn() -> None:
 def test_a_wrong_parameter_takes_the_place_of_missing_physics() -> None:
     """It is fitted then, and comes out right."""
     taken = next(
-        rival.identifier for rival in wrong_loss().search.steps[0].rivals
+        rival.identifier
+        for rival in wrong_loss().search.steps[0].rivals
         if rival.lead.effect.kind != "parameter"
-    )  # fmt: skip
+    )
     step, _, _, found = led(wrong_loss(), taken)
     assert step.winner.identifier == "parameter-b"
     assert B not in found.held
@@ -134,5 +145,6 @@ def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
     assert found.steps[1].before is other.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner
     assert {effect.identifier for effect in found.improved.model.effects} == {
-        other.identifier, found.steps[1].winner.identifier
-    }  # fmt: skip
+        other.identifier,
+        found.steps[1].winner.identifier,
+    }

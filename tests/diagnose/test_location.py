@@ -83,9 +83,11 @@ def test_intervals_lie_within_the_record(name: str) -> None:
 
 
 def located(
-    identifier: str, values: tuple[float, ...], base: FloatArray = TRUTH,
+    identifier: str,
+    values: tuple[float, ...],
+    base: FloatArray = TRUTH,
     time_s: FloatArray = TIME_S,
-) -> tuple[Location, float]:  # fmt: skip
+) -> tuple[Location, float]:
     """Where an effect shows that Eq. 8 alone leaves out; and Eq. 8's slip of the phase, rad."""
     effect = by_identifier(identifier)
     bare, extended = Model(time_s, INTERVAL_S), Model(time_s, INTERVAL_S, (effect,))

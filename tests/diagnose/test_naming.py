@@ -19,8 +19,9 @@ from .records import INTERVAL_S, LINEAR, TIME_S, TRUTH, prepared, white
 
 def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
     """A scan's answer, the p-values too small to matter."""
-    leads = [Lead(by_identifier(name), shape, score, 0.0)
-             for name, (score, shape) in scores.items()]  # fmt: skip
+    leads = [
+        Lead(by_identifier(name), shape, score, 0.0) for name, (score, shape) in scores.items()
+    ]
     return Detection(tuple(leads), 0.0, NO_SCAN)
 
 
@@ -36,9 +37,13 @@ def test_what_a_bound_holds_back_is_asked_though_it_scores_half(
     base = refine(Model(TIME_S, INTERVAL_S), data, noise, others)
     assert ({A, C} & set(pulled(base)) != set()) == at_a_bound
     rivals = refit_leads(
-        base, data, noise,
+        base,
+        data,
+        noise,
         _detection({"damping-drift": (100.0, (40.0,)), "power-law-damping": (50.0, (1.5, 0.0))}),
-        held=(), gross=False, origin=base.value,
-    )  # fmt: skip
+        held=(),
+        gross=False,
+        origin=base.value,
+    )
     asked = {rival.identifier for rival in rivals}
     assert ("power-law-damping" in asked) == at_a_bound

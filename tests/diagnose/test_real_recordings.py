@@ -93,8 +93,9 @@ def test_a_ship_hardens_rather_than_drifts() -> None:
     assert named[0].identifier == "cubic-stiffness"
     assert named[0].parameters["k3"].value == pytest.approx(0.27 / 0.375, abs=0.25)
     less = dict(named[0].indistinguishable)
-    assert all(less.get(name, 0.0) < named[0].probability for name in
-               ("clock-drift", "frequency-drift"))  # fmt: skip
+    assert all(
+        less.get(name, 0.0) < named[0].probability for name in ("clock-drift", "frequency-drift")
+    )
 
 
 def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:

@@ -18,8 +18,11 @@ SLOW = {"offset-drift", "equilibrium-creep", "ac-coupling", "equilibrium-step"}
 
 def named(readings: FloatArray, seed: int) -> set[str]:
     found = diagnose_recording(recording(readings, seed)).diagnosis.effects
-    return {name for effect in found for name in
-            (effect.identifier, *(mate for mate, _ in effect.indistinguishable))}  # fmt: skip
+    return {
+        name
+        for effect in found
+        for name in (effect.identifier, *(mate for mate, _ in effect.indistinguishable))
+    }
 
 
 def test_weak_drifts_of_the_level_in_white_noise_are_told_from_red_noise() -> None:

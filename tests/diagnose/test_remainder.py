@@ -59,9 +59,11 @@ def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
 
 
 @given(
-    gain=st.floats(0.0, 1e6), more=st.floats(1.0, 10.0), excess=st.floats(1.0, 1e6),
+    gain=st.floats(0.0, 1e6),
+    more=st.floats(1.0, 10.0),
+    excess=st.floats(1.0, 1e6),
     numbers=st.floats(2.0, 500.0),
-)  # fmt: skip
+)
 def test_a_gain_is_worth_no_more_than_itself_and_a_larger_one_no_less(
     gain: float, more: float, excess: float, numbers: float
 ) -> None:

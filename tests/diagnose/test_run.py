@@ -94,10 +94,12 @@ def test_the_improved_model_leaves_noise(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "parameter", "truth"),
-    [("circular-error", "frequency", TRUTH[OMEGA] / (2.0 * np.pi)),
-     ("sensor-quadratic", "offset", TRUTH[OFFSET]),
-     ("equilibrium-step", "offset", TRUTH[OFFSET])],
-)  # fmt: skip
+    [
+        ("circular-error", "frequency", TRUTH[OMEGA] / (2.0 * np.pi)),
+        ("sensor-quadratic", "offset", TRUTH[OFFSET]),
+        ("equilibrium-step", "offset", TRUTH[OFFSET]),
+    ],
+)
 def test_what_was_left_out_had_spoiled_the_fit(name: str, parameter: str, truth: float) -> None:
     found = diagnosed(name).diagnosis
     before, after = found.baseline.parameters[parameter], found.improved.parameters[parameter]
@@ -234,14 +236,33 @@ def test_the_result_is_json_without_nan(name: str) -> None:
     content = diagnosed(name).diagnosis.as_json()
     again = json.loads(json.dumps(content, allow_nan=False))
     assert set(again) >= {
-        "schema_version", "baseline", "noise_rms_rad", "verdict", "p_value", "effects",
-        "improved", "held_out", "unexplained", "statement", "figures", "provenance",
-    }  # fmt: skip
+        "schema_version",
+        "baseline",
+        "noise_rms_rad",
+        "verdict",
+        "p_value",
+        "effects",
+        "improved",
+        "held_out",
+        "unexplained",
+        "statement",
+        "figures",
+        "provenance",
+    }
     for effect in again["effects"]:
         assert set(effect) >= {
-            "id", "name", "kind", "equation", "parameters", "delta_chi2", "p_value_global",
-            "probability", "indistinguishable_from", "deciding_measurement", "location",
-        }  # fmt: skip
+            "id",
+            "name",
+            "kind",
+            "equation",
+            "parameters",
+            "delta_chi2",
+            "p_value_global",
+            "probability",
+            "indistinguishable_from",
+            "deciding_measurement",
+            "location",
+        }
         assert effect["deciding_measurement"]
         assert effect["location"]["summary"]
 

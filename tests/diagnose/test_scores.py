@@ -55,11 +55,19 @@ def test_columns_are_of_unit_length_and_beside_the_models_tangent_space() -> Non
 
 
 WORTH = {
-    "frequency-drift": 8.0, "equilibrium-step": 8.0, "amplitude-step": 8.0, "frequency-step": 8.0,
-    "impulse": 8.0, "sensor-quadratic": 8.0, "sensor-cubic": 8.0, "cubic-stiffness": 8.0,
-    "offset-drift": 8.0, "release-transient": 8.0,
-    "damping-drift": 0.1, "stribeck-friction": 0.1,
-}  # fmt: skip
+    "frequency-drift": 8.0,
+    "equilibrium-step": 8.0,
+    "amplitude-step": 8.0,
+    "frequency-step": 8.0,
+    "impulse": 8.0,
+    "sensor-quadratic": 8.0,
+    "sensor-cubic": 8.0,
+    "cubic-stiffness": 8.0,
+    "offset-drift": 8.0,
+    "release-transient": 8.0,
+    "damping-drift": 0.1,
+    "stribeck-friction": 0.1,
+}
 """Standard deviations. More of the last two would move a and c by as much as they are."""
 
 

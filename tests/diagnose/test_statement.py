@@ -19,9 +19,18 @@ from .records import INTERVAL_S, diagnosed
 def named(identifier: str, **parameters: Estimate) -> Named:
     effect = by_identifier(identifier)
     return Named(
-        effect.identifier, effect.name, effect.kind, effect.equation, parameters, 500.0, 1e-9,
-        0.9, (), effect.deciding, Location(summary="throughout the record"),
-    )  # fmt: skip
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
+        parameters,
+        500.0,
+        1e-9,
+        0.9,
+        (),
+        effect.deciding,
+        Location(summary="throughout the record"),
+    )
 
 
 def said(effect: Named, gain: float = 50.0) -> str:

@@ -28,18 +28,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _reading.add_arguments(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for the results")
     parser.add_argument(
-        "--baseline", choices=("eq8", "viscous"), default="eq8",
+        "--baseline",
+        choices=("eq8", "viscous"),
+        default="eq8",
         help="eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--fix", action="append", default=[], metavar="NAME=VALUE",
+        "--fix",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
         help="hold a parameter, so that a prediction is compared (a, b, c, frequency, amplitude,"
         " offset, quality_factor_hysteretic, quality_factor_viscous); repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--level", type=_probability, default=0.01, metavar="P",
+        "--level",
+        type=_probability,
+        default=0.01,
+        metavar="P",
         help="how often a recording that lacks nothing may be accused (%(default)s)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the draws that count trials"
     )
@@ -47,9 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fail-on", choices=("missing-physics",), help=f"end with status {FOUND} on that verdict"
     )
     parser.add_argument(
-        "--figures", choices=("all", "found", "none"), default="all",
+        "--figures",
+        choices=("all", "found", "none"),
+        default="all",
         help="draw them always (all), where something is missing (found), or never",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--no-figures", dest="figures", action="store_const", const="none", help="as --figures none"
     )
@@ -72,9 +82,13 @@ def run(arguments: argparse.Namespace) -> int:
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     question = Question(
-        arguments.baseline, fixed, arguments.seed, arguments.level, arguments.figures,
+        arguments.baseline,
+        fixed,
+        arguments.seed,
+        arguments.level,
+        arguments.figures,
         arguments.record is not None,
-    )  # fmt: skip
+    )
     if Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a place for it.
         make_folder(arguments.out)
@@ -94,9 +108,13 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
         recording, made = read_motion(arguments)
         provenance = made | provenance | {"level": question.level}
         outcome = diagnose_motion(
-            recording, question, place=arguments.file, turning_points=arguments.turning_points,
-            provenance=provenance, progress=_say,
-        )  # fmt: skip
+            recording,
+            question,
+            place=arguments.file,
+            turning_points=arguments.turning_points,
+            provenance=provenance,
+            progress=_say,
+        )
     except InputError as fault:
         if not Path(arguments.file).is_file():
             raise

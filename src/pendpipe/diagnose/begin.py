@@ -57,8 +57,12 @@ class Beginning:
 
 
 def begin(
-    samples: Samples, points: TurningPoints, *, baseline: Baseline, fixed: Mapping[str, float],
-) -> Beginning:  # fmt: skip
+    samples: Samples,
+    points: TurningPoints,
+    *,
+    baseline: Baseline,
+    fixed: Mapping[str, float],
+) -> Beginning:
     """Choose the readings that are compared, and the values from which the search starts."""
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
@@ -66,15 +70,26 @@ def begin(
     value = np.empty(8)
     a, b, c, omega, angle, time, offset, share = start.value
     value[[A, B, C, SHARE, OMEGA, START, TIME, OFFSET]] = (
-        a, b, c, min(max(share, 0.0), 1.0), omega, angle, time, offset,
-    )  # fmt: skip
+        a,
+        b,
+        c,
+        min(max(share, 0.0), 1.0),
+        omega,
+        angle,
+        time,
+        offset,
+    )
     if "offset" in fixed:
         value[OFFSET] = fixed["offset"]
     data = gather(
-        samples.time_s[span], samples.values[span], step=samples.step, unit=samples.unit,
-        counts=samples.counts, period_s=2.0 * math.pi / omega,
+        samples.time_s[span],
+        samples.values[span],
+        step=samples.step,
+        unit=samples.unit,
+        counts=samples.counts,
+        period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
-    )  # fmt: skip
+    )
     value = with_parts(value, parts)
     data = _far_from_the_stop(data, value)
     order = order_for(abs(angle), samples.unit)
@@ -102,9 +117,13 @@ def _before_the_stop(
     """Leave readings at the end out until the start values move the pendulum to the last."""
     while True:
         model = Model(
-            data.time_s, data.interval_s, order=order, fold=data.fold,
-            first_s=float(data.time_s[0]), parts=parts,
-        )  # fmt: skip
+            data.time_s,
+            data.interval_s,
+            order=order,
+            fold=data.fold,
+            first_s=float(data.time_s[0]),
+            parts=parts,
+        )
         try:
             model.evaluate(value)
         except NoMotionError:
@@ -126,9 +145,11 @@ def order_for(amplitude: float, unit: str) -> int:
 
 
 def _held(
-    held_rates: Mapping[str, float], fixed: Mapping[str, float], parts: Mapping[str, float],
+    held_rates: Mapping[str, float],
+    fixed: Mapping[str, float],
+    parts: Mapping[str, float],
     baseline: Baseline,
-) -> tuple[int, ...]:  # fmt: skip
+) -> tuple[int, ...]:
     index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
     # Held parts of b are the model's matter.
     held = [index[name] for name in held_rates if name != "b" or not parts]

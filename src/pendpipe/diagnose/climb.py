@@ -155,9 +155,10 @@ class Climb:
 def _shapes(model: Model) -> list[int]:
     """Indices of the values on which the readings do not depend in proportion."""
     return [
-        index for effect, place in model.places()
+        index
+        for effect, place in model.places()
         for index in range(place.start + (1 if effect.switch else effect.sizes), place.stop)
-    ]  # fmt: skip
+    ]
 
 
 def _residual(

@@ -149,9 +149,10 @@ def _red(
     )
     # What is clipped makes several minima.
     starts = [
-        np.array([middle, 0.0, 1.0]), np.array([middle, 0.0, _STEEPEST]),
+        np.array([middle, 0.0, 1.0]),
+        np.array([middle, 0.0, _STEEPEST]),
         _red_throughout(near, logs, bounds),
-    ]  # fmt: skip
+    ]
     ends_at = [minimise(cost, start, bounds, tolerance=_SETTLED, most=_MOST) for start in starts]
     found = min(ends_at, key=lambda minimum: minimum.quadratic.chi2)
     white, red, slope = found.value.tolist()

@@ -40,11 +40,12 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
     at = np.asarray(spaced(knots[0], knots[-1], _POINTS))
     scale = effect.scale(fit.model.pendulum(fit.value))
     found: dict[str, Any] = {
-        "argument": effect.argument.replace("rad", unit) if "phase" not in effect.argument
+        "argument": effect.argument.replace("rad", unit)
+        if "phase" not in effect.argument
         else effect.argument,
         "ordinate": effect.ordinate.replace(", rad", f", {unit}"),
         "at": at,
-    }  # fmt: skip
+    }
     for name, drawn in _parts(effect).items():
         columns = np.stack([drawn(one, at) for one in np.eye(effect.sizes)], axis=1)
         prefix = f"{name}_" if name != "value" else ""
@@ -100,5 +101,6 @@ def _local_exponent(
         jacobian[:, index] = (exponent(moved) - centre) / (1e-3 * sd)
     variance = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
     return {
-        "local_exponent": centre, "local_exponent_sd": np.sqrt(np.maximum(variance, 0.0)),
-    }  # fmt: skip
+        "local_exponent": centre,
+        "local_exponent_sd": np.sqrt(np.maximum(variance, 0.0)),
+    }

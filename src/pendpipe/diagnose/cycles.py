@@ -46,9 +46,11 @@ class Cycles:
         pace = (self.phase[-1] - self.phase[0]) / (known[-1] - known[0])
         slow = self.phase - pace * known
         return Cycles(
-            time_s, np.exp(np.interp(time_s, known, np.log(self.amplitude))),
-            pace * time_s + np.interp(time_s, known, slow), np.interp(time_s, known, self.sd),
-        )  # fmt: skip
+            time_s,
+            np.exp(np.interp(time_s, known, np.log(self.amplitude))),
+            pace * time_s + np.interp(time_s, known, slow),
+            np.interp(time_s, known, self.sd),
+        )
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,9 @@ def between(found: Cycles, ends: list[int]) -> Spans:
     spread = np.hypot(found.sd[first], found.sd[last]) / lasts
     turns = (found.phase[last] - found.phase[first]) / (2.0 * math.pi)
     return Spans(
-        np.exp(0.5 * (log[first] + log[last])), (log[first] - log[last]) / lasts, spread,
-        turns / lasts, spread / (2.0 * math.pi),
-    )  # fmt: skip
+        np.exp(0.5 * (log[first] + log[last])),
+        (log[first] - log[last]) / lasts,
+        spread,
+        turns / lasts,
+        spread / (2.0 * math.pi),
+    )

@@ -81,9 +81,11 @@ class Data:
     def first(self, count: int) -> Data:
         """The first `count` of them."""
         return replace(
-            self, time_s=self.time_s[:count], values=self.values[:count],
+            self,
+            time_s=self.time_s[:count],
+            values=self.values[:count],
             weight=self.weight[:count],
-        )  # fmt: skip
+        )
 
     def masked(self, bad: BoolArray) -> Data:
         """The same without some readings."""
@@ -159,9 +161,16 @@ def at_even_times(data: Data, time_s: FloatArray) -> Data:
 
 
 def gather(
-    time_s: FloatArray, values: FloatArray, *, step: float | None, unit: str, counts: bool,
-    period_s: float, noise_rms: float, most: int = 4000,
-) -> Data:  # fmt: skip
+    time_s: FloatArray,
+    values: FloatArray,
+    *,
+    step: float | None,
+    unit: str,
+    counts: bool,
+    period_s: float,
+    noise_rms: float,
+    most: int = 4000,
+) -> Data:
     """Take the readings, in means of several where there are very many in a cycle.
 
     A mean over m readings keeps what is slower than it; 24 in a cycle are left at least.
@@ -186,7 +195,14 @@ def gather(
         keep = slice(None, None, len(time_s) // (_MOST_UNEVEN * most) + 1)
         time_s, values = time_s[keep], values[keep]
     return Data(
-        time_s, values, interval, uniform, np.ones(len(time_s)),
-        (step or 0.0) if fold == 1 else 0.0, unit,
-        counts, noise_rms / fold**0.5, fold=fold,
-    )  # fmt: skip
+        time_s,
+        values,
+        interval,
+        uniform,
+        np.ones(len(time_s)),
+        (step or 0.0) if fold == 1 else 0.0,
+        unit,
+        counts,
+        noise_rms / fold**0.5,
+        fold=fold,
+    )

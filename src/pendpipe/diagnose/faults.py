@@ -30,8 +30,12 @@ from pendpipe.estimate import Estimate
 
 _BEFORE: Final = ("clipping", "glitches")
 _BEHIND: Final = (
-    "missing-codes", "coarse-quantisation", "jitter", "coloured-noise", "broadband-drive",
-)  # fmt: skip
+    "missing-codes",
+    "coarse-quantisation",
+    "jitter",
+    "coloured-noise",
+    "broadband-drive",
+)
 _EACH: Final = TESTS_SHARE / (len(_BEFORE) + len(_BEHIND))
 _ROUNDS: Final = 3
 _CLEAN: Final = 1.3
@@ -188,14 +192,16 @@ class Forensics:
         progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
         number = sum(each.number for each in lost)
         found = Finding(
-            "dropped-samples", 0.0, state.fit.chi2 - fit.chi2,
+            "dropped-samples",
+            0.0,
+            state.fit.chi2 - fit.chi2,
             {
                 "d": Estimate(number * interval, 0.0, "s"),
                 "samples": Estimate(float(number), 0.0, ""),
             },
             Location(time_s=(lost[0].time_s, lost[-1].time_s)),
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
-        )  # fmt: skip
+        )
         state.faults.append(Fault(found, 0.0, len(state.steps)))
         state.settle(fit, mended)
 

@@ -12,8 +12,13 @@ from pendpipe.effects.effect import Effect
 from pendpipe.effects.held_parts import HYSTERETIC, VISCOUS, share_by_b
 
 _INDEX: Final[Mapping[str, int]] = {
-    "a": A, "b": B, "c": C, "frequency": OMEGA, "amplitude": START, "offset": OFFSET,
-}  # fmt: skip
+    "a": A,
+    "b": B,
+    "c": C,
+    "frequency": OMEGA,
+    "amplitude": START,
+    "offset": OFFSET,
+}
 _PART: Final = {"quality_factor_hysteretic": HYSTERETIC, "quality_factor_viscous": VISCOUS}
 
 

@@ -28,9 +28,14 @@ _ROUNDS: Final = 8
 
 
 def grown(
-    model: Model, data: Data, noise_rms: float, start: FloatArray, *, held: Iterable[int] = (),
+    model: Model,
+    data: Data,
+    noise_rms: float,
+    start: FloatArray,
+    *,
+    held: Iterable[int] = (),
     first: int | None = None,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Fit the beginning of a record, then more and more of it.
 
     Parameters

@@ -42,9 +42,13 @@ class HeldOut:
 
 
 def held_out(
-    baseline: Fit, improved: Fit, data: Data, noise: Noise, held_before: Sequence[int],
+    baseline: Fit,
+    improved: Fit,
+    data: Data,
+    noise: Noise,
+    held_before: Sequence[int],
     held_after: Sequence[int],
-) -> HeldOut:  # fmt: skip
+) -> HeldOut:
     """Predict every other block of some ten cycles from the rest, by both models."""
     block = _blocks(improved)
     before = _densities(baseline, data, noise, held_before, block)

@@ -99,9 +99,13 @@ def _over_all(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
         noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
         try:
             value = grown(
-                model, data, noise.white_rms, part.fit.value, held=part.holding,
+                model,
+                data,
+                noise.white_rms,
+                part.fit.value,
+                held=part.holding,
                 first=len(part.data),
-            )  # fmt: skip
+            )
             fit = refine(model, data, noise, value, held=part.holding)
         except (NoMotionError, np.linalg.LinAlgError):
             continue

@@ -49,14 +49,14 @@ def _likeliest(found: Search, step: Step, weighed: Weighed) -> Rival | None:
     present = {effect.key for effect in found.improved.model.effects}
     own = step.winner
     likelier = [
-        (float(weight), mate) for mate, weight in
-        zip(weighed.mates, weighed.weights[1:], strict=False)
+        (float(weight), mate)
+        for mate, weight in zip(weighed.mates, weighed.weights[1:], strict=False)
         if mate.lead.effect.key not in present
         # Of what no model explains curves are drawn already, over the names.
         and not (mate.drawn and found.remainder.systematic)
-        and weight > weighed.weights[0] * (
-            _TOLD_FROM if mate.drawn and not own.drawn else _LIKELIER)
-    ]  # fmt: skip
+        and weight
+        > weighed.weights[0] * (_TOLD_FROM if mate.drawn and not own.drawn else _LIKELIER)
+    ]
     return max(likelier, key=lambda each: each[0], default=(0.0, None))[1]
 
 
@@ -75,9 +75,13 @@ def _exchanged(found: Search, place: int, best: Rival, without: Fit) -> Search |
     remainder = remainder_of(fit, found.data, found.noise)
     fit = replace(fit, spread=remainder.spread)
     return replace(
-        found, improved=fit, steps=_reordered(found.steps, place, effect), remainder=remainder,
-        held=tuple(sorted(held)), named=found.named._replace(fit=fit, remainder=remainder),
-    )  # fmt: skip
+        found,
+        improved=fit,
+        steps=_reordered(found.steps, place, effect),
+        remainder=remainder,
+        held=tuple(sorted(held)),
+        named=found.named._replace(fit=fit, remainder=remainder),
+    )
 
 
 def _reordered(steps: Sequence[Step], place: int, effect: Effect) -> tuple[Step, ...]:

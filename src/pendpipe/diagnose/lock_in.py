@@ -78,9 +78,13 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
     right = np.array([total(one * readings) for one in columns])[..., good]
     solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
     return LockIn(
-        np.flatnonzero(good) + first, size[good], solved[:, 1], solved[:, 2], normal[1, 1],
+        np.flatnonzero(good) + first,
+        size[good],
+        solved[:, 1],
+        solved[:, 2],
+        normal[1, 1],
         total(sampled.phase)[good] / size[good],
-    )  # fmt: skip
+    )
 
 
 def _usual(size: FloatArray) -> FloatArray:

@@ -42,9 +42,16 @@ _SOME: Final = 0.25
 
 
 def refit_leads(
-    base: Fit, data: Data, noise: Noise, detection: Detection, *, held: Sequence[int],
-    gross: bool, origin: FloatArray, most: int = _MOST,
-) -> list[Rival]:  # fmt: skip
+    base: Fit,
+    data: Data,
+    noise: Noise,
+    detection: Detection,
+    *,
+    held: Sequence[int],
+    gross: bool,
+    origin: FloatArray,
+    most: int = _MOST,
+) -> list[Rival]:
     """Refit the leading effects nonlinearly; the best first."""
     leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
@@ -72,10 +79,11 @@ def _named_first(rivals: list[Rival]) -> list[Rival]:
     rivals = sorted(rivals, key=lambda rival: -rival.evidence)
     best = max(rival.gain for rival in rivals)
     named = [
-        rival for rival in rivals
+        rival
+        for rival in rivals
         if rival.lead.effect.kind != "unnamed"
         and rival.gain > (_SOME if rival.lead.effect.expected else _MUCH) * best
-    ]  # fmt: skip
+    ]
     # What is likelier beforehand goes before a name that merely fits a trifle better.
     near = _ALIKE * max((rival.gain for rival in named), default=0.0)
     named.sort(key=lambda rival: (0, -rival.prior) if rival.gain > near else (1, 0.0))
@@ -106,9 +114,10 @@ def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -
     # Asked whatever their first order says: what the user holds, which is little; and in a gross
     # misfit bearing and fluid, which are in every pendulum.
     asked = [
-        lead for lead in leads
+        lead
+        for lead in leads
         if isinstance(lead.effect, FreedParameter) or (gross and lead.effect.expected)
-    ]  # fmt: skip
+    ]
     return [*near, *(lead for lead in asked if lead not in near)]
 
 

@@ -34,11 +34,14 @@ def not_analysable(
         "effects": [],
         "improved": dict(nothing),
         "held_out": {
-            "log_density_before": None, "log_density_after": None, "gain": None, "gain_sd": None,
+            "log_density_before": None,
+            "log_density_after": None,
+            "gain": None,
+            "gain_sd": None,
         },
         "unexplained": {"residual_rms_rad": None, "p_value": None},
         "statement": f"This recording can't be analysed: {reason}.",
         "figures": [],
         "warnings": [],
         "provenance": dict(provenance or {}),
-    }  # fmt: skip
+    }

@@ -53,9 +53,10 @@ def prefer_one_curve(state: State, progress: Progress) -> None:
 
 def _prefer(state: State, kept: Sequence[Step], progress: Progress) -> None:
     names = [
-        step for step in state.steps
+        step
+        for step in state.steps
         if step not in kept and step.winner.lead.effect.kind != "unnamed"
-    ]  # fmt: skip
+    ]
     if len(names) < 2 or any(not step.winner.lead.effect.count for step in names):
         return
     if _one_alone(names):

@@ -115,9 +115,15 @@ def pulled(fit: Fit) -> list[int]:
 
 
 def refine(
-    model: Model, data: Data, noise: Noise, start: FloatArray, *, held: Iterable[int] = (),
-    rounds: int = ROUNDS, of_use: float = math.inf,
-) -> Fit:  # fmt: skip
+    model: Model,
+    data: Data,
+    noise: Noise,
+    start: FloatArray,
+    *,
+    held: Iterable[int] = (),
+    rounds: int = ROUNDS,
+    of_use: float = math.inf,
+) -> Fit:
     """Minimise chi^2 by Gauss and Newton, within the bounds.
 
     Where model and readings are out of phase by much, the residual is taken along the
@@ -141,9 +147,15 @@ class Refining:
     """
 
     def __init__(
-        self, model: Model, data: Data, noise: Noise, start: FloatArray, *,
-        held: Iterable[int] = (), little: float = SETTLED,
-    ) -> None:  # fmt: skip
+        self,
+        model: Model,
+        data: Data,
+        noise: Noise,
+        start: FloatArray,
+        *,
+        held: Iterable[int] = (),
+        little: float = SETTLED,
+    ) -> None:
         fixed = {*held, *model.held()}
         self._free = np.array([k for k in range(model.size) if k not in fixed])
         self._climb = Climb(model, data, noise)

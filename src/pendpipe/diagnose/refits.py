@@ -34,9 +34,14 @@ _LARGEST: Final = 0.5
 
 
 def side_by_side(
-    base: Fit, data: Data, noise: Noise, leads: Sequence[Lead], held: Sequence[int], *,
+    base: Fit,
+    data: Data,
+    noise: Noise,
+    leads: Sequence[Lead],
+    held: Sequence[int],
+    *,
     gross: bool,
-) -> list[tuple[Lead, Fit | None]]:  # fmt: skip
+) -> list[tuple[Lead, Fit | None]]:
     """Refit each lead; None where that fails.
 
     In a gross misfit, where what explains a quarter may come first, and gains grow while a
@@ -86,7 +91,7 @@ def _limit(base: Fit, leads: Sequence[Lead], refits: Sequence[Refining | None]) 
         limit_of_use(refit.chi2, base.chi2 - refit.chi2, drawn=lead.effect.kind == "unnamed")
         for lead, refit in zip(leads, refits, strict=True)
         if refit and believable(base, refit.fit, lead.effect)
-    ]  # fmt: skip
+    ]
     return min(best, default=math.inf)
 
 

@@ -88,10 +88,12 @@ class Remainder:
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
         return {
-            "over_noise": self.over_noise, "independent_numbers": self.numbers,
-            "error_factor": self.spread, "systematic": self.systematic,
+            "over_noise": self.over_noise,
+            "independent_numbers": self.numbers,
+            "error_factor": self.spread,
+            "systematic": self.systematic,
             "shares": dict(self.shares),
-        }  # fmt: skip
+        }
 
 
 def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
@@ -113,9 +115,11 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     # Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
     numbers = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
     return Remainder(
-        excess, over, min(max(numbers, _FEWEST), float(freedom)),
+        excess,
+        over,
+        min(max(numbers, _FEWEST), float(freedom)),
         dict(zip(_NAMES, shares.tolist(), strict=True)),
-    )  # fmt: skip
+    )
 
 
 def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:

@@ -149,9 +149,14 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
     """
     leads = tuple(lead for lead in detection.leads if lead.effect.kind == "unnamed")
     rivals = refit_leads(
-        state.fit, state.data, state.noise, replace(detection, leads=leads),
-        held=state.holding, gross=is_gross(state.fit, state.data), origin=state.origin,
-    )  # fmt: skip
+        state.fit,
+        state.data,
+        state.noise,
+        replace(detection, leads=leads),
+        held=state.holding,
+        gross=is_gross(state.fit, state.data),
+        origin=state.origin,
+    )
     if not rivals:
         return False
     best = _of_the_motion(rivals)
@@ -173,5 +178,10 @@ def _of_the_motion(rivals: list[Rival]) -> Rival:
     largest = max(rival.gain for rival in rivals)
     # Where no curve helps, the gains are negative.
     near = [rival for rival in rivals if rival.gain >= min(_AS_WELL * largest, largest)]
-    return min(near, key=lambda rival: (isinstance(rival.lead.effect, Curve)
-                                        and rival.lead.effect.in_time, -rival.gain))  # fmt: skip
+    return min(
+        near,
+        key=lambda rival: (
+            isinstance(rival.lead.effect, Curve) and rival.lead.effect.in_time,
+            -rival.gain,
+        ),
+    )

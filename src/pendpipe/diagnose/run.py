@@ -45,10 +45,16 @@ class Outcome:
 
 
 def diagnose_recording(
-    recording: Recording, *, baseline: Baseline = "eq8", fixed: Mapping[str, float] | None = None,
-    seed: int = 0, level: float = LEVEL, place: str | Path = "recording",
-    provenance: Mapping[str, Any] | None = None, progress: Progress = silent,
-) -> Outcome:  # fmt: skip
+    recording: Recording,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    seed: int = 0,
+    level: float = LEVEL,
+    place: str | Path = "recording",
+    provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Outcome:
     """Say where Eq. 8 and a recording differ, and what was left out.
 
     Parameters
@@ -81,19 +87,34 @@ def diagnose_recording(
     progress("finding the free decay and its turning points")
     points, part = measure_recording(recording.as_motion(place=place), place)
     return diagnose_decay(
-        part, points, baseline=baseline, fixed=fixed, seed=seed, level=level, place=place,
-        provenance=provenance, progress=progress, whole=recording,
-    )  # fmt: skip
+        part,
+        points,
+        baseline=baseline,
+        fixed=fixed,
+        seed=seed,
+        level=level,
+        place=place,
+        provenance=provenance,
+        progress=progress,
+        whole=recording,
+    )
 
 
 # Trials far from any motion overflow; they are looked at, and thrown away.
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def diagnose_decay(
-    part: Recording, points: TurningPoints, *, baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None, seed: int = 0, level: float = LEVEL,
-    place: str | Path = "recording", provenance: Mapping[str, Any] | None = None,
-    progress: Progress = silent, whole: Recording | None = None,
-) -> Outcome:  # fmt: skip
+    part: Recording,
+    points: TurningPoints,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    seed: int = 0,
+    level: float = LEVEL,
+    place: str | Path = "recording",
+    provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+    whole: Recording | None = None,
+) -> Outcome:
     """The same for a free decay whose turning points are known.
 
     Of the `whole` recording that it was cut from only the time stamps are looked at.
@@ -109,9 +130,7 @@ def diagnose_decay(
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
     named = _as_added(found, weighed)
-    gap = gap_note(
-        (whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts
-    )  # fmt: skip
+    gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = (*([gap] if gap else []), *found.said)
     notes = (*points.notes, *stamps)
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
@@ -123,38 +142,69 @@ def diagnose_decay(
     held = _held_out(found, beginning) if named else None
     swings = _small_swings(found)
     diagnosis = Diagnosis(
-        baseline, before, after, rms,
-        "missing-physics" if named else "consistent", found.p_value, named, held,
-        after.residual_rms_rad, found.unexplained,
+        baseline,
+        before,
+        after,
+        rms,
+        "missing-physics" if named else "consistent",
+        found.p_value,
+        named,
+        held,
+        after.residual_rms_rad,
+        found.unexplained,
         statement(
-            baseline, before, after, named, held, rms, found.unexplained, level,
-            unit=found.data.unit, remainder=found.remainder, swings=swings,
+            baseline,
+            before,
+            after,
+            named,
+            held,
+            rms,
+            found.unexplained,
+            level,
+            unit=found.data.unit,
+            remainder=found.remainder,
+            swings=swings,
             notes=stamps,
         ),
-        warnings=notes, remainder=found.remainder, small_swings=swings,
+        warnings=notes,
+        remainder=found.remainder,
+        small_swings=swings,
         provenance=dict(provenance or {}),
-    )  # fmt: skip
+    )
     return Outcome(diagnosis, found, beginning)
 
 
 def _searched(
-    samples: Samples, points: TurningPoints, baseline: Baseline, fixed: Mapping[str, float],
-    level: float, seed: int, progress: Progress,
-) -> tuple[Search, tuple[Weighed, ...], Beginning]:  # fmt: skip
+    samples: Samples,
+    points: TurningPoints,
+    baseline: Baseline,
+    fixed: Mapping[str, float],
+    level: float,
+    seed: int,
+    progress: Progress,
+) -> tuple[Search, tuple[Weighed, ...], Beginning]:
     from pendpipe.effects.catalogue import CATALOGUE
 
     beginning = begin(samples, points, baseline=baseline, fixed=fixed)
     found = search(
-        beginning, samples, CATALOGUE, baseline=baseline, level=level, seed=seed,
-        freed=freed_parameters(fixed), progress=progress,
-    )  # fmt: skip
+        beginning,
+        samples,
+        CATALOGUE,
+        baseline=baseline,
+        level=level,
+        seed=seed,
+        freed=freed_parameters(fixed),
+        progress=progress,
+    )
     return *with_likeliest(found, beginning), beginning
 
 
 def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[Named, ...]:
     """Name effects and faults in the order in which they were added."""
-    effects = [(place, effect_named(found, step, each)) for place, (step, each) in
-               enumerate(zip(found.steps, weighed, strict=True))]  # fmt: skip
+    effects = [
+        (place, effect_named(found, step, each))
+        for place, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
+    ]
     faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
     # Sorting keeps the order of equals: a fault goes before the effect that followed it.
     return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))

@@ -107,9 +107,16 @@ class Search:
 
 
 def search(
-    beginning: Beginning, samples: Samples, catalogue: Sequence[Effect], *, baseline: str,
-    level: float, seed: int, freed: Sequence[FreedParameter] = (), progress: Progress = silent,
-) -> Search:  # fmt: skip
+    beginning: Beginning,
+    samples: Samples,
+    catalogue: Sequence[Effect],
+    *,
+    baseline: str,
+    level: float,
+    seed: int,
+    freed: Sequence[FreedParameter] = (),
+    progress: Progress = silent,
+) -> Search:
     """Fit the baseline, and add what improves it most, until chance explains the rest."""
     data, held = beginning.data, list(beginning.held)
     progress(f"fitting {baseline} to {data.used} readings")
@@ -128,12 +135,20 @@ def search(
     assert state.first is not None
     assert state.now is not None
     return Search(
-        state.data, state.noise, _baseline_alone(state, beginning),
-        replace(state.fit, spread=remainder.spread), tuple(state.steps), tuple(state.faults),
+        state.data,
+        state.noise,
+        _baseline_alone(state, beginning),
+        replace(state.fit, spread=remainder.spread),
+        tuple(state.steps),
+        tuple(state.faults),
         min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
-        min(state.now.p_value / CATALOGUE_SHARE, 1.0), state.first, tuple(state.holding),
-        remainder, named or Reviewed(state.fit, remainder), tuple(forensics.said),
-    )  # fmt: skip
+        min(state.now.p_value / CATALOGUE_SHARE, 1.0),
+        state.first,
+        tuple(state.holding),
+        remainder,
+        named or Reviewed(state.fit, remainder),
+        tuple(forensics.said),
+    )
 
 
 def _add_all(state: State, task: Task) -> None:
@@ -207,9 +222,14 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     closer = more_leads(state.fit, state.noise, undrawn(CLOSER_CURVES, state.fit))
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
-        state.fit, state.data, state.noise, found, held=state.holding, gross=gross,
+        state.fit,
+        state.data,
+        state.noise,
+        found,
+        held=state.holding,
+        gross=gross,
         origin=state.origin,
-    )  # fmt: skip
+    )
     if rivals:
         rivals = prefer_parameters(state, rivals)
     if not gross and rivals:

@@ -47,9 +47,10 @@ class SmallSwings:
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
         return {
-            "amplitude_rad": self.amplitude, "frequency_excess": self.excess,
+            "amplitude_rad": self.amplitude,
+            "frequency_excess": self.excess,
             "frequency_excess_sd": self.excess_sd,
-        }  # fmt: skip
+        }
 
     def said(self, unit: str) -> str:
         """Return it as a sentence."""

@@ -19,11 +19,20 @@ _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 
 
 def statement(
-    baseline: str, before: Judged, after: Judged, effects: Sequence[Named],
-    held: HeldOut | None, noise_rms: float, unexplained: float, level: float, *,
-    unit: str = "rad", remainder: Remainder | None = None,
-    swings: SmallSwings | None = None, notes: Sequence[str] = (),
-) -> str:  # fmt: skip
+    baseline: str,
+    before: Judged,
+    after: Judged,
+    effects: Sequence[Named],
+    held: HeldOut | None,
+    noise_rms: float,
+    unexplained: float,
+    level: float,
+    *,
+    unit: str = "rad",
+    remainder: Remainder | None = None,
+    swings: SmallSwings | None = None,
+    notes: Sequence[str] = (),
+) -> str:
     """Say where it differs, what was left out, how much better the fit is, what is open."""
     model = _NAMES.get(baseline, baseline)
     stamps = [f"Of the record itself: {'; '.join(notes)}."] if notes else []
@@ -75,10 +84,12 @@ def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
             return f"Nothing else stands out (global {_chance(unexplained)})."
         return f"Something is left that has not been explained (global {_chance(unexplained)})."
     places = {
-        "level": "in the level", "amplitude": "in the amplitude of the motion",
-        "phase": "in its phase", "harmonics": "in its higher harmonics",
+        "level": "in the level",
+        "amplitude": "in the amplitude of the motion",
+        "phase": "in its phase",
+        "harmonics": "in its higher harmonics",
         "between": "between the harmonics",
-    }  # fmt: skip
+    }
     shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
     where = ", ".join(f"{share:.0%} {places[name]}" for name, share in shares if share > 0.05)
     return (

@@ -83,6 +83,12 @@ def _refitted(
     base: Fit, found: Detection, state: State, held: Sequence[int], most: int
 ) -> list[Rival]:
     return refit_leads(
-        base, state.data, state.noise, found, held=held, gross=False, most=most,
+        base,
+        state.data,
+        state.noise,
+        found,
+        held=held,
+        gross=False,
+        most=most,
         origin=state.origin,
-    )  # fmt: skip
+    )

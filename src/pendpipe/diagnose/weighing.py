@@ -70,9 +70,10 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
     own = _weighed(found, own, gain, gain)
     others = [
-        _weighed(found, rival, rival.gain, gain) for rival in rivals
+        _weighed(found, rival, rival.gain, gain)
+        for rival in rivals
         if rival.identifier != effect.identifier
-    ]  # fmt: skip
+    ]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # What every pendulum has is likelier than its rivals beforehand, and than none of them.
     # Of a curve that follows whatever has happened it says little that it leaves nothing.
@@ -98,19 +99,31 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> Named:
     found = beside(found, effect)
     without, gain, mates, weights = weighed
     return Named(
-        effect.identifier, effect.name, effect.kind, effect.equation,
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
         with_instants(
-            effect_parameters(found.improved, effect, found.data.unit), effect, without,
-            found.noise, found.improved.spread,
+            effect_parameters(found.improved, effect, found.data.unit),
+            effect,
+            without,
+            found.noise,
+            found.improved.spread,
         ),
-        gain, step.p_value,
+        gain,
+        step.p_value,
         float(weights[0]),
-        tuple((mate.identifier, float(weight)) for mate, weight in
-              zip(mates, weights[1:], strict=False) if weight > _LISTED or not mate.drawn),
-        effect.deciding, locate(without, found.improved, found.data, effect),
+        tuple(
+            (mate.identifier, float(weight))
+            for mate, weight in zip(mates, weights[1:], strict=False)
+            if weight > _LISTED or not mate.drawn
+        ),
+        effect.deciding,
+        locate(without, found.improved, found.data, effect),
         curve_values(found.improved, effect, found.data.unit)
-        if isinstance(effect, Curve) else None,
-    )  # fmt: skip
+        if isinstance(effect, Curve)
+        else None,
+    )
 
 
 def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
@@ -156,11 +169,18 @@ def fault_named(found: Search, fault: Fault) -> Named:
     if finding.identifier in _OF_THE_REST:
         each *= _explained(found, effect, finding.delta_chi2)
     return Named(
-        effect.identifier, effect.name, effect.kind, effect.equation, finding.parameters,
-        finding.delta_chi2, fault.p_value, each, tuple((name, each) for name in finding.also),
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
+        finding.parameters,
+        finding.delta_chi2,
+        fault.p_value,
+        each,
+        tuple((name, each) for name in finding.also),
         effect.deciding,
         replace(finding.location, summary=finding.summary),
-    )  # fmt: skip
+    )
 
 
 def _misfit(found: Search) -> float:
@@ -197,9 +217,12 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
 
 
 def _refined(
-    model: Model, found: Search, held: Sequence[int], *starts: FloatArray,
+    model: Model,
+    found: Search,
+    held: Sequence[int],
+    *starts: FloatArray,
     of_use: float = math.inf,
-) -> Fit | None:  # fmt: skip
+) -> Fit | None:
     """The best fit of a model from several starts; None if it can't move from any."""
     fits = []
     for start in starts:

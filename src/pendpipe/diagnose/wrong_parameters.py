@@ -67,13 +67,16 @@ def doubt_curve(state: State, task: Task) -> bool:
     before = replace(state, fit=without, steps=state.steps[:-1])
     task.scanned(before)
     assert before.now is not None
-    leads = tuple(
-        lead for lead in before.now.leads if lead.effect.kind in ("parameter", "unnamed")
-    )  # fmt: skip
+    leads = tuple(lead for lead in before.now.leads if lead.effect.kind in ("parameter", "unnamed"))
     rivals = refit_leads(
-        without, state.data, state.noise, replace(before.now, leads=leads), held=state.holding,
-        gross=False, origin=state.origin,
-    )  # fmt: skip
+        without,
+        state.data,
+        state.noise,
+        replace(before.now, leads=leads),
+        held=state.holding,
+        gross=False,
+        origin=state.origin,
+    )
     rivals = prefer_two_names(before, sorted(rivals, key=lambda each: -each.evidence), task)
     if not rivals or not isinstance(rivals[0].lead.effect, FreedParameter):
         return False

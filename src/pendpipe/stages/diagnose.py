@@ -54,18 +54,27 @@ class Question:
 
 
 def diagnose_motion(
-    recording: Recording, question: Question, *, place: str | Path,
-    turning_points: Path | None = None, provenance: Mapping[str, Any] | None = None,
+    recording: Recording,
+    question: Question,
+    *,
+    place: str | Path,
+    turning_points: Path | None = None,
+    provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
-) -> Outcome:  # fmt: skip
+) -> Outcome:
     """Diagnose a recording in rad (or m), with turning points found before where there are."""
     from pendpipe.analysis.turning_points import read_turning_points
     from pendpipe.diagnose.run import diagnose_decay, diagnose_recording
 
     asked: dict[str, Any] = {
-        "baseline": question.baseline, "fixed": question.fixed, "seed": question.seed,
-        "level": question.level, "place": place, "provenance": provenance, "progress": progress,
-    }  # fmt: skip
+        "baseline": question.baseline,
+        "fixed": question.fixed,
+        "seed": question.seed,
+        "level": question.level,
+        "place": place,
+        "provenance": provenance,
+        "progress": progress,
+    }
     if turning_points is None:
         return diagnose_recording(recording, **asked)
     points = read_turning_points(turning_points)

@@ -42,5 +42,9 @@ TESTS: Final[dict[str, Test]] = {
 
 
 __all__ = [
-    "TESTS", "Finding", "LostSamples", "Test", "find_lost_samples",
-]  # fmt: skip
+    "TESTS",
+    "Finding",
+    "LostSamples",
+    "Test",
+    "find_lost_samples",
+]

@@ -164,7 +164,9 @@ def _described(
     linear = max(pendulum.linear, 1e-12)
     floor = math.sqrt(best / (8.0 * omega**2 * linear))
     return Finding(
-        "broadband-drive", p_value, gain,
+        "broadband-drive",
+        p_value,
+        gain,
         {"acceleration_density": Estimate(best, sd, f"({data.unit}/s^2)^2/Hz")},
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
@@ -173,4 +175,4 @@ def _described(
         ),
         summary="amplitude and phase wander as if a random torque shook the pendulum"
         f" ({best:.2g} (rad/s^2)^2/Hz; it would keep an rms of {floor:.2g} {data.unit} alive)",
-    )  # fmt: skip
+    )

@@ -137,9 +137,13 @@ def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tupl
 
 
 def _described(
-    data: Data, fit: Fit, samples: Samples, lattice: Lattice | None, ends: list[End],
+    data: Data,
+    fit: Fit,
+    samples: Samples,
+    lattice: Lattice | None,
+    ends: list[End],
     p_value: float,
-) -> Finding:  # fmt: skip
+) -> Finding:
     parameters = {}
     codes = []
     step = lattice.step if lattice is not None else 0.0
@@ -154,7 +158,10 @@ def _described(
     levels = " and ".join(f"{end.level:.5g}" for end in ends)
     around = {"upper": 0.0, "lower": math.pi}[ends[0].side]
     return Finding(
-        "clipping", p_value, sum(end.delta_chi2 for end in ends), parameters,
+        "clipping",
+        p_value,
+        sum(end.delta_chi2 for end in ends),
+        parameters,
         Location(
             (float(when[0]), float(when[-1])),
             (float(amplitude.min()), float(amplitude.max())),
@@ -166,4 +173,4 @@ def _described(
         mask=mask,
         summary=f"{number} readings stand at the {sides} end of the range ({levels}"
         f" {data.unit}), which the motion passes, until {when[-1]:.4g} s",
-    )  # fmt: skip
+    )

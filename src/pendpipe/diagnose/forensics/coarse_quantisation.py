@@ -54,7 +54,9 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     step, end = coded.lattice.step, float(fit.at.sampled.amplitude[-1])
     amplitude = fit.at.sampled.amplitude
     return Finding(
-        "coarse-quantisation", p_value, max(size / sd, 0.0) ** 2,
+        "coarse-quantisation",
+        p_value,
+        max(size / sd, 0.0) ** 2,
         {
             "step": Estimate(step, 0.0, data.unit),
             "noise_over_step": Estimate(coded.ratio, 0.2 * coded.ratio, ""),
@@ -67,7 +69,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
         f" that errors follow the codes; the amplitude ends at {end / step:.2g} steps",
         kind="fault" if end < _RANDOM * step else "property",
-    )  # fmt: skip
+    )
 
 
 def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
@@ -92,12 +94,16 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
     if whole:
         parameters["dead_bits"] = Estimate(math.log2(times), 0.0, "")
     return Finding(
-        "coarse-quantisation", times**-free, 2.0 * data.used * math.log(times), parameters,
+        "coarse-quantisation",
+        times**-free,
+        2.0 * data.used * math.log(times),
+        parameters,
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(amplitude.min()), float(amplitude.max())),
         ),
-        summary=f"only one code in {times:.0f} comes: {steps}" if whole else
-        f"the codes that come are {times:.4g} apart, rounded to whole ones: {steps}",
+        summary=f"only one code in {times:.0f} comes: {steps}"
+        if whole
+        else f"the codes that come are {times:.4g} apart, rounded to whole ones: {steps}",
         also=("missing-codes",) if whole and round(times) == 2 else (),
-    )  # fmt: skip
+    )

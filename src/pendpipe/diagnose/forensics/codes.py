@@ -89,19 +89,25 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     if part is not None:
         index = np.arange(part.start, part.stop)
         return Raw(
-            samples.values[part], error_of(data, fit), sampled.phase, data.weight > 0.0,
-            index, np.arange(len(data)),
-        )  # fmt: skip
+            samples.values[part],
+            error_of(data, fit),
+            sampled.phase,
+            data.weight > 0.0,
+            index,
+            np.arange(len(data)),
+        )
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
     last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
     index = np.arange(first, last, max(1, (last - first) // _MOST))
     when, values = samples.time_s[index], samples.values[index]
     return Raw(
-        values, values - _between(data.time_s, reading, when),
+        values,
+        values - _between(data.time_s, reading, when),
         np.interp(when, data.time_s, sampled.phase),
         np.interp(when, data.time_s, data.weight) > 0.99,
-        index, place_of(data, when),
-    )  # fmt: skip
+        index,
+        place_of(data, when),
+    )
 
 
 def place_of(data: Data, time_s: FloatArray) -> IntArray:

@@ -72,14 +72,17 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         "density_ratio": Estimate(ratio, ratio * sd, ""),
     }
     return Finding(
-        "coloured-noise", min(p_value, 1.0), max(gain, 0.0), parameters,
+        "coloured-noise",
+        min(p_value, 1.0),
+        max(gain, 0.0),
+        parameters,
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             frequency_hz=(_NEAR[0] * frequency_hz, _NEAR[1] * frequency_hz),
         ),
         summary=f"the noise about the pendulum's frequency is {max(ratio, 1.0 / ratio):.2g} times"
         f" {word} in power than on average: it is coloured (power as f^{-slope:.2g} there)",
-    )  # fmt: skip
+    )
 
 
 def _spectrum(data: Data, residual: FloatArray, frequency_hz: float) -> Spectrum:

@@ -230,9 +230,14 @@ def _others(sorted_error: FloatArray, step: float) -> Tail:
 
 
 def _described(
-    data: Data, fit: Fit, residual: FloatArray, sizes: FloatArray, mask: BoolArray,
-    p_value: float, tail: Tail,
-) -> Finding:  # fmt: skip
+    data: Data,
+    fit: Fit,
+    residual: FloatArray,
+    sizes: FloatArray,
+    mask: BoolArray,
+    p_value: float,
+    tail: Tail,
+) -> Finding:
     sampled = fit.at.sampled
     size = sizes[mask]
     used = data.weight > 0.0
@@ -263,9 +268,13 @@ def _described(
     if tail.inverse_freedom > 0.03:
         summary += f" (the other readings' tails: Student, nu = {1.0 / tail.inverse_freedom:.2g})"
     return Finding(
-        "glitches", p_value, float(np.sum(size**2)), parameters,
+        "glitches",
+        p_value,
+        float(np.sum(size**2)),
+        parameters,
         Location(
             (float(when[0]), float(when[-1])), (float(amplitude.min()), float(amplitude.max()))
         ),
-        mask=mask, summary=summary,
-    )  # fmt: skip
+        mask=mask,
+        summary=summary,
+    )

@@ -211,14 +211,17 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
     omega = sampled.motion.angular_frequency
     factor = 1.0 + share / max(1.0 + float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
     return Finding(
-        "jitter", p_value, max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
+        "jitter",
+        p_value,
+        max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
         {"sigma_t": Estimate(seconds, error, "s")},
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
-            (0.25 * math.pi, 0.75 * math.pi), (omega / math.pi,),
+            (0.25 * math.pi, 0.75 * math.pi),
+            (omega / math.pi,),
         ),
         variance=factor,
         summary=f"the noise is largest where the motion is fastest, as if the moments of"
         f" reading were uncertain by {seconds:.2g} s",
-    )  # fmt: skip
+    )

@@ -161,9 +161,13 @@ def _in_a_half(coded: Coded, run: int) -> float:
 
 
 def _described(
-    data: Data, coded: Coded, occupation: Occupation, bad: BoolArray,
-    bit: tuple[int, float] | None, p_value: float,
-) -> Finding:  # fmt: skip
+    data: Data,
+    coded: Coded,
+    occupation: Occupation,
+    bad: BoolArray,
+    bit: tuple[int, float] | None,
+    p_value: float,
+) -> Finding:
     step = coded.lattice.step
     found, expected = occupation.found[bad], occupation.expected[bad]
     likely = np.where(found > 0.0, found * np.log(np.maximum(found, 1e-9) / expected), 0.0)
@@ -189,9 +193,13 @@ def _described(
         summary = f"{len(seldom)} code(s) ({named}, in steps of {step:.4g} {data.unit}) came"
         summary += f" {came:.0f} times where {due:.0f} were due"
     return Finding(
-        "missing-codes", p_value, gain, parameters,
-        Location(adc_codes=tuple(int(code) for code in seldom[:_SHOWN])), summary=summary,
-    )  # fmt: skip
+        "missing-codes",
+        p_value,
+        gain,
+        parameters,
+        Location(adc_codes=tuple(int(code) for code in seldom[:_SHOWN])),
+        summary=summary,
+    )
 
 
 def _described_comb(data: Data, coded: Coded, comb: Comb, p_value: float) -> Finding:
@@ -200,7 +208,9 @@ def _described_comb(data: Data, coded: Coded, comb: Comb, p_value: float) -> Fin
     codes = codes[comb.holds(codes)]
     due = max(comb.expected, 1.0)
     return Finding(
-        "missing-codes", p_value, comb.gain,
+        "missing-codes",
+        p_value,
+        comb.gain,
         {
             "share": Estimate((due - comb.found) / readings, math.sqrt(due) / readings, ""),
             "number": Estimate(float(len(codes)), 0.0, ""),
@@ -212,4 +222,4 @@ def _described_comb(data: Data, coded: Coded, comb: Comb, p_value: float) -> Fin
         summary=f"every {comb.period}th code (from {codes[0]}, in steps of"
         f" {coded.lattice.step:.4g} {data.unit}) came {comb.found:.0f} times where"
         f" {comb.expected:.0f} were due",
-    )  # fmt: skip
+    )

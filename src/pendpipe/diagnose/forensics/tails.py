@@ -12,8 +12,20 @@ from pendpipe.analysis.distributions import each, student_beyond
 from pendpipe.arrays import FloatArray
 
 _INVERSE_FREEDOM: Final = (
-    1e-4, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55,
-)  # fmt: skip
+    1e-4,
+    0.01,
+    0.02,
+    0.035,
+    0.055,
+    0.08,
+    0.11,
+    0.15,
+    0.2,
+    0.26,
+    0.33,
+    0.42,
+    0.55,
+)
 """1/nu: from a normal distribution (but for 1 % of what is beyond 5 sigma) to tails as heavy
 as any."""
 _BINS: Final = 200
@@ -136,9 +148,11 @@ def _rounding(step: float) -> tuple[FloatArray, FloatArray]:
 def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
     """Logarithm of Student's density at zero."""
     return np.asarray(
-        each(math.lgamma, 0.5 * (freedom + 1.0)) - each(math.lgamma, 0.5 * freedom)
-        - 0.5 * np.log(math.pi * freedom) - np.log(scale)
-    )  # fmt: skip
+        each(math.lgamma, 0.5 * (freedom + 1.0))
+        - each(math.lgamma, 0.5 * freedom)
+        - 0.5 * np.log(math.pi * freedom)
+        - np.log(scale)
+    )
 
 
 def _prior() -> FloatArray:

@@ -59,14 +59,17 @@ def find_gaps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         parameters["missing_samples"] = Estimate(float(np.round(missing / usual).sum()), 0.0, "")
     amplitude = np.interp(begin, data.time_s, fit.at.sampled.amplitude)
     return Finding(
-        "dropped-samples", 0.0, 0.0, parameters,
+        "dropped-samples",
+        0.0,
+        0.0,
+        parameters,
         Location(
             (float(begin[0]), float(end[-1])), (float(amplitude.min()), float(amplitude.max()))
         ),
         summary=f"{number} gap(s) in the time stamps, the longest of"
         f" {intervals[gaps][longest]:.4g} s at {begin[longest]:.5g} s",
         kind="property",
-    )  # fmt: skip
+    )
 
 
 def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
@@ -129,7 +132,9 @@ def find_uneven(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
     rms = float(np.std(stamps.off_s))
     amplitude = sampled.amplitude
     return Finding(
-        identifier, p_value, max(share / sd, 0.0) ** 2,
+        identifier,
+        p_value,
+        max(share / sd, 0.0) ** 2,
         {
             "share": Estimate(share, sd, ""),
             "unevenness": Estimate(rms, rms / math.sqrt(2.0 * len(data)), "s"),
@@ -143,7 +148,7 @@ def find_uneven(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
         time_s=stamps.even_s if share > 3.0 * sd and share > 0.5 else None,
         summary=f"the time stamps are uneven by {rms:.2g} s and the readings are not: they were"
         f" taken every {stamps.interval_s:.6g} s",
-    )  # fmt: skip
+    )
 
 
 def against_even_clock(time_s: FloatArray) -> Stamps | None:
