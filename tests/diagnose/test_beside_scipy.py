@@ -10,8 +10,7 @@ from scipy import special
 from scipy.fft import dct, idct
 from scipy.optimize import lsq_linear
 
-from pendpipe.diagnose.bounded import bounded_least_squares
-from pendpipe.diagnose.cosines import cosines, from_cosines
+from pendpipe.diagnose.numerics import bounded_least_squares, cosines, from_cosines
 from pendpipe.effects.complex_erfcx import erfcx
 
 

@@ -13,8 +13,8 @@ from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.forensics import TESTS, Finding
-from pendpipe.diagnose.forensics.combs import worst_comb
 from pendpipe.diagnose.forensics.lattice import spacing_of, with_true_step
+from pendpipe.diagnose.forensics.missing_codes import worst_comb
 from pendpipe.diagnose.run import diagnose_recording
 from pendpipe.recording import Recording
 

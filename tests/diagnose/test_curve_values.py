@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.values import curve_values
 from pendpipe.effects.curves import DampingCurve, DriveCurve
 from pendpipe.effects.model import Model
 

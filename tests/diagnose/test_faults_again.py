@@ -9,12 +9,11 @@ import pytest
 
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose import diagnose_recording
-from pendpipe.diagnose.between_readings import with_better_instants
+from pendpipe.diagnose import diagnose_recording, silent
 from pendpipe.diagnose.faults import Forensics
 from pendpipe.diagnose.forensics.finding import Finding
+from pendpipe.diagnose.instants import with_better_instants
 from pendpipe.diagnose.noise import white_noise
-from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import Fault, State
 from pendpipe.effects.catalogue import by_identifier

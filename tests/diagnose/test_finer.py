@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnose.data import gather
-from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.scores import finer_shape
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 
@@ -46,7 +45,7 @@ def test_an_instant_is_found_from_the_nearest_row(
     base = refine(model, data, noise, BASE)
     rows = np.unique([row[0] for row in effect.shapes(base.at.span)])
     nearest = float(rows[np.argmin(np.abs(rows - instant))])
-    shape = finer_shape(base, noise, Lead(effect, (nearest,), 0.0, 1.0))
+    shape = finer_shape(base, noise, effect, (nearest,))
     start = np.concatenate([base.value, [0.0], shape])
     found = refine(model.adding(effect), data, noise, start)
     best = refine(model.adding(effect), data, noise, truth)
@@ -67,5 +66,5 @@ def test_effects_that_vary_slowly_need_no_closer_look() -> None:
     )
     noise = white_noise(data, NOISE)
     base = refine(model, data, noise, BASE)
-    lead = Lead(by_identifier("frequency-step"), (70.0,), 0.0, 1.0)
-    assert finer_shape(base, noise, lead) == (70.0,)
+    effect = by_identifier("frequency-step")
+    assert finer_shape(base, noise, effect, (70.0,)) == (70.0,)

@@ -10,13 +10,13 @@ import pytest
 
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose import silent
 from pendpipe.diagnose.data import gather
 from pendpipe.diagnose.faults import Forensics
 from pendpipe.diagnose.forensics import TESTS, Finding, find_lost_samples
 from pendpipe.diagnose.forensics.glitches import find_in_misfit
 from pendpipe.diagnose.forensics.lost_samples import LostSamples
 from pendpipe.diagnose.noise import white_noise
-from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State
 from pendpipe.effects.catalogue import CATALOGUE

@@ -12,7 +12,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.forensics import TESTS, find_lost_samples
 from pendpipe.diagnose.forensics.tails import Tail, fit_tail
-from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
+from pendpipe.diagnose.numerics import tail_of_squares
 from pendpipe.diagnose.state import settled
 
 from .decays import Fitted, Pendulum, fitted, rounded

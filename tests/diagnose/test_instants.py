@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.finer import finer_shape
 from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.scores import finer_shape
 from pendpipe.diagnose.values import effect_parameters
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
@@ -33,7 +32,7 @@ def told(
     without = refine(model, data, noise, TRUTH)
     rows = effect.shapes(without.at.span)
     nearest = min(rows, key=lambda row: abs(row[0] - INSTANT_S))
-    shape = finer_shape(without, noise, Lead(effect, tuple(nearest), 0.0, 1.0))
+    shape = finer_shape(without, noise, effect, tuple(nearest))
     start = np.concatenate([without.value, [0.0], shape])
     fit = refine(model.adding(effect), data, noise, start)
     found = effect_parameters(fit, effect)

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.large_first import large_first
+from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
@@ -60,7 +60,7 @@ def searching(record: Recording, guess: float = 1.0) -> tuple[State, list[int]]:
         model = part.fit.model.adding(CircularError())
         start = np.append(beginning.value, 1.0)
         try:
-            value = grown(model, part.data, part.noise.white_rms, start)
+            value = progressive_start(model, part.data, part.noise.white_rms, start)
         except NoMotionError:
             return False
         part.settle(refine(model, part.data, part.noise, value))
@@ -138,14 +138,18 @@ def test_a_search_that_is_not_taken_leaves_the_record_whole(
             followed.append(len(data))
         if len(data) == len(beginning.data):
             raise NoMotionError("it stops")
-        return grown(model, data, *given, **named)
+        return progressive_start(model, data, *given, **named)
 
     def add_circular_error(part: State) -> bool:
         if not found or part.fit.model.effects:
             return False
         model = part.fit.model.adding(CircularError())
         start = np.append(beginning.value, 1.0)
-        part.settle(refine(model, part.data, part.noise, grown(model, part.data, NOISE_RAD, start)))
+        part.settle(
+            refine(
+                model, part.data, part.noise, progressive_start(model, part.data, NOISE_RAD, start)
+            )
+        )
         return True
 
     monkeypatch.setattr("pendpipe.diagnose.large_first.grown", not_to_the_end)

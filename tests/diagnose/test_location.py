@@ -9,8 +9,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.noise import white_noise
-from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.result import Location
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 
@@ -97,7 +97,7 @@ def located(
     data = Data(time_s, readings, INTERVAL_S, even, np.ones(len(time_s)))
     noise = white_noise(data, NOISE_RAD)
     before, after = refine(bare, data, noise, base), refine(extended, data, noise, truth)
-    return locate(before, after, data, effect), before.slip_rad
+    return locate(before, after, data, effect), before.max_phase_error_rad
 
 
 SLIPPING = {

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose import diagnose_recording
+from pendpipe.diagnose import diagnose_recording, silent
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.one_curve import prefer_one_curve
-from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, Step
 from pendpipe.dynamics.any_law import Motion

@@ -18,8 +18,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose import diagnose_recording
 from pendpipe.diagnose.begin import Beginning, begin
 from pendpipe.diagnose.forensics.time_stamps import gap_note
-from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.location import beat_of
+from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.small_swings import small_swings
 from pendpipe.diagnose.state import first_noise
@@ -58,7 +58,7 @@ def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
         model = model.adding(by_identifier(identifier.replace("_", "-")))
         value = np.append(value, start)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        value = grown(model, found.data, noise.white_rms, value, held=found.held)
+        value = progressive_start(model, found.data, noise.white_rms, value, held=found.held)
         return refine(model, found.data, noise, value, held=found.held)
 
 
@@ -76,7 +76,7 @@ def test_a_pendulum_has_the_circular_error_of_its_geometry(name: str) -> None:
     assert values(free, "cubic-stiffness")[0] == pytest.approx(-1.0 / 6.0, rel=0.05)
     # The frequency follows sin x over all cycles to a few tenths of a radian of phase.
     assert values(switched, "circular-error")[0] == 1.0
-    assert switched.slip_rad < 0.2
+    assert switched.max_phase_error_rad < 0.2
 
 
 def test_a_ships_righting_moment_hardens() -> None:

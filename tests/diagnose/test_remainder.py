@@ -27,7 +27,7 @@ def left_by(extra: FloatArray) -> tuple[Fit, Remainder]:
 def test_noise_alone_leaves_nothing_and_widens_no_error() -> None:
     found = remainder_of(*null_fit())
     assert not found.systematic
-    assert found.spread == 1.0
+    assert found.error_scale == 1.0
     assert found.worth(20.0) == 20.0
     assert found.over_noise == pytest.approx(1.0, abs=4.0 / math.sqrt(2 * len(TIME_S)))
 
@@ -53,8 +53,8 @@ def test_the_rest_is_said_to_lie_where_it_was_put(where: str, extra: FloatArray)
 def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
     _, small = left_by(4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
     _, large = left_by(8e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
-    assert large.spread == pytest.approx(2.0 * small.spread, rel=0.2)
-    assert small.spread > small.over_noise
+    assert large.error_scale == pytest.approx(2.0 * small.error_scale, rel=0.2)
+    assert small.error_scale > small.over_noise
     assert large.numbers < 30.0
 
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose import silent
 from pendpipe.diagnose.detect import Lead, detect, prepare
 from pendpipe.diagnose.naming import Rival
-from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.remainder import Remainder, remainder_of
 from pendpipe.diagnose.review import (

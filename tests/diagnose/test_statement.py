@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pendpipe.diagnose.held_out import HeldOut
-from pendpipe.diagnose.place import Location
-from pendpipe.diagnose.result import Judged, Named
+from pendpipe.diagnose.result import FittedModel, FoundEffect, Location
 from pendpipe.diagnose.statement import statement
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate
@@ -16,9 +15,9 @@ from pendpipe.estimate import Estimate
 from .records import INTERVAL_S, diagnosed
 
 
-def named(identifier: str, **parameters: Estimate) -> Named:
+def named(identifier: str, **parameters: Estimate) -> FoundEffect:
     effect = by_identifier(identifier)
-    return Named(
+    return FoundEffect(
         effect.identifier,
         effect.name,
         effect.kind,
@@ -33,8 +32,8 @@ def named(identifier: str, **parameters: Estimate) -> Named:
     )
 
 
-def said(effect: Named, gain: float = 50.0) -> str:
-    before, after = Judged({}, 2e-4, 4.0), Judged({}, 1e-4, 1.0)
+def said(effect: FoundEffect, gain: float = 50.0) -> str:
+    before, after = FittedModel({}, 2e-4, 4.0), FittedModel({}, 1e-4, 1.0)
     held = HeldOut(1000.0, 1000.0 + gain, 5.0)
     return statement("eq8", before, after, [effect], held, 1e-4, 0.5, 0.01)
 

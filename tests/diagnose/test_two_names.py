@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
+from pendpipe.diagnose import silent
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.faults import Forensics
-from pendpipe.diagnose.progress import silent
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State, first_noise
 from pendpipe.diagnose.task import Task, applicable

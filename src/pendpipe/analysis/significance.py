@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from math import isfinite, nan
 
-from pendpipe.analysis.distributions import beta_below, poisson_up_to
+import numpy as np
+
+from pendpipe.analysis.distributions import beta_below, poisson_up_to, student_beyond
 
 
 def chi_square_p_value(chi2: float, degrees_of_freedom: int) -> float:
@@ -23,7 +25,14 @@ def variance_ratio_p_value(ratio: float, numerator: int, denominator: int) -> fl
 
 
 def student_quantile95(degrees_of_freedom: int) -> float:
-    """How many standard deviations a 95 % interval reaches to each side."""
-    from scipy.special import stdtrit
+    """How many standard deviations a 95 % interval reaches to each side.
 
-    return float(stdtrit(degrees_of_freedom, 0.975))
+    >>> round(student_quantile95(3), 4)
+    3.1824
+    """
+    low, high = 1.9, 13.0  # of infinite freedom, and of one degree
+    while high - low > 1e-12 * high:
+        middle = 0.5 * (low + high)
+        beyond = float(student_beyond(np.array(degrees_of_freedom), np.array(middle)))
+        low, high = (middle, high) if beyond > 0.05 else (low, middle)
+    return 0.5 * (low + high)

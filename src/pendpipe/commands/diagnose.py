@@ -17,7 +17,7 @@ from pendpipe.commands import _reading
 from pendpipe.commands._campaign import add_record
 
 if TYPE_CHECKING:
-    from pendpipe.stages.diagnose import Question
+    from pendpipe.stages.diagnose import DiagnosisOptions
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
@@ -77,11 +77,11 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.analysis.fit.fixed import parse_fixed
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
-    from pendpipe.stages.diagnose import Question, refused_before
+    from pendpipe.stages.diagnose import DiagnosisOptions, refused_before
 
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
-    question = Question(
+    question = DiagnosisOptions(
         arguments.baseline,
         fixed,
         arguments.seed,
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     return _diagnose(arguments, question)
 
 
-def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
+def _diagnose(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
     from pendpipe.commands._motion import read_motion
     from pendpipe.errors import InputError
     from pendpipe.stages.diagnose import diagnose_motion, write_diagnosis
@@ -131,7 +131,10 @@ def _diagnose(arguments: argparse.Namespace, question: Question) -> int:
 
 
 def _not_analysable(
-    arguments: argparse.Namespace, question: Question, reason: str, provenance: dict[str, Any]
+    arguments: argparse.Namespace,
+    question: DiagnosisOptions,
+    reason: str,
+    provenance: dict[str, Any],
 ) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
     from pendpipe.stages.diagnose import write_not_analysable

@@ -14,13 +14,21 @@ used.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pendpipe.diagnose.result import Diagnosis
     from pendpipe.diagnose.run import Outcome, diagnose_decay, diagnose_recording
 
-__all__ = ["Diagnosis", "Outcome", "diagnose_decay", "diagnose_recording"]
+__all__ = ["Diagnosis", "Outcome", "Progress", "diagnose_decay", "diagnose_recording", "silent"]
+
+Progress = Callable[[str], None]
+"""Receives one line for each step of a diagnosis."""
+
+
+def silent(line: str) -> None:
+    """Print nothing."""
 
 
 def __getattr__(name: str) -> Any:

@@ -114,3 +114,11 @@ def _trials(smallest: FloatArray, growth: float) -> Trials:
     middle = float(np.exp(np.mean(np.log(trials[part]))))
     at = float(np.exp(np.mean(np.log(ordered[part]))))
     return Trials(max(middle, 1.0), growth, min(at, 0.5))
+
+
+CATALOGUE_SHARE: Final = 0.5
+"""Part of the level that the catalogue's scan spends."""
+RED_NOISE_SHARE: Final = 0.2
+"""Part of it for the doubt whether red noise is an effect."""
+TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
+"""Part of it that the tests of the measurement share."""

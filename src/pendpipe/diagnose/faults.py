@@ -14,16 +14,16 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray
+from pendpipe.diagnose import Progress
+from pendpipe.diagnose.chance import TESTS_SHARE
 from pendpipe.diagnose.data import at_even_times
 from pendpipe.diagnose.evidence import Rival, equivalent
 from pendpipe.diagnose.forensics import TESTS, Test, find_lost_samples
 from pendpipe.diagnose.forensics.finding import Finding
 from pendpipe.diagnose.forensics.glitches import find_in_misfit
-from pendpipe.diagnose.level import TESTS_SHARE
 from pendpipe.diagnose.noise import white_noise
-from pendpipe.diagnose.place import Location
-from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import refine
+from pendpipe.diagnose.result import Location
 from pendpipe.diagnose.state import Fault, State, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
@@ -156,7 +156,7 @@ class Forensics:
 
     def _mend_stamps(self, state: State, progress: Progress) -> None:
         """Take an even clock's times where the readings are evener than their stamps."""
-        if state.fit.slip_rad > _IN_PHASE or self.said:
+        if state.fit.max_phase_error_rad > _IN_PHASE or self.said:
             return
         finding = TESTS["time-stamps"](state.data, state.fit, state.noise, self.samples)
         if finding.time_s is None or finding.p_value > self.level * _EACH:

@@ -16,8 +16,8 @@ import numpy as np
 
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
@@ -98,7 +98,7 @@ def _over_all(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
         model = part.fit.model.at_times(data.time_s)
         noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
         try:
-            value = grown(
+            value = progressive_start(
                 model,
                 data,
                 noise.white_rms,

@@ -16,11 +16,11 @@ from pendpipe.diagnose.evidence import (
     evidence,
     ranked,
 )
-from pendpipe.diagnose.freed import FreedParameter
-from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import Fit, pulled, refine
 from pendpipe.diagnose.refits import NEAR, believable, side_by_side
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.dynamics.any_law import NoMotionError
 
 _MOST: Final = 9
@@ -56,7 +56,7 @@ def refit_leads(
     leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
-        lost = base.slip_rad > _LOST and len(fits) < _FROM_AFAR
+        lost = base.max_phase_error_rad > _LOST and len(fits) < _FROM_AFAR
         # With the baseline's friction a law may not get through to the end.
         if lost or (gross and fit is None):
             fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
@@ -116,7 +116,7 @@ def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -
     asked = [
         lead
         for lead in leads
-        if isinstance(lead.effect, FreedParameter) or (gross and lead.effect.expected)
+        if isinstance(lead.effect, ReleasedParameter) or (gross and lead.effect.expected)
     ]
     return [*near, *(lead for lead in asked if lead not in near)]
 
@@ -130,14 +130,14 @@ def _from_afar(
 ) -> Fit | None:
     """Refit from the first cycles on, where the base has lost the phase."""
     effect = lead.effect
-    if isinstance(effect, FreedParameter) or effect.kind == "unnamed":
+    if isinstance(effect, ReleasedParameter) or effect.kind == "unnamed":
         return None
     sizes = np.ones(1) if effect.switch else np.zeros(effect.sizes)
     known = base.value[len(origin) :]
     start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
     model = base.model.adding(effect)
     try:
-        value = grown(model, data, noise.white_rms, start, held=held)
+        value = progressive_start(model, data, noise.white_rms, start, held=held)
         return refine(model, data, noise, value, held=held)
     except (NoMotionError, np.linalg.LinAlgError):
         return None

@@ -10,8 +10,8 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.colour import fit_colour
-from pendpipe.diagnose.cosines import cosines, from_cosines
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.numerics import cosines, from_cosines
 
 _HARMONICS: Final = 7
 _WIDTH: Final = 0.08

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnose import Progress
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.evidence import MISSHAPEN, NO_SCAN, Rival, evidence, ranked
-from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.scores import build_bank

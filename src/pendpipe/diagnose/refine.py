@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.climb import SETTLED, Climb, Place
 from pendpipe.diagnose.data import Data
+from pendpipe.diagnose.gauss_newton import SETTLED, GaussNewton, Place
 from pendpipe.diagnose.noise import Noise
 from pendpipe.effects.baseline import C
 from pendpipe.effects.evaluated import Evaluated
@@ -41,14 +41,14 @@ class Fit:
         Indices of the values that were fitted.
     converged
         Whether the last step was negligible.
-    spread
+    error_scale
         Factor of all standard deviations, for what is left beyond the noise.
     """
 
     place: Place
     free: tuple[int, ...]
     converged: bool
-    spread: float = 1.0
+    error_scale: float = 1.0
 
     @property
     def model(self) -> Model:
@@ -81,9 +81,9 @@ class Fit:
         return self.place.columns
 
     @property
-    def slip_rad(self) -> float:
+    def max_phase_error_rad(self) -> float:
         """The largest phase by which model and readings differ."""
-        return self.place.slip_rad
+        return self.place.max_phase_error_rad
 
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
@@ -93,7 +93,7 @@ class Fit:
         scale[scale == 0.0] = 1.0
         inverse = np.linalg.pinv(np.linalg.qr(part / scale, mode="r"), rcond=1e-12)
         matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
-        return self.spread**2 * matrix
+        return self.error_scale**2 * matrix
 
 
 def pulled(fit: Fit) -> list[int]:
@@ -158,7 +158,7 @@ class Refining:
     ) -> None:
         fixed = {*held, *model.held()}
         self._free = np.array([k for k in range(model.size) if k not in fixed])
-        self._climb = Climb(model, data, noise)
+        self._climb = GaussNewton(model, data, noise)
         self._here = self._climb.start(start)
         self._gains: list[float] = []
         self._stalled = ((2, little), (3, max(little, _CREEP)))
@@ -258,4 +258,4 @@ def misfit(model: Model, data: Data, noise: Noise, value: FloatArray) -> float:
     NoMotionError
         If the model can't be evaluated there.
     """
-    return Climb(model, data, noise).place(value).chi2
+    return GaussNewton(model, data, noise).place(value).chi2

@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.climb import SETTLED
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Lead
-from pendpipe.diagnose.finer import finer_shape
-from pendpipe.diagnose.freed import FreedParameter
+from pendpipe.diagnose.gauss_newton import SETTLED
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import ROUNDS, Fit, Refining
+from pendpipe.diagnose.released_parameters import ReleasedParameter
+from pendpipe.diagnose.scores import finer_shape
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 
@@ -100,9 +100,11 @@ def _begun(
 ) -> Refining | None:
     """The first rounds of a lead's refit."""
     effect = lead.effect
-    if isinstance(effect, FreedParameter):
+    if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
-    start = np.concatenate([base.value, _sizes(effect), finer_shape(base, noise, lead)])
+    start = np.concatenate(
+        [base.value, _sizes(effect), finer_shape(base, noise, effect, lead.shape)]
+    )
     try:
         model = base.model.adding(effect)
         refit = Refining(model, data, noise, start, held=held, little=little)

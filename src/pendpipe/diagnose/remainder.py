@@ -17,9 +17,9 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.cosines import cosines
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.numerics import cosines
 from pendpipe.diagnose.refine import Fit
 
 _FLOOR: Final = 1.14
@@ -60,7 +60,7 @@ class Remainder:
         return self.over_noise > _FLOOR
 
     @property
-    def spread(self) -> float:
+    def error_scale(self) -> float:
         """Factor by which standard deviations grow: 1 where noise alone is left."""
         if not self.systematic:
             return 1.0
@@ -90,7 +90,7 @@ class Remainder:
         return {
             "over_noise": self.over_noise,
             "independent_numbers": self.numbers,
-            "error_factor": self.spread,
+            "error_factor": self.error_scale,
             "systematic": self.systematic,
             "shares": dict(self.shares),
         }

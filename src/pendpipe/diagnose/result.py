@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from pendpipe.diagnose.held_out import HeldOut
-from pendpipe.diagnose.place import Location
-from pendpipe.diagnose.remainder import Remainder
-from pendpipe.diagnose.small_swings import SmallSwings
-from pendpipe.estimate import Estimate
+if TYPE_CHECKING:
+    from pendpipe.diagnose.held_out import HeldOut
+    from pendpipe.diagnose.remainder import Remainder
+    from pendpipe.diagnose.small_swings import SmallSwings
+    from pendpipe.estimate import Estimate
+
 
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
 
 
 @dataclass(frozen=True)
-class Judged:
+class FittedModel:
     """A model's parameters, and how well it describes the readings."""
 
     parameters: Mapping[str, Estimate]
@@ -33,7 +34,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Named:
+class FoundEffect:
     """One effect that was left out.
 
     Parameters
@@ -121,12 +122,12 @@ class Diagnosis:
     """
 
     baseline_name: str
-    baseline: Judged
-    improved: Judged
+    baseline: FittedModel
+    improved: FittedModel
     noise_rms_rad: float
     verdict: Verdict
     p_value: float
-    effects: tuple[Named, ...]
+    effects: tuple[FoundEffect, ...]
     held_out: HeldOut | None
     unexplained_rms_rad: float
     unexplained_p_value: float
@@ -165,3 +166,86 @@ class Diagnosis:
             "warnings": list(self.warnings),
             "provenance": dict(self.provenance),
         }
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where an effect shows in the readings.
+
+    Parameters
+    ----------
+    time_s, amplitude_rad, phase_rad
+        Intervals that hold nine tenths of what it explains; the phase from a turning point
+        at the positive side; None where it is everywhere.
+    frequency_hz, harmonics
+        Where in the spectrum: frequencies, and multiples of the motion's.
+    adc_codes
+        The converter's codes that are concerned.
+    summary
+        One clause.
+    """
+
+    time_s: tuple[float, float] | None = None
+    amplitude_rad: tuple[float, float] | None = None
+    phase_rad: tuple[float, float] | None = None
+    frequency_hz: tuple[float, ...] = ()
+    harmonics: tuple[int, ...] = ()
+    adc_codes: tuple[int, ...] = ()
+    summary: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+
+        def pair(interval: tuple[float, float] | None) -> list[float] | None:
+            return None if interval is None else [float(end) for end in interval]
+
+        return {
+            "summary": self.summary,
+            "time_s": pair(self.time_s),
+            "amplitude_rad": pair(self.amplitude_rad),
+            "phase_rad": pair(self.phase_rad),
+            "frequency_hz": list(self.frequency_hz),
+            "harmonics": list(self.harmonics),
+            "adc_codes": list(self.adc_codes),
+        }
+
+
+def not_analysable(
+    baseline: str, reason: str, provenance: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return ``diagnosis.json`` of a recording that can't be analysed.
+
+    It has every key that another diagnosis has, so that a program need not ask which are
+    there; numbers that do not exist are None.
+
+    Parameters
+    ----------
+    baseline
+        The model that was asked for.
+    reason
+        Why it can't be analysed, one line.
+    provenance
+        Goes into the result.
+    """
+    nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
+    return {
+        "schema_version": 1,
+        "baseline": {"name": baseline, **nothing},
+        "noise_rms_rad": None,
+        "verdict": "not-analysable",
+        "reason": reason,
+        "p_value": None,
+        "effects": [],
+        "improved": dict(nothing),
+        "held_out": {
+            "log_density_before": None,
+            "log_density_after": None,
+            "gain": None,
+            "gain_sd": None,
+        },
+        "unexplained": {"residual_rms_rad": None, "p_value": None},
+        "statement": f"This recording can't be analysed: {reason}.",
+        "figures": [],
+        "warnings": [],
+        "provenance": dict(provenance or {}),
+    }

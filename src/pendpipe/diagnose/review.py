@@ -8,14 +8,14 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.distributions import chi2_beyond
+from pendpipe.diagnose import Progress
 from pendpipe.diagnose.chance import Trials
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.evidence import Rival
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.location import tone_of
 from pendpipe.diagnose.naming import refit_leads
-from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.remainder import Remainder, remainder_of
 from pendpipe.diagnose.state import State, Step, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
@@ -117,7 +117,7 @@ def _least_credible(state: State, remainder: Remainder) -> tuple[Step, Fit, floa
     found = []
     for step in state.steps:
         effect = step.winner.lead.effect
-        if isinstance(effect, FreedParameter) or stands_apart(effect, state.fit):
+        if isinstance(effect, ReleasedParameter) or stands_apart(effect, state.fit):
             continue
         without = fit_without(state, step)
         if without is not None:

@@ -13,15 +13,15 @@ from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
+from pendpipe.diagnose import Progress, silent
 from pendpipe.diagnose.begin import Beginning, begin
 from pendpipe.diagnose.forensics.lattice import with_true_step
 from pendpipe.diagnose.forensics.time_stamps import gap_note
-from pendpipe.diagnose.freed import freed_parameters
 from pendpipe.diagnose.held_out import HeldOut, held_out
-from pendpipe.diagnose.likeliest import with_likeliest
-from pendpipe.diagnose.progress import Progress, silent
+from pendpipe.diagnose.likelier import swap_in_likelier
 from pendpipe.diagnose.refine import Fit
-from pendpipe.diagnose.result import Diagnosis, Judged, Named
+from pendpipe.diagnose.released_parameters import released_parameters
+from pendpipe.diagnose.result import Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnose.search import Search, search
 from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
@@ -70,7 +70,7 @@ def diagnose_recording(
     level
         Global p-value below which something is said to be missing.
     place
-        Named in messages.
+        FoundEffect in messages.
     provenance
         Goes into the result.
     progress
@@ -135,7 +135,7 @@ def diagnose_decay(
     notes = (*points.notes, *stamps)
     rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _judged(found.baseline, found)
-    same = found.improved.value is found.baseline.value and found.improved.spread == 1.0
+    same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     after = before if same else _judged(found.improved, found)
     if named:
         progress("predicting held-out blocks")
@@ -193,13 +193,13 @@ def _searched(
         baseline=baseline,
         level=level,
         seed=seed,
-        freed=freed_parameters(fixed),
+        freed=released_parameters(fixed),
         progress=progress,
     )
-    return *with_likeliest(found, beginning), beginning
+    return *swap_in_likelier(found, beginning), beginning
 
 
-def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[Named, ...]:
+def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, ...]:
     """Name effects and faults in the order in which they were added."""
     effects = [
         (place, effect_named(found, step, each))
@@ -218,11 +218,11 @@ def _small_swings(found: Search) -> SmallSwings | None:
     return swings if swings is not None and swings.sure else None
 
 
-def _judged(fit: Fit, found: Search) -> Judged:
+def _judged(fit: Fit, found: Search) -> FittedModel:
     data = found.data
     residual = data.residual(fit.at.reading)[data.weight > 0.0]
     dof = max(data.used - len(fit.free), 1)
-    return Judged(
+    return FittedModel(
         parameters_of(fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
     )
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.effects import Effect
 from pendpipe.effects.curve import Curve
 from pendpipe.effects.effect import Span
@@ -116,7 +116,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
     kept = _Kept(tangent_basis(fit), most)
     for effect, rows in zip(effects, shapes, strict=True):
-        if isinstance(effect, FreedParameter):
+        if isinstance(effect, ReleasedParameter):
             kept.add(effect, rows, effect.sensitivity(fit)[None])
             continue
         some = max(_AT_ONCE // effect.sizes, 1)
@@ -127,7 +127,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
 
 
 def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
-    if isinstance(effect, FreedParameter):
+    if isinstance(effect, ReleasedParameter):
         return [()]
     return [tuple(float(number) for number in row) for row in effect.shapes(span)]
 
@@ -244,3 +244,47 @@ def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
     for width in np.unique(freedom).astype(int).tolist():
         found[freedom == width] = chi2_beyond(scores[freedom == width], width)
     return found
+
+
+def finer_shape(
+    base: Fit, noise: Noise, effect: Effect, shape: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Return the shape of highest score among those about a lead's (`Effect.finer`).
+
+    The effect of a knock, say, depends on the phase at which it comes: chi^2 has a minimum
+    in each half cycle, and the scan's rows are farther apart.
+    """
+    shapes = [tuple(row) for row in effect.finer(base.at.span, shape)] if shape else []
+    if not shapes:
+        return shape
+    shapes.append(shape)
+    products, length = products_and_lengths(base, noise, effect, shapes)
+    length[length == 0.0] = np.inf
+    return shapes[int(np.argmax(np.abs(products) / length))]
+
+
+def products_and_lengths(
+    base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Score shapes of an effect's first size on what a fit leaves.
+
+    Returns
+    -------
+    products, lengths
+        Inner products with the residual of what a unit of the size does beyond the model's own
+        values, and the lengths of that; shape (shapes,). The size is product/length^2, and
+        takes (product/length)^2 off chi^2.
+    """
+    span = base.at.span
+    small = effect.small(span)
+    sizes = np.zeros(effect.sizes)
+    changed = sizes.copy()
+    changed[0] = small
+    changes = [(np.append(sizes, shape), np.append(changed, shape)) for shape in shapes]
+    pendulum = base.model.pendulum(base.value)
+    raw = responses(effect, changes, base.at, pendulum).T / small
+    columns = np.zeros((len(raw) + 1, len(shapes)))
+    columns[:-1] = noise.whiten(raw)
+    basis = tangent_basis(base)
+    columns -= basis @ (basis.T @ columns)
+    return columns.T @ base.residual, np.linalg.norm(columns, axis=0)

@@ -9,20 +9,20 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnose import Progress, silent
 from pendpipe.diagnose.begin import Beginning
+from pendpipe.diagnose.chance import CATALOGUE_SHARE
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, more_leads
+from pendpipe.diagnose.drift_or_red_noise import reconsider_red_noise
 from pendpipe.diagnose.evidence import MISSHAPEN
 from pendpipe.diagnose.faults import Forensics
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.large_first import large_first
-from pendpipe.diagnose.level import CATALOGUE_SHARE
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.one_curve import prefer_one_curve
-from pendpipe.diagnose.progress import Progress, silent
-from pendpipe.diagnose.redness import doubt_redness
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.remainder import Remainder, remainder_of
 from pendpipe.diagnose.review import (
     credible,
@@ -34,7 +34,7 @@ from pendpipe.diagnose.review import (
 from pendpipe.diagnose.state import Fault, State, Step, first_noise, is_gross
 from pendpipe.diagnose.task import Task, undrawn
 from pendpipe.diagnose.two_names import prefer_two_names
-from pendpipe.diagnose.wrong_parameters import doubt_curve, prefer_parameters
+from pendpipe.diagnose.wrong_parameters import prefer_parameters, reconsider_curve
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
@@ -114,7 +114,7 @@ def search(
     baseline: str,
     level: float,
     seed: int,
-    freed: Sequence[FreedParameter] = (),
+    freed: Sequence[ReleasedParameter] = (),
     progress: Progress = silent,
 ) -> Search:
     """Fit the baseline, and add what improves it most, until chance explains the rest."""
@@ -128,7 +128,7 @@ def search(
     task = Task(catalogue, freed, baseline, level, seed, forensics, progress)
     large_first(beginning, state, lambda part: _add_one(part, task, _MAIN))
     _add_all(state, task)
-    if doubt_curve(state, task):
+    if reconsider_curve(state, task):
         _add_all(state, task)
     named, remainder = _reviewed(state, task)
     forensics.after(state, progress)
@@ -138,7 +138,7 @@ def search(
         state.data,
         state.noise,
         _baseline_alone(state, beginning),
-        replace(state.fit, spread=remainder.spread),
+        replace(state.fit, error_scale=remainder.error_scale),
         tuple(state.steps),
         tuple(state.faults),
         min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
@@ -176,7 +176,7 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
     if not remainder.systematic or _drawn(state):
         return None, remainder
     assert state.now is not None
-    named = Reviewed(replace(state.fit, spread=remainder.spread), remainder)
+    named = Reviewed(replace(state.fit, error_scale=remainder.error_scale), remainder)
     if describe_rest(state, state.now, state.now.p_value / CATALOGUE_SHARE):
         task.scanned(state)
     return named, remainder_of(state.fit, state.data, state.noise)
@@ -215,7 +215,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     effects = task.scanned(state)
     assert state.now is not None
     if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
-        doubt_redness(state, effects, task.level, task.seed, progress)
+        reconsider_red_noise(state, effects, task.level, task.seed, progress)
     if state.now.p_value > threshold or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
@@ -246,7 +246,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     state.steps.append(step)
     winner = rivals[0]
     progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
-    if isinstance(winner.lead.effect, FreedParameter):
+    if isinstance(winner.lead.effect, ReleasedParameter):
         state.holding = winner.lead.effect.without(state.holding)
     state.settle(winner.fit)
     return True
@@ -268,7 +268,7 @@ def _prune(state: State, progress: Progress) -> None:
     joined = any(fault.behind == len(state.steps) for fault in state.faults)
     for step in list(state.steps if joined and not _drawn(state) else state.steps[:-1]):
         effect = step.winner.lead.effect
-        without = None if isinstance(effect, FreedParameter) else fit_without(state, step)
+        without = None if isinstance(effect, ReleasedParameter) else fit_without(state, step)
         if without is None:
             continue
         needed = _NEEDED if stands_apart(effect, state.fit) else max(_NEEDED, between)

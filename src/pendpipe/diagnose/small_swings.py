@@ -52,7 +52,7 @@ class SmallSwings:
             "frequency_excess_sd": self.excess_sd,
         }
 
-    def said(self, unit: str) -> str:
+    def sentence(self, unit: str) -> str:
         """Return it as a sentence."""
         way, torque = ("above", "stiffer") if self.excess > 0.0 else ("below", "softer")
         return (

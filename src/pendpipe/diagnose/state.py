@@ -10,11 +10,11 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.begin import Beginning
-from pendpipe.diagnose.between_readings import with_better_instants
 from pendpipe.diagnose.data import Data, with_lattice
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.forensics.finding import Finding
+from pendpipe.diagnose.instants import with_better_instants
 from pendpipe.diagnose.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA
@@ -108,7 +108,7 @@ class State:
 
 def is_gross(fit: Fit, data: Data) -> bool:
     """Say whether a misfit is so large that sensitivities can't be trusted."""
-    return fit.chi2 > GROSS * data.used or fit.slip_rad > _SLIP
+    return fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > _SLIP
 
 
 def first_noise(beginning: Beginning) -> Noise:
@@ -131,7 +131,7 @@ def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Judge the noise anew where the model is near enough, and refit."""
-    if data.time_noise or fit.slip_rad > _SLIP:
+    if data.time_noise or fit.max_phase_error_rad > _SLIP:
         return fit, data, noise
     finer = with_lattice(data, fit.at.reading)
     left = noise_left(fit, finer, red=red)

@@ -7,7 +7,7 @@ from typing import Final
 
 from pendpipe.diagnose.held_out import HeldOut
 from pendpipe.diagnose.remainder import Remainder
-from pendpipe.diagnose.result import Judged, Named
+from pendpipe.diagnose.result import FittedModel, FoundEffect
 from pendpipe.diagnose.small_swings import SmallSwings
 from pendpipe.estimate import Estimate
 
@@ -20,9 +20,9 @@ _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 
 def statement(
     baseline: str,
-    before: Judged,
-    after: Judged,
-    effects: Sequence[Named],
+    before: FittedModel,
+    after: FittedModel,
+    effects: Sequence[FoundEffect],
     held: HeldOut | None,
     noise_rms: float,
     unexplained: float,
@@ -54,12 +54,12 @@ def statement(
         said.append(f"The omission had falsified {moved}.")
     said.append(_open(unexplained, level, remainder))
     if swings is not None:
-        said.append(swings.said(unit))
+        said.append(swings.sentence(unit))
     return " ".join([*said, *stamps])
 
 
 def _improvement(
-    number: int, before: Judged, after: Judged, held: HeldOut | None, unit: str
+    number: int, before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str
 ) -> str:
     text = (
         f"With {'it' if number == 1 else 'them'} the residual falls to"
@@ -95,7 +95,7 @@ def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
     return (
         f"What is left is {remainder.over_noise:.3g} times the noise and has not been explained"
         f" (global {_chance(unexplained)}; {where}): it is systematic, so that all errors given"
-        f" are {remainder.spread:.3g} times those of noise alone, and no name is believed more"
+        f" are {remainder.error_scale:.3g} times those of noise alone, and no name is believed more"
         " than the part of the misfit that it explains."
     )
 
@@ -105,7 +105,7 @@ def _chance(p_value: float) -> str:
     return f"p = {p_value:.2g}" if p_value >= _SMALLEST else f"p < {_SMALLEST:.0e}"
 
 
-def _effect(effect: Named) -> str:
+def _effect(effect: FoundEffect) -> str:
     """One sentence on one effect."""
     where = f", {effect.location.summary}" if effect.location.summary else ""
     if effect.kind == "unnamed":

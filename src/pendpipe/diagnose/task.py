@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
+from pendpipe.diagnose import Progress
+from pendpipe.diagnose.chance import CATALOGUE_SHARE
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.faults import Forensics
-from pendpipe.diagnose.freed import FreedParameter
-from pendpipe.diagnose.level import CATALOGUE_SHARE
-from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.state import State
 from pendpipe.effects import Effect
 from pendpipe.effects.curve import Curve
@@ -66,7 +66,7 @@ class Task:
     """
 
     catalogue: Sequence[Effect]
-    freed: Sequence[FreedParameter]
+    freed: Sequence[ReleasedParameter]
     baseline: str
     level: float
     seed: int

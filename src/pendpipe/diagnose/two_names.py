@@ -9,11 +9,11 @@ from typing import Final
 
 from pendpipe.diagnose.detect import Detection, detect, prepare
 from pendpipe.diagnose.evidence import Rival, form_spread
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.one_curve import BETTER
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.refits import OF_A_CURVE
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.state import State
 from pendpipe.diagnose.task import Task, applicable
 
@@ -49,7 +49,7 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
 
 def _margin(curve: Rival, *names: Rival) -> float:
     """By how much two names must be better than a curve."""
-    if any(isinstance(name.lead.effect, FreedParameter) for name in names):
+    if any(isinstance(name.lead.effect, ReleasedParameter) for name in names):
         return 0.0
     return math.hypot(BETTER, form_spread(curve))
 
@@ -69,7 +69,7 @@ def _second(state: State, name: Rival, task: Task) -> list[Rival]:
         if effect.kind != "unnamed"
     ]
     held = state.holding
-    if isinstance(name.lead.effect, FreedParameter):
+    if isinstance(name.lead.effect, ReleasedParameter):
         held = name.lead.effect.without(held)
     freed = [entry for entry in task.freed if entry not in name.fit.model.effects]
     scanner = prepare(name.fit, state.data, state.noise, [*effects, *freed])

@@ -62,7 +62,7 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     -------
     residual
         Shape (n,).
-    slip_rad
+    max_phase_error_rad
         The largest phase between model and readings; 0 where it is seen to be slight.
     """
     plain = data.residual(at.reading)

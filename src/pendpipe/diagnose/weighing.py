@@ -11,18 +11,17 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.begin import Beginning
-from pendpipe.diagnose.curve_values import curve_values
 from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabilities
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.refits import limit_of_use
-from pendpipe.diagnose.result import Named
+from pendpipe.diagnose.released_parameters import ReleasedParameter
+from pendpipe.diagnose.result import FoundEffect
 from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Fault, Step, is_gross
-from pendpipe.diagnose.values import effect_parameters
+from pendpipe.diagnose.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import BASELINE
@@ -93,12 +92,12 @@ def beside(found: Search, effect: Effect) -> Search:
     return replace(found, improved=found.named.fit, remainder=found.named.remainder)
 
 
-def effect_named(found: Search, step: Step, weighed: Weighed) -> Named:
+def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
     """One effect, with what is said of it in the end."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
     without, gain, mates, weights = weighed
-    return Named(
+    return FoundEffect(
         effect.identifier,
         effect.name,
         effect.kind,
@@ -108,7 +107,7 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> Named:
             effect,
             without,
             found.noise,
-            found.improved.spread,
+            found.improved.error_scale,
         ),
         gain,
         step.p_value,
@@ -157,7 +156,7 @@ def _explained(found: Search, effect: Effect, gain: float) -> float:
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
-def fault_named(found: Search, fault: Fault) -> Named:
+def fault_named(found: Search, fault: Fault) -> FoundEffect:
     """A fault of the measurement that a test of its own has found."""
     from pendpipe.effects.catalogue import by_identifier
 
@@ -168,7 +167,7 @@ def fault_named(found: Search, fault: Fault) -> Named:
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _OF_THE_REST:
         each *= _explained(found, effect, finding.delta_chi2)
-    return Named(
+    return FoundEffect(
         effect.identifier,
         effect.name,
         effect.kind,
@@ -193,7 +192,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     effect = step.winner.lead.effect
     held = list(found.held)
     model, value = found.improved.model.dropping(effect, found.improved.value)
-    if isinstance(effect, FreedParameter) and effect.index is not None:
+    if isinstance(effect, ReleasedParameter) and effect.index is not None:
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
     bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
@@ -242,7 +241,7 @@ def refitted(
 ) -> Fit | None:
     """Refit a rival in the final model, from where it ended before, as far as it is of use."""
     effect = rival.lead.effect
-    if isinstance(effect, FreedParameter):
+    if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])

@@ -14,10 +14,10 @@ from itertools import combinations
 import numpy as np
 
 from pendpipe.diagnose.evidence import SIZE, Rival
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.one_curve import BETTER
 from pendpipe.diagnose.refine import Fit, refine
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.review import fit_without
 from pendpipe.diagnose.state import State, Step
 from pendpipe.diagnose.task import Task
@@ -40,7 +40,7 @@ def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
     list
         The same; of the fewest held parameters that it takes, the one that gains most leads.
     """
-    freed = [rival for rival in rivals if isinstance(rival.lead.effect, FreedParameter)]
+    freed = [rival for rival in rivals if isinstance(rival.lead.effect, ReleasedParameter)]
     if not freed or (len(freed) == 1 and rivals[0] is freed[0]):
         return list(rivals)
     most = _together(state, freed)
@@ -53,7 +53,7 @@ def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
     return [first, *(rival for rival in rivals if rival is not first)]
 
 
-def doubt_curve(state: State, task: Task) -> bool:
+def reconsider_curve(state: State, task: Task) -> bool:
     """Take the last curve back where a held parameter and a name do as well; say whether they do.
 
     What was added one by one to a wrong prediction may be neither, and a curve follows both.
@@ -78,7 +78,7 @@ def doubt_curve(state: State, task: Task) -> bool:
         origin=state.origin,
     )
     rivals = prefer_two_names(before, sorted(rivals, key=lambda each: -each.evidence), task)
-    if not rivals or not isinstance(rivals[0].lead.effect, FreedParameter):
+    if not rivals or not isinstance(rivals[0].lead.effect, ReleasedParameter):
         return False
     task.progress(f"{rivals[0].identifier} and a name do as well as the curve")
     state.steps[:] = [*before.steps, Step(tuple(rivals), drawn.p_value, without)]
@@ -105,7 +105,7 @@ def _together(state: State, freed: Sequence[Rival]) -> Fit | None:
     model, held = state.fit.model, list(state.holding)
     for rival in freed:
         effect = rival.lead.effect
-        assert isinstance(effect, FreedParameter)
+        assert isinstance(effect, ReleasedParameter)
         model, held = model.adding(effect), effect.without(held)
     best = min(freed, key=lambda rival: rival.fit.chi2)
     try:
@@ -125,5 +125,5 @@ def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequenc
     return all(
         worth >= rival.evidence + (BETTER if more and not rival.drawn else 0.0)
         for rival in rivals
-        if not isinstance(rival.lead.effect, FreedParameter)
+        if not isinstance(rival.lead.effect, ReleasedParameter)
     )

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pendpipe.diagnose.result import Named
+from pendpipe.diagnose.result import FoundEffect
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREEN, INK, WIDTH_IN, key_above, styled
@@ -38,11 +38,11 @@ def draw(content: Shown) -> Figure:
     return figure
 
 
-def _exponents(effect: Named) -> bool:
+def _exponents(effect: FoundEffect) -> bool:
     return effect.curve is not None and "local_exponent" in effect.curve
 
 
-def _curve(axes: Axes, effect: Named) -> None:
+def _curve(axes: Axes, effect: FoundEffect) -> None:
     assert effect.curve is not None
     curve = effect.curve
     at, argument = _scaled(curve["at"], curve["argument"])
@@ -65,7 +65,7 @@ def _curve(axes: Axes, effect: Named) -> None:
         key_above(axes, 2)
 
 
-def _exponent(axes: Axes, effect: Named) -> None:
+def _exponent(axes: Axes, effect: FoundEffect) -> None:
     """The power of the velocity that the whole loss follows, by amplitude."""
     assert effect.curve is not None
     at, argument = _scaled(effect.curve["at"], effect.curve["argument"])

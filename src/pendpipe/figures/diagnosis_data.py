@@ -43,7 +43,7 @@ class Shown:
     def clock(self) -> Evaluated:
         """The model whose phase tells the cycles apart: the one that stays in step."""
         best = self.extended
-        if best is None or best.slip_rad > self.baseline.slip_rad:
+        if best is None or best.max_phase_error_rad > self.baseline.max_phase_error_rad:
             best = self.baseline
         return best.at
 

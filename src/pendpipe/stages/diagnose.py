@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pendpipe.diagnose.progress import Progress, silent
+from pendpipe.diagnose import Progress, silent
 from pendpipe.files import replaced, write_json
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ Figures = Literal["all", "found", "none"]
 
 
 @dataclass(frozen=True)
-class Question:
+class DiagnosisOptions:
     """What a recording is asked.
 
     Parameters
@@ -55,7 +55,7 @@ class Question:
 
 def diagnose_motion(
     recording: Recording,
-    question: Question,
+    question: DiagnosisOptions,
     *,
     place: str | Path,
     turning_points: Path | None = None,
@@ -83,7 +83,7 @@ def diagnose_motion(
 
 
 def write_diagnosis(
-    folder: Path, outcome: Outcome, question: Question, progress: Progress = silent
+    folder: Path, outcome: Outcome, question: DiagnosisOptions, progress: Progress = silent
 ) -> dict[str, Any]:
     """Draw the figures that are asked for, then write the result that names them."""
     diagnosis = outcome.diagnosis
@@ -110,7 +110,7 @@ def _forget_figures(folder: Path) -> None:
             folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
 
-def _say_what_is_not_drawn(folder: Path, question: Question, reason: str) -> None:
+def _say_what_is_not_drawn(folder: Path, question: DiagnosisOptions, reason: str) -> None:
     """Put a line in the place of each figure that a workflow waits for."""
     if not question.in_campaign or question.figures == "none":
         return
@@ -122,10 +122,10 @@ def _say_what_is_not_drawn(folder: Path, question: Question, reason: str) -> Non
 
 
 def write_not_analysable(
-    folder: Path, question: Question, reason: str, provenance: Mapping[str, Any]
+    folder: Path, question: DiagnosisOptions, reason: str, provenance: Mapping[str, Any]
 ) -> None:
     """Write the result of a recording that can't be analysed."""
-    from pendpipe.diagnose.not_analysable import not_analysable
+    from pendpipe.diagnose.result import not_analysable
 
     _forget_figures(folder)
     _say_what_is_not_drawn(folder, question, "Not drawn: this record can't be analysed.")

@@ -12,10 +12,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import residual_of
-from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.numerics import tail_of_squares
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.diagnose.scores import tangent_basis
 from pendpipe.estimate import Estimate
 
@@ -65,7 +65,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     sum of squares. It must be there in amplitude and in phase alike, which a term left out
     of the law of motion seldom is: p = max(p_amplitude, p_phase)^2.
     """
-    if data.used < 100 or fit.slip_rad > _SLIP:
+    if data.used < 100 or fit.max_phase_error_rad > _SLIP:
         return nothing("broadband-drive")
     amplitude, phase, per_kick = _wandering(data, fit, noise)
     if min(len(amplitude.weight), len(phase.weight)) < 5:

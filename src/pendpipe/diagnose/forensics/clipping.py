@@ -21,8 +21,8 @@ from pendpipe.diagnose.forensics.lattice import (
 )
 from pendpipe.diagnose.forensics.local import Local, local_residual
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 _FEWEST: Final = 2

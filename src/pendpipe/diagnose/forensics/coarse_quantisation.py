@@ -12,8 +12,8 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.codes import read_codes
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 _WELL_BELOW: Final = 0.25

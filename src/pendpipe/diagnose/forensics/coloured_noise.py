@@ -13,8 +13,8 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.local import residual_of
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 _MATTERS: Final = 1.5

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 

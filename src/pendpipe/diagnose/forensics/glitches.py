@@ -21,8 +21,8 @@ from pendpipe.diagnose.forensics.local import (
 )
 from pendpipe.diagnose.forensics.tails import Tail, fit_tail
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 _NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)

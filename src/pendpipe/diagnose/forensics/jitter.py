@@ -14,10 +14,10 @@ from pendpipe.diagnose.forensics.codes import Coded, read_codes
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import rounding_moments, whole_readings
 from pendpipe.diagnose.forensics.local import local_residual, residual_of, whitened_in_time
-from pendpipe.diagnose.forensics.weighted_chi2 import tail_of_squares
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.place import Location
+from pendpipe.diagnose.numerics import tail_of_squares
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
 _FAR: Final = 3.0

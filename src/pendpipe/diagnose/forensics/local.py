@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnose.cosines import cosines, from_cosines
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.numerics import cosines, from_cosines
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.unwrapped import unwrapped
 

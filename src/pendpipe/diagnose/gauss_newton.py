@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.diagnose.bounded import bounded_least_squares
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
+from pendpipe.diagnose.numerics import bounded_least_squares
 from pendpipe.diagnose.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, SHARE, B
@@ -42,7 +42,7 @@ class Place:
     ----------
     value
         Of the model.
-    at, residual, slip_rad
+    at, residual, max_phase_error_rad
         The model there, the whitened residual, and the largest slip of the phase.
     model, noise
         From which the Jacobian is worked out, where it is asked for.
@@ -51,7 +51,7 @@ class Place:
     value: FloatArray
     at: Evaluated
     residual: FloatArray
-    slip_rad: float
+    max_phase_error_rad: float
     model: Model
     noise: Noise
 
@@ -66,7 +66,7 @@ class Place:
         return _jacobian(self.model, self.noise, self.value, self.at)
 
 
-class Climb:
+class GaussNewton:
     """Steps of Gauss and Newton from place to place."""
 
     def __init__(self, model: Model, data: Data, noise: Noise) -> None:

@@ -22,7 +22,7 @@ _INDEX: Final[Mapping[str, int]] = {
 _PART: Final = {"quality_factor_hysteretic": HYSTERETIC, "quality_factor_viscous": VISCOUS}
 
 
-class FreedParameter(Effect):
+class ReleasedParameter(Effect):
     """A baseline parameter given by ``--fix``, set free.
 
     Parameters
@@ -68,6 +68,6 @@ class FreedParameter(Effect):
         return fit.jacobian[:, B] + along * fit.jacobian[:, SHARE]
 
 
-def freed_parameters(fixed: Mapping[str, float]) -> list[FreedParameter]:
+def released_parameters(fixed: Mapping[str, float]) -> list[ReleasedParameter]:
     """One for each parameter that is held."""
-    return [FreedParameter(name) for name in fixed]
+    return [ReleasedParameter(name) for name in fixed]

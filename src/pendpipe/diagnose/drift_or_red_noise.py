@@ -8,21 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from pendpipe.diagnose.chance import Trials
+from pendpipe.diagnose import Progress
+from pendpipe.diagnose.chance import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials
 from pendpipe.diagnose.colour import REFERENCE_HZ
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import detect, prepare
 from pendpipe.diagnose.evidence import Rival
-from pendpipe.diagnose.level import CATALOGUE_SHARE, REDNESS_SHARE
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.progress import Progress
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, settled
 from pendpipe.effects import Effect
 
 
-def doubt_redness(
+def reconsider_red_noise(
     state: State, effects: Sequence[Effect], level: float, seed: int, progress: Progress
 ) -> None:
     """Ask whether what passes for red noise is an effect: a step or a drift is red as well.
@@ -31,7 +30,7 @@ def doubt_redness(
     judgement is taken where effect and noise together are likelier by 1/p, p this doubt's part
     of the level: what is normalised beats the true model by so much no more often (Markov).
     """
-    share = level * REDNESS_SHARE
+    share = level * RED_NOISE_SHARE
     progress("the noise is red: is it an effect?")
     effects = [effect for effect in effects if effect.kind != "unnamed"]
     assert state.now is not None
@@ -53,7 +52,7 @@ def doubt_redness(
     state.fit, state.data, state.noise = fit, data, noise
     found = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
     # As rare in the catalogue's share of the level as it is in this doubt's.
-    rare = by_chance * CATALOGUE_SHARE / REDNESS_SHARE
+    rare = by_chance * CATALOGUE_SHARE / RED_NOISE_SHARE
     state.now = replace(found, p_value=max(found.p_value, rare))
     state.first = state.now if not state.steps else state.first
 

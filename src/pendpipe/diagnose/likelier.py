@@ -8,8 +8,8 @@ from typing import Final
 
 from pendpipe.diagnose.begin import Beginning
 from pendpipe.diagnose.evidence import Rival
-from pendpipe.diagnose.freed import FreedParameter
 from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.remainder import remainder_of
 from pendpipe.diagnose.search import Search
 from pendpipe.diagnose.state import Step
@@ -23,7 +23,7 @@ _TOLD_FROM: Final = 20.0
 from them: at odds of one in twenty it can."""
 
 
-def with_likeliest(found: Search, beginning: Beginning) -> tuple[Search, tuple[Weighed, ...]]:
+def swap_in_likelier(found: Search, beginning: Beginning) -> tuple[Search, tuple[Weighed, ...]]:
     """Put what is likelier in the end in the place of what was taken first; weigh all steps.
 
     A search takes what improves a gross misfit most; where much is left that no model explains,
@@ -65,15 +65,15 @@ def _exchanged(found: Search, place: int, best: Rival, without: Fit) -> Search |
     step, effect = found.steps[place], best.lead.effect
     own, held = step.winner.lead.effect, set(found.held)
     # A held part of b is no index: the model knows of it.
-    if isinstance(own, FreedParameter) and own.index is not None:
+    if isinstance(own, ReleasedParameter) and own.index is not None:
         held.add(own.index)
-    if isinstance(effect, FreedParameter):
+    if isinstance(effect, ReleasedParameter):
         held = set(effect.without(held))
     fit = refitted(without, found, sorted(held), best)
     if fit is None:
         return None
     remainder = remainder_of(fit, found.data, found.noise)
-    fit = replace(fit, spread=remainder.spread)
+    fit = replace(fit, error_scale=remainder.error_scale)
     return replace(
         found,
         improved=fit,

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.growing import grown
 from pendpipe.diagnose.noise import white_noise
+from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.circular_error import CircularError
@@ -36,7 +36,7 @@ def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_
     model = Model(TIME_S, 1.0 / RATE_HZ, (CircularError(),), order=20)
     slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)
     start = np.array([0.0, LINEAR, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
-    value = grown(model, data, NOISE_RAD, start)
+    value = progressive_start(model, data, NOISE_RAD, start)
     fit = refine(model, data, white_noise(data, NOISE_RAD), value)
     assert fit.chi2 / len(TIME_S) == pytest.approx(1.0, abs=0.1)
     sd = math.sqrt(fit.covariance()[OMEGA, OMEGA])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnose import diagnose_recording, likeliest
-from pendpipe.diagnose.likeliest import with_likeliest
+from pendpipe.diagnose.likelier import swap_in_likelier
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.run import Outcome
 from pendpipe.diagnose.search import Search
@@ -57,7 +57,7 @@ def having_taken(outcome: Outcome, name: str) -> Search:
 
 def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
     """Who leads in the end where another was taken first, and all probabilities."""
-    found, (weighed,) = with_likeliest(having_taken(outcome, name), outcome.beginning)
+    found, (weighed,) = swap_in_likelier(having_taken(outcome, name), outcome.beginning)
     (step,) = found.steps
     own, *others = weighed.weights[:-1].tolist()
     mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
@@ -105,7 +105,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
 
     monkeypatch.setattr(likeliest, "weigh", weighed)
     outcome = diagnosed("circular-error")
-    found, _ = with_likeliest(outcome.search, outcome.beginning)
+    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert [effect.identifier for effect in found.improved.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
 
@@ -140,7 +140,7 @@ def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
     monkeypatch.setattr(
         likeliest, "_likeliest", lambda _, step, __: other if step is first else None
     )
-    found, _ = with_likeliest(outcome.search, outcome.beginning)
+    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert found.steps[0].winner is other
     assert found.steps[1].before is other.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner

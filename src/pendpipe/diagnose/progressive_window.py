@@ -27,7 +27,7 @@ _CLOSER: Final = 1.1
 _ROUNDS: Final = 8
 
 
-def grown(
+def progressive_start(
     model: Model,
     data: Data,
     noise_rms: float,

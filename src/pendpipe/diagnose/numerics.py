@@ -1,0 +1,193 @@
+"""Linear least squares of a few values within bounds, by active sets (Stark and Parker 1995).
+
+scipy has it; importing its optimisers for this would take as long as a whole fit.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pendpipe.arrays import BoolArray, FloatArray
+
+_SLACK = 1e-9
+"""Of the gradient: what is rounding."""
+
+
+def bounded_least_squares(
+    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
+) -> FloatArray:
+    """Minimise |matrix x - right| with floor <= x <= ceiling.
+
+    Values walk from zero (which must lie within) towards the best of those that are free;
+    what meets its bound on the way is held there, and let go where that lowers the sum.
+
+    Parameters
+    ----------
+    matrix, right
+        Shapes (m, n) and (m,).
+    floor, ceiling
+        Shape (n,); infinite where there is no bound.
+    """
+    x = np.clip(np.zeros(len(floor)), floor, ceiling)
+    held = np.zeros(len(floor), dtype=bool)
+    for _ in range(10 * len(floor) + 10):
+        goal = x.copy()
+        rest = right - matrix[:, held] @ x[held]
+        goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
+        met, share = _first_met(x, goal, floor, ceiling, ~held)
+        x = np.clip(x + share * (goal - x), floor, ceiling)
+        if met is not None:
+            x[met] = floor[met] if goal[met] < x[met] else ceiling[met]
+            held[met] = True
+            continue
+        pull = matrix.T @ (right - matrix @ x)
+        inwards = np.where(x <= floor, pull, -pull) * held
+        freed = int(np.argmax(inwards))
+        if inwards[freed] <= _SLACK * (1.0 + float(np.abs(right).max())):
+            break
+        held[freed] = False
+    return x
+
+
+def _first_met(
+    x: FloatArray, goal: FloatArray, floor: FloatArray, ceiling: FloatArray, free: BoolArray
+) -> tuple[int | None, float]:
+    """The first free value that meets its bound on the way, and after what part of it."""
+    out = free & ((goal < floor) | (goal > ceiling))
+    if not out.any():
+        return None, 1.0
+    wall = np.where(goal < floor, floor, ceiling)
+    share = np.full(len(x), np.inf)
+    share[out] = (wall[out] - x[out]) / (goal[out] - x[out])
+    met = int(np.argmin(share))
+    return met, max(float(share[met]), 0.0)
+
+
+_Complex = NDArray[np.complex128]
+
+
+def cosines(rows: FloatArray) -> FloatArray:
+    """Return c_k = sqrt((2 - [k = 0])/n) sum over j of x_j cos(pi k (2 j + 1)/(2 n)), last axis.
+
+    The even entries followed by the odd ones backwards have a Fourier transform whose phases
+    have only to be turned (Makhoul 1980). Single precision stays single.
+    """
+    count = rows.shape[-1]
+    if count < 2:
+        return np.array(rows)
+    half = (count + 1) // 2
+    mixed = np.empty(rows.shape, dtype=rows.dtype)
+    mixed[..., :half] = rows[..., ::2]
+    mixed[..., half:] = rows[..., 1::2][..., ::-1]
+    turned = np.fft.rfft(mixed)
+    turned *= _turn(count).astype(turned.dtype)
+    found = mixed
+    lines = turned.shape[-1]
+    found[..., :lines] = turned.real
+    found[..., lines:] = -turned.imag[..., count - lines : 0 : -1]
+    return found
+
+
+def from_cosines(rows: FloatArray) -> FloatArray:
+    """Return the inverse of `cosines` (and its transpose), last axis."""
+    count = rows.shape[-1]
+    if count < 2:
+        return np.array(rows)
+    lines = count // 2 + 1
+    turned = np.empty((*rows.shape[:-1], lines), dtype=np.result_type(rows.dtype, np.complex64))
+    turned.real = rows[..., :lines]
+    turned.imag[..., 0] = 0.0
+    turned.imag[..., 1:] = -rows[..., : count - lines : -1]
+    turned /= _turn(count).astype(turned.dtype)
+    mixed = np.fft.irfft(turned, n=count)
+    half = (count + 1) // 2
+    found = np.empty(rows.shape, dtype=rows.dtype)
+    found[..., ::2] = mixed[..., :half]
+    found[..., 1::2] = mixed[..., half:][..., ::-1]
+    return found
+
+
+@lru_cache(maxsize=8)
+def _turn(count: int) -> _Complex:
+    """sqrt(2/n) e^(-i pi k/(2 n)), the level's own scale included."""
+    order = np.arange(count // 2 + 1)
+    turn = np.sqrt(2.0 / count) * np.exp(-0.5j * np.pi * order / count)
+    turn[0] = np.sqrt(1.0 / count)
+    return np.asarray(turn)
+
+
+_ROUNDS: Final = 60
+
+
+def tail_of_squares(total: float, weight: FloatArray) -> float:
+    """P(sum of w_i z_i^2 > total), z_i independent and normal.
+
+    The saddlepoint approximation of Lugannani and Rice (Kuonen, Biometrika 86 (1999) 929),
+    good to a few per cent of the probability however small that is.
+
+    Parameters
+    ----------
+    total
+        The sum that was found.
+    weight
+        w_i, of either sign, shape (n,).
+    """
+    weight = weight[weight != 0.0]
+    if len(weight) == 0:
+        return 1.0
+    mean = float(weight.sum())
+    spread = math.sqrt(2.0 * float(np.sum(weight**2)))
+    if abs(total - mean) < 1e-3 * spread:
+        # At the mean itself the formula is 0/0; its limit holds the skewness.
+        skew = 8.0 * float(np.sum(weight**3)) / spread**3
+        return 0.5 - skew / (6.0 * math.sqrt(2.0 * math.pi))
+    if float(weight.min()) > 0.0 and total <= 0.0:
+        return 1.0
+    if float(weight.max()) < 0.0 and total >= 0.0:
+        return 0.0
+    tilt = _saddlepoint(total, weight)
+    left = 1.0 - 2.0 * tilt * weight
+    cumulant = -0.5 * float(np.sum(np.log(left)))
+    curvature = 2.0 * float(np.sum((weight / left) ** 2))
+    w = math.copysign(math.sqrt(max(2.0 * (tilt * total - cumulant), 0.0)), tilt)
+    v = tilt * math.sqrt(curvature)
+    if abs(w) < 1e-6 or v / w <= 0.0:
+        return 0.5
+    return _upper_tail(w + math.log(v / w) / w)
+
+
+def _saddlepoint(total: float, weight: FloatArray) -> float:
+    """Where the derivative of the cumulants' generating function is the total."""
+    high_weight, low_weight = float(weight.max()), float(weight.min())
+    high = 0.5 / high_weight if high_weight > 0.0 else math.inf
+    low = 0.5 / low_weight if low_weight < 0.0 else -math.inf
+    tilt = 0.0
+    for _ in range(_ROUNDS):
+        left = 1.0 - 2.0 * tilt * weight
+        excess = float(np.sum(weight / left)) - total
+        if excess > 0.0:
+            high = tilt
+        else:
+            low = tilt
+        step = excess / (2.0 * float(np.sum((weight / left) ** 2)))
+        trial = tilt - step
+        if not low < trial < high:
+            # Newton's step leaves what is possible: halve what is.
+            if math.isinf(low) or math.isinf(high):
+                trial = 2.0 * tilt - math.copysign(1.0 / (abs(weight).max()), excess)
+            else:
+                trial = 0.5 * (low + high)
+        if abs(trial - tilt) < 1e-12 * max(abs(trial), 1e-3 / abs(weight).max()):
+            return trial
+        tilt = trial
+    return tilt
+
+
+def _upper_tail(z: float) -> float:
+    """P(a standard normal number > z)."""
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
