@@ -42,14 +42,14 @@ check: .venv/installed
 	$(RUN) snakefmt --check Snakefile workflow
 	$(RUN) snakemake --lint
 
-.venv/installed: pyproject.toml constraints.txt
+.venv/installed: pyproject.toml challenge/pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]" --editable ./challenge
 	$(BIN)/python -m pendpipe.warm_up
 	touch $@
 
 .venv/installed-bench: .venv/installed
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]" --editable ./challenge
 	touch $@
 
 clean:

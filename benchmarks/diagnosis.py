@@ -23,10 +23,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+import pendpipe_challenge
 from benchmarks.diagnosis_pairs import over_one
 from benchmarks.diagnosis_table import BESIDE, table
-from pendpipe.challenge.workers import workers
 from pendpipe.provenance import code_version
+from pendpipe_challenge.sets import process_pool
 
 JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
 PAGE: Final = Path("docs/diagnosis.md")
@@ -62,7 +63,7 @@ class Case(NamedTuple):
 
 def cases(part: float, nulls: int | None = None) -> Iterator[Case]:
     """All recordings of the evidence, or a part of each kind (nulls may be given by number)."""
-    from pendpipe.challenge.items import outside_names
+    from pendpipe_challenge.items import outside_names
 
     def numbers(whole: int) -> range:
         return range(max(1, round(part * whole)))
@@ -88,7 +89,7 @@ def seed_of(case: Case) -> list[int]:
 
 def made(case: Case) -> Any:
     """Make a recording, with its truth."""
-    from pendpipe.challenge.items import make_null, make_outside, make_pair, make_single
+    from pendpipe_challenge.items import make_null, make_outside, make_pair, make_single
 
     random = np.random.default_rng(seed_of(case))
     if case.family == "null":
@@ -106,12 +107,12 @@ def diagnosed(case: Case) -> dict[str, Any]:
     """Make and diagnose one recording."""
     import tempfile
 
-    from pendpipe.challenge.recordings import write_recording
     from pendpipe.diagnose.run import diagnose_recording
     from pendpipe.dynamics.any_law import NoMotionError
     from pendpipe.errors import InputError
     from pendpipe.process import keep_memory
     from pendpipe.recording import read_plain
+    from pendpipe_challenge.recordings import write_recording
 
     keep_memory()  # as the command does
     entry: dict[str, Any] = {"key": case.key, "family": case.family, "names": case.names,
@@ -149,7 +150,7 @@ def diagnosed(case: Case) -> dict[str, Any]:
 
 def _inside(truth: dict[str, Any], effects: Any) -> list[bool]:
     """Whether 95 % intervals hold the parameters, where the catalogue's own law was named."""
-    from pendpipe.challenge.pulls import expected
+    from pendpipe_challenge.measures import expected
 
     if truth["family"] != "single" or not truth["effects"][0]["own_form"] or not effects:
         return []
@@ -195,10 +196,10 @@ def _peers(item: Any) -> dict[str, Any]:
 @cache
 def code() -> str:
     """Digest of what makes the recordings, diagnoses them, and says what is right."""
-    modules = ("pendpipe.diagnose.run", "pendpipe.challenge.items")
-    digest = hashlib.sha256("".join(map(code_version, modules)).encode())
-    for name in ("diagnosis.py", "diagnosis_pairs.py", "peers_diagnosis.py"):
-        digest.update(Path(__file__).with_name(name).read_bytes())
+    digest = hashlib.sha256(code_version("pendpipe.diagnose.run").encode())
+    here = [Path(__file__), Path(__file__).with_name("peers_diagnosis.py")]
+    for path in [*here, *sorted(Path(pendpipe_challenge.__file__).parent.glob("*.py"))]:
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
@@ -216,7 +217,7 @@ def run(part: float, processes: int, nulls: int | None = None) -> list[dict[str,
     known, version = kept(), code()
     wanted = list(cases(part, nulls))
     todo = [case for case in wanted if case.key not in known]
-    with workers(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
+    with process_pool(processes) as pool, JOURNAL.open("a", encoding="utf-8") as journal:
         made_by = [pool.submit(diagnosed, case) for case in todo]
         for done, outcome in enumerate(as_completed(made_by), start=1):
             entry = {**outcome.result(), "code": version}

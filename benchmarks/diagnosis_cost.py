@@ -19,11 +19,11 @@ import numpy as np
 
 from benchmarks.diagnosis import EFFECTS
 from benchmarks.table import Row, at_most, write
-from pendpipe.challenge.workers import workers
+from pendpipe_challenge.sets import process_pool
 
 if TYPE_CHECKING:
-    from pendpipe.challenge.scenario import Scenario
     from pendpipe.recording import Recording
+    from pendpipe_challenge.scenario import Scenario
 
 ASKED_S: Final = {4000: 2.0, 32768: 10.0}
 """CPU seconds that a recording of so many readings may cost."""
@@ -51,11 +51,11 @@ def recorded(samples: int, hidden: str, number: int) -> tuple[Recording, float]:
     import tempfile
     from pathlib import Path
 
-    from pendpipe.challenge.recordings import write_recording
-    from pendpipe.challenge.registry import hide
-    from pendpipe.challenge.scenario import draw_scenario
-    from pendpipe.challenge.sizing import size
     from pendpipe.recording import read_plain
+    from pendpipe_challenge.catalogue import hide
+    from pendpipe_challenge.recordings import write_recording
+    from pendpipe_challenge.scenario import draw_scenario
+    from pendpipe_challenge.sizing import size
 
     random = np.random.default_rng([samples, number, *map(ord, hidden)])
     while True:
@@ -83,7 +83,7 @@ def cost(samples: int, hidden: str, number: int) -> Cost:
     taken = time.process_time() - began
     peer = None
     if importlib.util.find_spec("pysindy"):
-        from pendpipe.challenge.sindy import by_sindy
+        from pendpipe_challenge.peers import by_sindy
 
         began = time.process_time()
         with warnings.catch_warnings():
@@ -95,7 +95,7 @@ def cost(samples: int, hidden: str, number: int) -> Cost:
 
 def costs() -> Iterator[Cost]:
     """All recordings in one process, one after the other; the first is not counted."""
-    with workers(1) as pool:
+    with process_pool(1) as pool:
         pool.submit(cost, 4000, EFFECTS[0], 99).result()
         for samples in ASKED_S:
             for number in range(NULLS):

@@ -37,7 +37,7 @@ def _by_size(singles: Sequence[Outcome]) -> str:
 
 
 def _power(singles: Sequence[Outcome]) -> dict[str, Any]:
-    from pendpipe.challenge.intervals import power_ratio
+    from pendpipe_challenge.intervals import power_ratio
 
     sizes = np.array([entry["size"] for entry in singles])
     ours, best = (

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.challenge.sindy import Judgement, by_sindy
+from pendpipe_challenge.peers import Judgement, by_sindy
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -39,7 +39,7 @@ def fit_eq8(time_s: FloatArray, angle_rad: FloatArray, noise_rad: float) -> Base
     """Least squares with central differences; losses stay at or above nought."""
     from scipy.optimize import least_squares
 
-    from pendpipe.challenge.motion import Motion, Track
+    from pendpipe_challenge.motion import Motion, Track
 
     span = float(time_s[-1] - time_s[0])
     swing = angle_rad - np.median(angle_rad)

@@ -19,11 +19,10 @@ import numpy as np
 
 from benchmarks.diagnosis import SIZES, Case, seed_of
 from pendpipe.arrays import FloatArray
-from pendpipe.challenge.intervals import power_ratio
-from pendpipe.challenge.item import judge
-from pendpipe.challenge.singles import draw_sized
-from pendpipe.challenge.sizing import Sized
-from pendpipe.challenge.workers import workers
+from pendpipe_challenge.intervals import power_ratio
+from pendpipe_challenge.items import draw_sized, judge
+from pendpipe_challenge.sets import process_pool
+from pendpipe_challenge.sizing import Sized
 
 SLOW: Final = ("offset-drift", "equilibrium-creep", "equilibrium-step")
 STEEPNESS: Final = (0.3, 0.6, 0.9, 1.2, 1.5)
@@ -144,7 +143,7 @@ def main() -> None:
     for name in SLOW:
         cases = [Case("single", (name,), size, number)
                  for number in range(arguments.count) for size in SIZES]  # fmt: skip
-        with workers(arguments.processes) as pool:
+        with process_pool(arguments.processes) as pool:
             told = list(zip(cases, pool.map(answered, cases), strict=True))
         known = [(case.size, answer) for case, answer in told if answer is not None]
         print(row(name, known), flush=True)

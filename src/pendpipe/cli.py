@@ -2,7 +2,8 @@
 
 Every command is a module of `pendpipe.commands` with two functions,
 ``add_arguments(parser)`` and ``run(arguments) -> int``. Only the module of the command
-that was asked for is imported, since a job's cost is its imports.
+that was asked for is imported, since a job's cost is its imports. Other packages add commands
+by entry points of the group ``pendpipe.commands``.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from pendpipe.errors import InputError
 from pendpipe.process import one_thread
 from pendpipe.version import __version__
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 COMMANDS: Final = {
     "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
@@ -29,7 +33,6 @@ COMMANDS: Final = {
     "fit": "a, b, c and the rest of one recording",
     "diagnose": "what physics was left out: located, named, modelled",
     "diagnose-campaign": "the same over a campaign's records (not available yet)",
-    "challenge": "conceal effects in recordings, have them diagnosed, open and score",
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
     "figures": "the figures 3 to 10 of a campaign",
@@ -38,6 +41,9 @@ COMMANDS: Final = {
     "effects": "the catalogue of what may have been left out",
 }
 """The commands with the line that ``--help`` shows for each."""
+
+IN_A_CLONE: Final = {"challenge": "pip install --editable ./challenge"}
+"""Commands of packages beside the library, and what installs each in a clone."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -49,15 +55,36 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {line}; see {self.prog} --help\n")
 
 
-def _list_of_commands() -> str:
-    width = max(map(len, COMMANDS)) + 2
-    return "\n".join(f"  {name:<{width}}{text}" for name, text in COMMANDS.items())
+def _added() -> dict[str, EntryPoint]:
+    """The commands that other packages add."""
+    from importlib.metadata import entry_points
+
+    return {found.name: found for found in entry_points(group="pendpipe.commands")}
+
+
+def _descriptions() -> dict[str, str]:
+    """All commands with a line about each; an added one's is the first of its module."""
+    added = {name: (found.load().__doc__ or "").splitlines() for name, found in _added().items()}
+    return COMMANDS | {name: lines[0].rstrip(".") for name, lines in added.items() if lines}
+
+
+def _module_of(name: str) -> Any:
+    """The module of a command; None where there is no such command."""
+    if name in COMMANDS:
+        return importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
+    if (found := _added().get(name)) is not None:
+        return found.load()
+    if name in IN_A_CLONE:
+        raise InputError(
+            name, "this command is not installed", f"in a clone of pendpipe: {IN_A_CLONE[name]}"
+        )
+    return None
 
 
 def _parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
-    if argv and argv[0] in COMMANDS:
-        module = importlib.import_module(f"pendpipe.commands.{argv[0].replace('-', '_')}")
+    module = _module_of(argv[0]) if argv else None
+    if module is not None:
         parser = _Parser(
             prog=f"pendpipe {argv[0]}",
             description=module.__doc__,
@@ -67,14 +94,18 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         arguments = parser.parse_args(argv[1:])
         arguments.run = module.run
         return arguments
+    # Looking for added commands takes longer than all the rest.
+    descriptions = COMMANDS if list(argv) == ["--version"] else _descriptions()
+    width = max(map(len, descriptions)) + 2
+    listed = "\n".join(f"  {name:<{width}}{text}" for name, text in descriptions.items())
     parser = _Parser(
         prog="pendpipe",
         description=(__import__("pendpipe").__doc__ or "").splitlines()[0],
-        epilog="commands (each has its own --help):\n" + _list_of_commands(),
+        epilog="commands (each has its own --help):\n" + listed,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"pendpipe {__version__}")
-    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="see below")
+    parser.add_argument("command", choices=descriptions, metavar="COMMAND", help="see below")
     return parser.parse_args(argv)
 
 
@@ -91,8 +122,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without Greek letters
     one_thread()
-    arguments = _parse(sys.argv[1:] if argv is None else argv)
     try:
+        arguments = _parse(sys.argv[1:] if argv is None else argv)
         return int(arguments.run(arguments))
     except InputError as fault:
         print(f"pendpipe: {fault}", file=sys.stderr)

@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pendpipe.challenge.causes import EXPLAINED, causes
-from pendpipe.challenge.page import page
-from pendpipe.challenge.registry import EFFECTS, hide
-from pendpipe.challenge.score import score
-from pendpipe.challenge.solved import read_items
+from pendpipe_challenge.answers import read_items
+from pendpipe_challenge.catalogue import EFFECTS, hide
+from pendpipe_challenge.page import page
+from pendpipe_challenge.score import EXPLAINED, causes, score
 
 from .test_scores import K3, answer, opened, truth
 
-REASONS = tomllib.loads(files("pendpipe.challenge").joinpath("reasons.toml").read_text("utf-8"))
+REASONS = tomllib.loads(files("pendpipe_challenge").joinpath("reasons.toml").read_text("utf-8"))
 
 
 def nulls(count: int = 4) -> list[tuple[dict[str, Any], dict[str, Any]]]:
@@ -110,8 +109,8 @@ def test_each_reason_is_on_the_page_once_and_only_where_its_cause_occurred() -> 
 
 def test_reasons_are_keyed_by_what_can_be_hidden() -> None:
     """By names and laws that the generator has."""
-    from pendpipe.challenge.hidden import OUTSIDE
-    from pendpipe.challenge.items import make_null
+    from pendpipe_challenge.hidden import OUTSIDE
+    from pendpipe_challenge.items import make_null
 
     random = np.random.default_rng(1)
     scenario = make_null(random).scenario

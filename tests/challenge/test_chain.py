@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.challenge.chain import Chain
-from pendpipe.challenge.filters import high_pass, play, with_turns
-from pendpipe.challenge.motion import Motion, Track
+from pendpipe_challenge.chain import Chain, high_pass, play, with_turns
+from pendpipe_challenge.motion import Motion, Track
 
 TIME = 0.02 * np.arange(3000)
 OMEGA = 5.0

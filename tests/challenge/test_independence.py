@@ -5,15 +5,15 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-import pendpipe.challenge
+import pendpipe_challenge
 
 FORBIDDEN = ("dynamics", "effects", "diagnose", "simulation", "analysis", "physics")
 
 
 def test_the_challenge_imports_nothing_that_it_judges() -> None:
-    folder = Path(pendpipe.challenge.__file__).parent
+    folder = Path(pendpipe_challenge.__file__).parent
     files = list(folder.rglob("*.py"))
-    assert len(files) > 20
+    assert len(files) > 15
     for path in files:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = []

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pendpipe.arrays import FloatArray
-from pendpipe.challenge.motion import Motion
+from pendpipe_challenge.motion import Motion
 
 OMEGA, AMPLITUDE = 5.6, 0.2
 LOSSES = {

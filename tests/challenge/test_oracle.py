@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.challenge.bench import Bench
-from pendpipe.challenge.items import make_null, make_outside, make_pair, make_single
-from pendpipe.challenge.noise import Noise, Whitening
-from pendpipe.challenge.registry import CATALOGUE, EFFECTS, hide
-from pendpipe.challenge.scenario import Scenario, draw_scenario
-from pendpipe.challenge.sizing import size
+from pendpipe_challenge.bench import Bench
+from pendpipe_challenge.catalogue import CATALOGUE, EFFECTS, hide
+from pendpipe_challenge.items import make_null, make_outside, make_pair, make_single
+from pendpipe_challenge.scenario import Noise, Scenario, Whitening, draw_scenario
+from pendpipe_challenge.sizing import size
 
 
 def scenario(seed: int = 1, **options: object) -> Scenario:

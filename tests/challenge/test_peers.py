@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from benchmarks import peers_diagnosis as peers
 
-from pendpipe.challenge import sindy
-from pendpipe.challenge.motion import Motion
-from pendpipe.challenge.recordings import intervals_s, plain_text
-from pendpipe.challenge.solved import read_items
+from pendpipe_challenge import peers as judges
+from pendpipe_challenge.answers import read_items
+from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.recordings import intervals_s, plain_text
 
 from .test_scores import answer, opened, truth
 
@@ -80,20 +80,20 @@ def test_the_peer_judges_the_first_nulls_and_singles_of_a_set(
 ) -> None:
     pytest.importorskip("pysindy", reason="pysindy is not installed (the bench extra)")
     items = read_items(kept_set(tmp_path))
-    found = sindy.sindy_scores(items, tmp_path)
+    found = judges.sindy_scores(items, tmp_path)
     assert (found["false_alarms"]["of"], found["detected"]["of"]) == (2, 1)
     assert found["top1"]["hits"] == 1
-    monkeypatch.setattr(sindy, "FIRST", 1)
-    assert sindy.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 1
-    monkeypatch.setattr(sindy, "PATIENCE_S", -1.0)
-    assert sindy.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 0
+    monkeypatch.setattr(judges, "FIRST", 1)
+    assert judges.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 1
+    monkeypatch.setattr(judges, "PATIENCE_S", -1.0)
+    assert judges.sindy_scores(items, tmp_path)["false_alarms"]["of"] == 0
 
 
 def test_a_peer_that_is_not_installed_is_told_of(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    assert "pendpipe[bench]" in sindy.sindy_scores([], tmp_path)["install"]
+    assert "pendpipe[bench]" in judges.sindy_scores([], tmp_path)["install"]
 
 
 def test_the_sampling_is_read_off_the_recordings(tmp_path: Path) -> None:

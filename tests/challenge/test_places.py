@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pendpipe.challenge import score_places
-from pendpipe.challenge.hidden_instrument import glitches
-from pendpipe.challenge.items import make_null
-from pendpipe.challenge.score_places import Place, true_place
-from pendpipe.challenge.solved import read_items
+from pendpipe_challenge import measures
+from pendpipe_challenge.answers import read_items
+from pendpipe_challenge.hidden_instrument import glitches
+from pendpipe_challenge.items import make_null
+from pendpipe_challenge.measures import Place, true_place
 
 from .test_scores import answer, opened, truth
 
@@ -34,7 +34,7 @@ def placed(
 
 def places(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> dict[str, Any]:
     content = opened(*pairs)
-    return score_places.places(read_items(content), dict.fromkeys(content["items"], INTERVAL_S))
+    return measures.places(read_items(content), dict.fromkeys(content["items"], INTERVAL_S))
 
 
 def test_an_instant_is_held_by_its_interval_or_not() -> None:

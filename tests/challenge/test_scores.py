@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pendpipe.challenge import intervals
-from pendpipe.challenge.cases import draw_cases
-from pendpipe.challenge.draw import draw
-from pendpipe.challenge.page import page
-from pendpipe.challenge.score import score
-from pendpipe.challenge.score_confidence import abstention
-from pendpipe.challenge.solved import read_items, six_cases
+from pendpipe_challenge import intervals
+from pendpipe_challenge.answers import read_items, six_cases
+from pendpipe_challenge.figures import draw, draw_cases
+from pendpipe_challenge.measures import abstention
+from pendpipe_challenge.page import page
+from pendpipe_challenge.score import score
 
 
 def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:

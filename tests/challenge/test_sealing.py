@@ -11,15 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.challenge import families, make, sealing
-from pendpipe.challenge.make import Places, make_set
-from pendpipe.challenge.opening import open_set
-from pendpipe.challenge.singles import make_null
-from pendpipe.challenge.solve import answer_path, solve_set
-from pendpipe.commands import challenge as command
 from pendpipe.errors import InputError
+from pendpipe_challenge import catalogue, command, items, sets
+from pendpipe_challenge.items import make_null
+from pendpipe_challenge.sets import Places, answer_path, make_set, open_set, solve_set
 
-ENTER = sealing.enter
+ENTER = sets.enter
 
 STUB = """
 import json, os, pathlib, sys
@@ -66,9 +63,9 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Places:
     root = tmp_path_factory.mktemp("challenge")
     places = Places(root / "open" / "set", root / "hidden" / "truth")
     patch = pytest.MonkeyPatch()
-    patch.setattr(make, "make_item", lambda recipe, random: make_null(random))
-    patch.setattr(make, "plan", lambda count, random, real: [{"family": "null"}] * count)
-    patch.setattr(make, "processes", Alone)
+    patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
+    patch.setattr(sets, "plan", lambda count, random, real: [{"family": "null"}] * count)
+    patch.setattr(sets, "process_pool", Alone)
     make_set(places, 3, seed=7)
     patch.undo()
     stub = root / "elsewhere" / "solver.py"
@@ -164,12 +161,12 @@ def test_a_set_opens_once_and_every_hash_is_checked(solved: Places) -> None:
 
 def test_the_ledger_holds_every_item_and_no_line_can_go(solved: Places, tmp_path: Path) -> None:
     ledger = solved.folder.parent / "ledger.jsonl"
-    assert sealing.check_ledger(ledger) == 3
+    assert sets.check_ledger(ledger) == 3
     copy = tmp_path / "ledger.jsonl"
     lines = ledger.read_text().splitlines(keepends=True)
     copy.write_text("".join([lines[0], lines[2]]))
     with pytest.raises(InputError, match="chain of hashes"):
-        sealing.check_ledger(copy)
+        sets.check_ledger(copy)
 
 
 def interrupted(*_: object) -> None:
@@ -181,20 +178,20 @@ def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path
     ledger = tmp_path / "ledger.jsonl"
     recipes = [{"family": "null"}] * 3
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(make, "make_item", lambda recipe, random: make_null(random))
-        patch.setattr(make, "plan", lambda count, random, real: recipes[:count])
-        patch.setattr(make, "processes", Alone)
+        patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
+        patch.setattr(sets, "plan", lambda count, random, real: recipes[:count])
+        patch.setattr(sets, "process_pool", Alone)
         # As if it had stopped between two items: made, and not entered.
-        patch.setattr(sealing, "enter", interrupted)
+        patch.setattr(sets, "enter", interrupted)
         with pytest.raises(KeyboardInterrupt):
             make_set(places, 3, seed=7)
         made = places.recording("item-0001").read_bytes()
-        patch.setattr(sealing, "enter", ENTER)
+        patch.setattr(sets, "enter", ENTER)
         make_set(places, 3, seed=7)
     assert places.recording("item-0001").read_bytes() == made
-    assert sealing.check_ledger(ledger) == 3
-    assert sealing.entered(ledger, "set") == {"item-0001", "item-0002", "item-0003"}
-    assert sealing.entered(ledger, "another") == set()
+    assert sets.check_ledger(ledger) == 3
+    assert sets.entered(ledger, "set") == {"item-0001", "item-0002", "item-0003"}
+    assert sets.entered(ledger, "another") == set()
 
 
 def test_the_same_seed_makes_the_same_recording() -> None:
@@ -214,20 +211,20 @@ def test_an_unsolved_set_is_not_opened(tmp_path: Path) -> None:
 
 
 def test_a_salt_hides_what_was_hashed() -> None:
-    assert sealing.salted({"a": 1}, "x") != sealing.salted({"a": 1}, "y")
-    assert sealing.salted({"a": 1, "b": 2}, "x") == sealing.salted({"b": 2, "a": 1}, "x")
+    assert sets.salted({"a": 1}, "x") != sets.salted({"a": 1}, "y")
+    assert sets.salted({"a": 1, "b": 2}, "x") == sets.salted({"b": 2, "a": 1}, "x")
 
 
 def test_the_plan_has_a_third_nulls_and_many_instrument_decoys() -> None:
-    recipes = families.plan(600, np.random.default_rng(0), real=1000)
+    recipes = items.plan(600, np.random.default_rng(0), real=1000)
     assert len(recipes) == 600
-    count = {f: sum(r["family"] == f for r in recipes) for f in families.SHARES}
+    count = {f: sum(r["family"] == f for r in recipes) for f in items.SHARES}
     assert count["null"] >= 200
-    assert all(count[family] >= 25 for family in families.SHARES)
+    assert all(count[family] >= 25 for family in items.SHARES)
     singles = [r for r in recipes if r["family"] == "single"]
-    decoys = [r for r in singles if r["effects"][0] in families.MEASUREMENT]
+    decoys = [r for r in singles if r["effects"][0] in catalogue.MEASUREMENT]
     assert len(decoys) >= 0.35 * len(singles)
-    assert {size for r in singles for size in r["delta_chi2"]} == set(families.SIZES)
+    assert {size for r in singles for size in r["delta_chi2"]} == set(items.SIZES)
     assert any(r["cancelling"] for r in recipes if r["family"] == "combination")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.unknown_colour import STRENGTHS, likelihoods
 
-from pendpipe.challenge.noise import Noise
+from pendpipe_challenge.scenario import Noise
 
 TIME_S = np.arange(300) * 0.5
 NOISE = Noise(white_sd=2e-4, alpha=1.2)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.challenge.workers import workers
+from pendpipe_challenge.sets import process_pool
 
 TASKS = Path("/proc/self/task")
 
@@ -19,7 +19,7 @@ def test_linear_algebra_in_a_worker_takes_one_thread(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    with workers(1) as pool:
+    with process_pool(1) as pool:
         pool.submit(np.linalg.inv, np.eye(400)).result()
         assert len(pool.submit(os.listdir, str(TASKS)).result()) == 1
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"

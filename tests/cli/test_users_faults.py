@@ -91,7 +91,6 @@ def test_a_place_that_cannot_be_written_is_the_users_fault(
         (["diagnose", "f.csv"], "--out"),
         (["diagnose", "f.csv", "--out", "d", "--level", "x"], "'x' is no number"),
         (["diagnose", "f.csv", "--out", "d", "--level", "2"], "between 0 and 1"),
-        (["challenge", "make", "d", "--sealed", "s", "--items", "x"], "'x' is no whole number"),
         (["fit", "f.csv", "--out", "o", "--start", "x"], "--start"),
     ],
 )

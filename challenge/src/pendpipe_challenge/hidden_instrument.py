@@ -1,0 +1,379 @@
+"""Hidden faults of the measurement: sensor, amplifier, clock, converter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pendpipe_challenge.hidden import Hidden, amplitude, either_sign, law, reading
+from pendpipe_challenge.scenario import Scenario
+
+Random = np.random.Generator
+
+
+@law("sensor-quadratic")
+def square(r: Random, s: Scenario) -> Hidden:
+    """s2 x^2."""
+    return reading(
+        s, "sensor-quadratic", "x^2", "square", either_sign(r) * s.sd_rad / amplitude(s) ** 2
+    )
+
+
+@law("sensor-quadratic")
+def leaning(r: Random, s: Scenario) -> Hidden:
+    """A capacitor whose moving plate does not rest in the middle."""
+    found = reading(
+        s,
+        "sensor-quadratic",
+        "plates",
+        "plates",
+        s.sd_rad / amplitude(s) ** 2,
+        own=False,
+        lean=either_sign(r) * 0.4,
+    )
+    return replace(found, largest=0.4 / amplitude(s))
+
+
+@law("sensor-cubic")
+def cubic(r: Random, s: Scenario) -> Hidden:
+    """s3 x^3."""
+    return reading(s, "sensor-cubic", "x^3", "cubic", either_sign(r) * s.sd_rad / amplitude(s) ** 3)
+
+
+@law("sensor-cubic")
+def plates(_: Random, s: Scenario) -> Hidden:
+    """A differential capacitor: (C1 - C2)/(C1 + C2) with parallel plates and strays."""
+    found = reading(s, "sensor-cubic", "plates", "plates", 0.1 / amplitude(s), own=False)
+    return replace(found, growth=4.0, largest=0.9 / amplitude(s))
+
+
+@law("sensor-cubic")
+def saturating(_: Random, s: Scenario) -> Hidden:
+    """A sensor whose field weakens off its centre (tanh)."""
+    return reading(s, "sensor-cubic", "tanh", "logistic", s.sd_rad / amplitude(s) ** 3, own=False)
+
+
+@law("sensor-backlash")
+def coupling(_: Random, s: Scenario) -> Hidden:
+    """Play between axis and sensor."""
+    return reading(s, "sensor-backlash", "play", "play_rad", s.sd_rad)
+
+
+@law("sensor-backlash")
+def elastic(_: Random, s: Scenario) -> Hidden:
+    """A coupling that gives before it slips."""
+    return reading(s, "sensor-backlash", "elastic slip", "elastic_play_rad", s.sd_rad, own=False)
+
+
+@law("offset-drift")
+def drift(r: Random, s: Scenario) -> Hidden:
+    """Straight."""
+    volts = s.sd_rad * s.chain.volts_per_radian
+    return reading(
+        s, "offset-drift", "straight", "drift_volts_s", either_sign(r) * volts / s.span_s
+    )
+
+
+@law("offset-drift")
+def warm_up(r: Random, s: Scenario) -> Hidden:
+    """An amplifier that warms up."""
+    volts = s.sd_rad * s.chain.volts_per_radian
+    return reading(
+        s,
+        "offset-drift",
+        "warm-up",
+        "warm_up_volts",
+        either_sign(r) * volts,
+        own=False,
+        warm_up_s=float(r.uniform(0.1, 0.5)) * s.span_s,
+    )
+
+
+@law("offset-drift")
+def walk(r: Random, s: Scenario) -> Hidden:
+    """It wanders."""
+    knots = np.cumsum(r.standard_normal(6))
+    volts = s.sd_rad * s.chain.volts_per_radian
+
+    def build(base: Scenario, size: float) -> Scenario:
+        return base.with_chain(walk_volts=tuple((size * knots).tolist()))
+
+    return Hidden("offset-drift", "wandering", build, volts, False, s, parameter="step_volts")
+
+
+@law("gain-drift")
+def gain(r: Random, s: Scenario) -> Hidden:
+    """Straight."""
+    found = reading(s, "gain-drift", "straight", "gain_drift", either_sign(r) * 1e-2 / s.span_s)
+    return replace(found, largest=0.5 / s.span_s)
+
+
+@law("gain-drift")
+def gain_relaxing(r: Random, s: Scenario) -> Hidden:
+    """With the amplifier's temperature."""
+    tau = float(r.uniform(0.15, 0.5)) * s.span_s
+    found = reading(
+        s, "gain-drift", "relaxing", "gain_drift", either_sign(r) * 1e-2 / tau, gain_drift_s=tau
+    )
+    return replace(found, largest=0.5 / tau)
+
+
+@law("ac-coupling")
+def ac(r: Random, s: Scenario) -> Hidden:
+    """A capacitor in the way; the level it takes away must not be nought."""
+    offset = either_sign(r) * s.chain.volts_per_radian * amplitude(s) * 0.1
+    offset += s.chain.offset_volts
+    prepared = s.with_chain(offset_volts=offset)
+
+    def build(base: Scenario, rate: float) -> Scenario:
+        return base.with_chain(ac_time_s=1.0 / rate)
+
+    return Hidden(
+        "ac-coupling",
+        "RC",
+        build,
+        1e-4 / s.span_s,
+        True,
+        prepared,
+        largest=s.omega / 3.0,
+        parameter="rate",
+    )
+
+
+def _tone(r: Random, s: Scenario, second: float, name: str) -> Hidden:
+    nyquist = 0.5 / s.interval_s
+    line = s.omega / 2 / np.pi
+    hertz = float(r.uniform(0.15 * line, nyquist))
+    while min(abs(hertz - k * line) for k in (1, 2, 3, 5)) < 0.1 * line:
+        hertz = float(r.uniform(0.15 * line, nyquist))
+    volts = s.sd_rad * s.chain.volts_per_radian
+    return reading(
+        s,
+        "tone-pickup",
+        name,
+        "tone_volts",
+        volts,
+        own=second == 0.0,
+        tone_hz=hertz,
+        tone_phase=float(r.uniform(0, 2 * np.pi)),
+        tone_second=second,
+    )
+
+
+@law("tone-pickup")
+def tone(r: Random, s: Scenario) -> Hidden:
+    """Mains or its alias."""
+    return _tone(r, s, 0.0, "cosine")
+
+
+@law("tone-pickup")
+def hum(r: Random, s: Scenario) -> Hidden:
+    """With a harmonic."""
+    return _tone(r, s, 0.3, "with harmonic")
+
+
+def _peaks(s: Scenario) -> tuple[float, float]:
+    volts = s.chain.volts(s.track(), s.samples)
+    return float(volts.max()), float(volts.min())
+
+
+@law("clipping")
+def clipped(r: Random, s: Scenario) -> Hidden:
+    """A limit below the first peaks, on one side or on both."""
+    high, low = _peaks(s)
+    both = r.random() < 0.6
+
+    def build(base: Scenario, share: float) -> Scenario:
+        limits = {"clip_high_volts": high * (1.0 - share)}
+        if both:
+            limits["clip_low_volts"] = low * (1.0 - share)
+        return base.with_chain(**limits)
+
+    return Hidden(
+        "clipping", "hard", build, 0.01, True, s, growth=3.5, largest=0.7, parameter="share"
+    )
+
+
+@law("clipping")
+def saturated(_: Random, s: Scenario) -> Hidden:
+    """An amplifier that rounds the peaks on one side."""
+    high, _low = _peaks(s)
+
+    def build(base: Scenario, share: float) -> Scenario:
+        return base.with_chain(clip_high_volts=high * (1.0 - share), soft_clip=0.02 * high)
+
+    return Hidden(
+        "clipping", "soft", build, 0.01, False, s, growth=3.0, largest=0.7, parameter="share"
+    )
+
+
+@law("missing-codes")
+def missing(_: Random, s: Scenario) -> Hidden:
+    """Codes that the converter never gives; the next one gets their readings."""
+    volts = s.chain.volts(s.track(), s.samples)
+    used, count = np.unique(np.rint(volts / s.chain.step_volts).astype(int), return_counts=True)
+
+    def build(base: Scenario, number: float) -> Scenario:
+        # The busiest codes that together hold about so many readings.
+        left, wanted = number, list[int]()
+        for at in np.argsort(-count, kind="stable"):
+            if count[at] <= left or (not wanted and at == np.argmin(count)):
+                wanted.append(int(used[at]))
+                left -= count[at]
+        return base.with_chain(missing_codes=tuple(sorted(wanted)))
+
+    return Hidden(
+        "missing-codes",
+        "skipped",
+        build,
+        5.0,
+        True,
+        s,
+        sized="codes",
+        growth=1.0,
+        largest=300.0,
+        parameter="readings",
+    )
+
+
+@law("missing-codes")
+def comb(r: Random, s: Scenario) -> Hidden:
+    """A faulty bit: every so many codes one is missing."""
+    volts = s.chain.volts(s.track(), s.samples)
+    code = np.rint(volts / s.chain.step_volts).astype(int)
+    phase = int(r.integers(0, 128))
+
+    def build(base: Scenario, number: float) -> Scenario:
+        spacing = 2 ** max(2, 8 - round(number))
+        first = int(code.min()) + 1 + (phase - int(code.min()) - 1) % spacing
+        return base.with_chain(missing_codes=tuple(range(first, int(code.max()), spacing)))
+
+    return Hidden(
+        "missing-codes",
+        "comb",
+        build,
+        1.0,
+        False,
+        s,
+        sized="codes",
+        growth=3.0,
+        largest=6.0,
+        parameter="comb",
+    )
+
+
+@law("coarse-quantisation")
+def coarse(r: Random, s: Scenario) -> Hidden:
+    """Low bits that do not move."""
+    dead = int(r.integers(2, 5))
+
+    def build(base: Scenario, _: float) -> Scenario:
+        return base.with_chain(dead_bits=dead)
+
+    return Hidden(
+        "coarse-quantisation",
+        "dead bits",
+        build,
+        1.0,
+        True,
+        s,
+        sized="fixed",
+        parameter="on",
+        details={"dead_bits": float(dead)},
+    )
+
+
+@law("clock-drift")
+def clock(r: Random, s: Scenario) -> Hidden:
+    """Straight."""
+    return reading(s, "clock-drift", "straight", "clock_drift", either_sign(r) * 1e-4 / s.span_s)
+
+
+@law("clock-drift")
+def clock_relaxing(r: Random, s: Scenario) -> Hidden:
+    """A crystal that warms up."""
+    tau = float(r.uniform(0.15, 0.5)) * s.span_s
+    return reading(
+        s, "clock-drift", "relaxing", "clock_drift", either_sign(r) * 1e-4 / tau, clock_drift_s=tau
+    )
+
+
+@law("jitter")
+def jitter(_: Random, s: Scenario) -> Hidden:
+    """Samples at uncertain moments."""
+    size = 0.5 * s.sd_rad / (s.omega * amplitude(s))
+    found = reading(s, "jitter", "Gaussian", "jitter_s", size)
+    return replace(found, sized="variance", growth=4.0)
+
+
+@law("dropped-samples")
+def dropped(r: Random, s: Scenario) -> Hidden:
+    """One to three samples lost at one place, or one repeated."""
+    at = int(r.uniform(0.1, 0.9) * s.samples)
+    lost = int(r.choice([1, 1, 2, 3, -1]))
+
+    def build(base: Scenario, _: float) -> Scenario:
+        return base.with_chain(dropped=((at, lost),))
+
+    return Hidden(
+        "dropped-samples",
+        "lost" if lost > 0 else "repeated",
+        build,
+        1.0,
+        True,
+        s,
+        sized="fixed",
+        parameter="on",
+        details={"sample": float(at), "lost": float(lost)},
+    )
+
+
+@law("glitches")
+def glitches(r: Random, s: Scenario) -> Hidden:
+    """One to four wild samples."""
+    number = int(r.integers(1, 5))
+    places = np.sort(r.choice(np.arange(20, s.samples - 20), number, replace=False))
+    shares = r.choice([-1.0, 1.0], number) * r.uniform(0.7, 1.3, number)
+    volts = s.sd_rad * s.chain.volts_per_radian
+
+    def build(base: Scenario, size: float) -> Scenario:
+        wild = tuple(
+            (int(at), float(size * share)) for at, share in zip(places, shares, strict=True)
+        )
+        return base.with_chain(glitches=wild)
+
+    told = {f"sample_{i}": float(at) for i, at in enumerate(places, 1)}
+    return Hidden(
+        "glitches",
+        "single samples",
+        build,
+        5.0 * volts,
+        True,
+        s,
+        parameter="volts",
+        details={"number": float(number), **told},
+    )
+
+
+@law("coloured-noise")
+def coloured(r: Random, s: Scenario) -> Hidden:
+    """Red noise up to a third of the pendulum's frequency, far above what is usual."""
+    corner = 0.3 * s.omega / 2 / np.pi
+    alpha = float(r.uniform(1.0, 2.0))
+
+    def build(base: Scenario, _: float) -> Scenario:
+        return replace(base, noise=replace(base.noise, alpha=alpha, corner_hz=corner))
+
+    white = replace(s, noise=replace(s.noise, alpha=0.0))
+    return Hidden(
+        "coloured-noise",
+        "red",
+        build,
+        1.0,
+        True,
+        white,
+        sized="fixed",
+        parameter="on",
+        details={"alpha": alpha, "corner_hz": corner},
+    )
