@@ -1,4 +1,4 @@
-"""The name that is reported is the likeliest in the end, whatever was taken first."""
+"""The name that is reported is the likelier in the end, whatever was taken first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pendpipe.diagnose import diagnose_recording, likeliest
+from pendpipe.diagnose import diagnose_recording, likelier
 from pendpipe.diagnose.likelier import swap_in_likelier
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.run import Outcome
@@ -103,7 +103,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
         curve = [mate for mate in found.mates if mate.identifier == "unnamed-restoring"]
         return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
 
-    monkeypatch.setattr(likeliest, "weigh", weighed)
+    monkeypatch.setattr(likelier, "weigh", weighed)
     outcome = diagnosed("circular-error")
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert [effect.identifier for effect in found.improved.model.effects] == [leads]
@@ -138,7 +138,7 @@ def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
     first = outcome.search.steps[0]
     other = first.rivals[1]
     monkeypatch.setattr(
-        likeliest, "_likeliest", lambda _, step, __: other if step is first else None
+        likelier, "_likeliest", lambda _, step, __: other if step is first else None
     )
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert found.steps[0].winner is other
