@@ -1,4 +1,4 @@
-"""The command line: it picks a command and turns faults into one line and a status.
+"""The command line: it picks a command and turns user errors into one line and a status.
 
 Every command is a module of `pendpipe.commands` with two functions,
 ``add_arguments(parser)`` and ``run(arguments) -> int``. Only the module of the command
@@ -9,6 +9,7 @@ by entry points of the group ``pendpipe.commands``.
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import io
 import os
@@ -41,6 +42,16 @@ COMMANDS: Final = {
     "effects": "the catalogue of what may have been left out",
 }
 """The commands with the line that ``--help`` shows for each."""
+
+FIRST_STEPS: Final = """\
+pendpipe analyses free decays of pendulums. With a recording in FILE:
+
+  pendpipe inspect FILE                       what the file holds
+  pendpipe fit FILE                           a, b, c, Q and the period
+  pendpipe diagnose FILE --out diagnosis      what physics is missing from the fit
+
+Without a recording: pendpipe acquire --device simulated:di2108 --duration 20 --out try.csv
+All commands: pendpipe --help"""
 
 IN_A_CLONE: Final = {"challenge": "pip install --editable ./challenge"}
 """Commands of packages beside the library, and what installs each in a clone."""
@@ -96,6 +107,10 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         return arguments
     # Looking for added commands takes longer than all the rest.
     descriptions = COMMANDS if list(argv) == ["--version"] else _descriptions()
+    if argv and not argv[0].startswith("-"):
+        close = difflib.get_close_matches(argv[0], descriptions, n=1)
+        hint = f"did you mean 'pendpipe {close[0]}'?" if close else "pendpipe --help lists them"
+        raise InputError(argv[0], "there is no such command", hint)
     width = max(map(len, descriptions)) + 2
     listed = "\n".join(f"  {name:<{width}}{text}" for name, text in descriptions.items())
     parser = _Parser(
@@ -105,8 +120,16 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"pendpipe {__version__}")
-    parser.add_argument("command", choices=descriptions, metavar="COMMAND", help="see below")
-    return parser.parse_args(argv)
+    parser.add_argument("command", nargs="?", metavar="COMMAND", help="see below")
+    arguments = parser.parse_args(argv)
+    arguments.run = _first_steps
+    return arguments
+
+
+def _first_steps(_: argparse.Namespace) -> int:
+    """Show somebody who gave no command where to begin."""
+    print(FIRST_STEPS)
+    return 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:

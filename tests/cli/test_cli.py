@@ -24,11 +24,16 @@ def test_every_command_has_its_module_and_its_help(
     assert (module.__doc__ or "").splitlines()[0] in shown
 
 
-def test_an_unknown_command_is_a_usage_fault(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        cli.main(["inspekt"])
-    assert ended.value.code == 2
-    assert "inspekt" in capsys.readouterr().err
+def test_a_mistyped_command_gets_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspekt"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "did you mean 'pendpipe inspect'?" in err
+
+
+def test_no_arguments_show_where_to_begin(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert "pendpipe fit FILE" in capsys.readouterr().out
 
 
 def test_a_users_fault_is_one_line_and_status_2(
