@@ -25,14 +25,14 @@ def test_every_command_has_its_module_and_its_help(
 
 
 def test_a_mistyped_command_gets_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspekt"]) == 2
+    assert cli.main(["inspekt"]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert "did you mean 'pendpipe inspect'?" in err
 
 
 def test_no_arguments_show_where_to_begin(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([]) == 0
+    assert cli.main([]) == 0
     assert "pendpipe fit FILE" in capsys.readouterr().out
 
 
