@@ -1,6 +1,6 @@
 """Real recordings through the whole tool: the table of ``docs/recordings.md``.
 
-    snakemake --cores 2 --configfile config/recordings.yaml
+    snakemake --cores 2 --configfile benchmarks/shared_recordings.yaml
     python -m benchmarks.recordings
 
 The known times are those of the recordings' own README (``../shared/recordings``).
@@ -16,7 +16,7 @@ from benchmarks.recordings_diagnosis import diagnose_viscous, section
 from pendpipe.files import read_json
 
 ROOT = Path(__file__).parents[1]
-RESULTS = ROOT / "results/recordings"
+RESULTS = ROOT / "results/shared-recordings"
 KNOWN = {
     "adip": "free after t = 2 s (rest and hand pull before)",
     "dataset4": "free from t = 12.8 s (rest and hand lift before), to rest",
@@ -41,7 +41,7 @@ Recordings that others made, each through the whole tool with its path alone: no
 stop time, no layout, no unit is told. Made by
 
 ```sh
-snakemake --cores 2 --configfile config/recordings.yaml
+snakemake --cores 2 --configfile benchmarks/shared_recordings.yaml
 python -m benchmarks.recordings
 ```
 

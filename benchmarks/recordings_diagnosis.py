@@ -85,7 +85,7 @@ def diagnose_viscous(root: Path, results: Path) -> None:
     import subprocess
     import sys
 
-    with (root / "config/recordings.tsv").open(encoding="utf-8") as stream:
+    with (root / "benchmarks/shared_recordings.tsv").open(encoding="utf-8") as stream:
         rows = [line.split("\t") for line in stream if not line.startswith("#")]
     source = {cells[0]: cells[1] for cells in rows}
     for name in VISCOUS:

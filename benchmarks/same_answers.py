@@ -3,7 +3,7 @@
     python -m benchmarks.same_answers --code CHECKOUT --out old.json   answers of another checkout
     python -m benchmarks.same_answers --out new.json --against old.json
 
-`pendpipe fit` and `pendpipe diagnose` answer every recording of ``config/recordings.tsv`` and
+`pendpipe fit` and `pendpipe diagnose` answer every recording of ``benchmarks/shared_recordings.tsv`` and
 the items of a challenge set (``--set FOLDER``, made by ``pendpipe challenge make``). Answers
 that stand in OUT already are kept, so an interrupted run goes on. The comparison prints each
 difference: exit status, verdict, names, class, and values by more than 0.1 of their errors.
@@ -31,7 +31,7 @@ LONGEST_S = 600
 
 def sources(challenge_set: Path | None) -> Iterator[tuple[str, Path]]:
     """Each recording with a name that stays the same on another machine."""
-    table = ROOT / "config" / "recordings.tsv"
+    table = ROOT / "benchmarks" / "shared_recordings.tsv"
     rows = [line for line in table.read_text().splitlines() if not line.startswith("#")]
     for row in csv.DictReader(rows, delimiter="\t"):
         path = (ROOT / row["source"]).resolve()

@@ -46,9 +46,9 @@ def test_the_default_campaign_has_a_job_a_record_in_each_of_its_stages(
 
 def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
-    done = dry_run(tmp_path / "results", "--configfile", "config/recordings.yaml")
+    done = dry_run(tmp_path / "results", "--configfile", "benchmarks/shared_recordings.yaml")
     assert done.returncode == 0, done.stdout + done.stderr
-    rows = (ROOT / "config/recordings.tsv").read_text(encoding="utf-8").splitlines()
+    rows = (ROOT / "benchmarks/shared_recordings.tsv").read_text(encoding="utf-8").splitlines()
     records = [row for row in rows[1:] if not row.startswith(("#", "record\t"))]
     assert jobs(done.stdout + done.stderr)["acquire"] == len(records)
 
