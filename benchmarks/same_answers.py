@@ -3,10 +3,11 @@
     python -m benchmarks.same_answers --code CHECKOUT --out old.json   answers of another checkout
     python -m benchmarks.same_answers --out new.json --against old.json
 
-`pendpipe fit` and `pendpipe diagnose` answer every recording of ``benchmarks/shared_recordings.tsv`` and
-the items of a challenge set (``--set FOLDER``, made by ``pendpipe challenge make``). Answers
-that stand in OUT already are kept, so an interrupted run goes on. The comparison prints each
-difference: exit status, verdict, names, class, and values by more than 0.1 of their errors.
+`pendpipe fit` and `pendpipe diagnose` answer every recording of
+``benchmarks/shared_recordings.tsv`` and the items of a challenge set (``--set FOLDER``, made by
+``pendpipe challenge make``). Answers that stand in OUT already are kept, so an interrupted run
+goes on. The comparison prints each difference: exit status, verdict, names, class, and values
+that moved by more than 0.1 of their errors.
 """
 
 from __future__ import annotations
