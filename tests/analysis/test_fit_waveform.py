@@ -180,11 +180,27 @@ def test_fit_json_is_read_as_it_was_written() -> None:
     again = FitResult.from_json(content)
     assert finite(again.as_json()) == content
     assert set(content) == {
-        "schema_version", "method", "baseline", "parameters", "quality_factor_limit",
-        "quality_factor_hysteretic", "quality_factor_viscous", "covariance", "noise_rms_rad",
-        "residual_rms_rad", "chi2_per_dof", "samples", "turning_points", "cuts", "provenance",
+        "schema_version",
+        "method",
+        "baseline",
+        "parameters",
+        "quality_factor_limit",
+        "quality_factor_hysteretic",
+        "quality_factor_viscous",
+        "covariance",
+        "noise_rms_rad",
+        "residual_rms_rad",
+        "chi2_per_dof",
+        "samples",
+        "turning_points",
+        "cuts",
+        "provenance",
         "warnings",
-    }  # fmt: skip
+        "restoring",
+        "light",
+        "light_reason",
+        "decrement_check",
+    }
     sd = [content["parameters"][name]["sd"] for name in content["covariance"]["order"]]
     assert np.sqrt(np.diag(content["covariance"]["matrix"])) == pytest.approx(sd)
 

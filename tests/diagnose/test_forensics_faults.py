@@ -171,6 +171,16 @@ def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> N
     assert "jitter" not in found(fitted(AIR, readings))
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_an_amplitude_that_is_held_tells_no_jitter_and_stops_nothing(seed: int) -> None:
+    """As of a recording that is driven first: v^2's mean can't be told from the noise's level."""
+    held = Pendulum(quality_factor=1e10, quadratic=0.0, coulomb=0.0)
+    clean = held.model().reading(held.values())
+    record = fitted(held, clean + white(generator(seed), held.count))
+    finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
+    assert finding.p_value > 1e-4
+
+
 def test_gain_noise_is_no_jitter(clean: FloatArray) -> None:
     draw = generator()
     readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + white(draw, AIR.count)

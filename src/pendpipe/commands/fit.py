@@ -1,8 +1,14 @@
 """Fit a, b, c, frequency, amplitude, phase and offset of one free decay.
 
 --method turning-points fits Eq. 14 to the turning points (the paper's way); --method
-waveform, the default, fits Eq. 8 to all readings, starting from there. --fix holds a
+waveform fits Eq. 8 to all readings, starting from there. --method auto, the default, takes the
+waveform, and the turning points where the waveform's law contradicts the decay. --fix holds a
 parameter, so that a prediction is compared with the recording.
+
+The light compares the fitted law's loss with the decrement of the turning points at three
+amplitudes. green: they agree, and noise explains the rest. amber: they agree, but the readings
+differ from the law by more than noise. red: they contradict each other; then the reason is
+printed instead of the law, and the exit status is 2 unless --accept is given.
 """
 
 from __future__ import annotations
@@ -24,17 +30,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _reading.add_arguments(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="JSON", help="the result")
     parser.add_argument(
-        "--method", choices=("waveform", "turning-points"), default="waveform", help="%(default)s"
+        "--method",
+        choices=("auto", "waveform", "turning-points"),
+        default="auto",
+        help="%(default)s",
     )
     parser.add_argument(
-        "--baseline", choices=("eq8", "viscous"), default="eq8",
-        help="eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
-    )  # fmt: skip
+        "--accept",
+        action="store_true",
+        help="print a law that contradicts the decay, and end with 0",
+    )
     parser.add_argument(
-        "--fix", action="append", default=[], metavar="NAME=VALUE",
+        "--baseline",
+        choices=("eq8", "viscous"),
+        default="eq8",
+        help="eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
+    )
+    parser.add_argument(
+        "--fix",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
         help="hold a parameter (a, b, c, frequency, amplitude, offset, quality_factor_hysteretic,"
         " quality_factor_viscous); repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--turning-points", type=Path, metavar="CSV", help="found before, with their cuts"
     )
@@ -49,16 +68,20 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit and write."""
     from pendpipe.stages.refusal import run_stage
 
-    return run_stage(
+    lights: list[str] = []
+    status = run_stage(
         "fit",
         arguments.record or arguments.file,
-        lambda: _fit(arguments),
+        lambda: lights.append(_fit(arguments)),
         outputs=[arguments.out],
         refused=arguments.refused,
     )
+    # In a campaign the light stands in the result, and the other records go on.
+    contradicted = "red" in lights and not arguments.accept and arguments.refused is None
+    return 2 if contradicted else status
 
 
-def _fit(arguments: argparse.Namespace) -> None:
+def _fit(arguments: argparse.Namespace) -> str:
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording
@@ -77,18 +100,26 @@ def _fit(arguments: argparse.Namespace) -> None:
 
         points, part = measure_recording(recording, arguments.file)
     result = fit_recording(
-        part, points=points, method=arguments.method, baseline=arguments.baseline,
-        fixed=fixed, place=arguments.file,
-    )  # fmt: skip
+        part,
+        points=points,
+        method=None if arguments.method == "auto" else arguments.method,
+        baseline=arguments.baseline,
+        fixed=fixed,
+        place=arguments.file,
+    )
     result = replace(
         result,
         cuts=tuple(cut._asdict() for cut in points.cuts),
         provenance=_provenance(arguments, provenance),
     )
     write_json(arguments.out, result.as_json())
+    if result.light == "red":
+        remedy = "see pendpipe diagnose; --accept prints the law all the same"
+        print(f"pendpipe: {arguments.file}: {result.light_reason}; {remedy}", file=sys.stderr)
     for warning in result.warnings:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
-    print(_statement(arguments.out, result))
+    print(_statement(arguments.out, result, law=result.light != "red" or arguments.accept))
+    return result.light
 
 
 def _provenance(arguments: argparse.Namespace, provenance: dict[str, Any]) -> dict[str, Any]:
@@ -102,9 +133,23 @@ def _provenance(arguments: argparse.Namespace, provenance: dict[str, Any]) -> di
     }
 
 
-def _statement(out: Path, result: FitResult) -> str:
-    """The numbers, a line each."""
-    lines = [f"{out}: {result.method}, {result.turning_points} turning points"]
+def _statement(out: Path, result: FitResult, *, law: bool) -> str:
+    """The light with its reason, the numbers a line each (with `law`), and the check."""
+    lines = [
+        f"{result.light}: {result.light_reason}",
+        f"{out}: {result.method}, {result.restoring} restoring torque,"
+        f" {result.turning_points} turning points",
+    ]
+    if law:
+        lines += _numbers(result)
+    unit = result.parameters["amplitude"].unit
+    for check in result.decrement_check:
+        lines.append(f"  {'decrement_check':<22}{check.sentence(unit)}")
+    return "\n".join(lines)
+
+
+def _numbers(result: FitResult) -> list[str]:
+    lines = []
     for name, estimate in result.parameters.items():
         bound = " (at its bound)" if estimate.at_bound else ""
         lines.append(
@@ -114,4 +159,4 @@ def _statement(out: Path, result: FitResult) -> str:
     if limit is not None:
         lines.append(f"  {'quality_factor_limit':<22}{limit.value:.6g} +- {limit.sd:.2g}")
     lines.append(f"  {'chi2_per_dof':<22}{result.chi2_per_dof:.4g}")
-    return "\n".join(lines)
+    return lines

@@ -157,8 +157,10 @@ class CaliperRun(Section):
 class Fit(Section):
     """How a, b and c are found."""
 
-    method: Literal["waveform", "turning-points"] = Field(
-        "waveform", description="Eq. 8 on all samples, or Eq. 14 on the turning points"
+    method: Literal["auto", "waveform", "turning-points"] = Field(
+        "auto",
+        description="Eq. 8 on all samples, Eq. 14 on the turning points, or (auto) the former"
+        " unless it contradicts the decay",
     )
 
 

@@ -39,7 +39,7 @@ def health(entry: Mapping[str, Any]) -> Health:
         They have values, but chi^2 per degree of freedom is outside `CHI2_RANGE`, or the
         exponential losses came out as zero, so that no limiting Q exists.
     failed
-        The fit has no finite values.
+        The fit has no finite values, or its law contradicts the decay (a red light).
     not run
         The record was refused, so nothing was fitted.
     """
@@ -50,6 +50,8 @@ def health(entry: Mapping[str, Any]) -> Health:
     ]
     if missing:
         return _state("failed", f"no value of {', '.join(missing)}")
+    if entry.get("light") == "red":
+        return _state("failed", str(entry["light_reason"]))
     chi2 = number(entry.get("chi2_per_dof"))
     if not math.isfinite(chi2):
         return _state("look", "the fit's χ² is unknown")

@@ -108,9 +108,12 @@ def _record(
             "samples",
             "turning_points",
             "cuts",
+            "light",
+            "light_reason",
         )
     }
-    content["warnings"] = [*fit["warnings"], *result.calibration["warnings"]]
+    excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
+    content["warnings"] = [*excluded, *fit["warnings"], *result.calibration["warnings"]]
     content["volts_per_radian"] = result.calibration["volts_per_radian"]
     points = read_turning_points(
         Path(campaign.configuration.results) / row.record / "turning_points.csv"

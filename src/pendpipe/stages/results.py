@@ -21,6 +21,11 @@ class RecordResult:
     calibration: dict[str, Any]
     refused: str | None = None
 
+    @property
+    def usable(self) -> bool:
+        """Whether there is a fit that does not contradict the decay."""
+        return self.refused is None and self.fit["light"] != "red"
+
     def parameter(self, name: str) -> Estimate:
         """One of the fit's parameters (``a``, ``b``, ``c``, ``frequency``, ...)."""
         return estimate(self.fit["parameters"][name])

@@ -27,9 +27,10 @@ class Separation:
 def separate_campaign(campaign: Campaign, out: Path) -> None:
     """Fit k to the records in air and apply Eq. 17 to all; write ``separation.json``.
 
-    A campaign without records of the branch ``air`` has no k: nothing is separated.
+    A campaign without records of the branch ``air`` has no k: nothing is separated. Records whose
+    fitted law contradicts the decay (a red light) are left out; `compare` reports the reason.
     """
-    results = [result for result in read_results(campaign) if result.refused is None]
+    results = [result for result in read_results(campaign) if result.usable]
     measured = [_measured(campaign, result) for result in results]
     air = [record for record in measured if record.branch == "air"]
     if not air:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.assemble import Numbers, estimates, misfit, quality_factor, wrapped
 from pendpipe.analysis.fit.assemble import warn as warnings_of
+from pendpipe.analysis.fit.decrement import check_decrement, light_of
 from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
 from pendpipe.analysis.fit.intervals import intervals95
@@ -19,6 +20,7 @@ from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
 
 _LATE: Final = 3.0
@@ -78,13 +80,23 @@ def fit_points(
     envelope = fit_envelope(points, held)
     a, b, c = (float(rate) for rate in envelope.value[:3])
     period = fit_period(
-        points, envelope.amplitude, a, b, c,
+        points,
+        envelope.amplitude,
+        a,
+        b,
+        c,
         share=share_of(parts, b, baseline),
         held=2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None,
-    )  # fmt: skip
+    )
     stretched = misfit(envelope.chi2_per_dof, len(points) - 4.0)
     numbers = _numbers(points, envelope, period, stretched)
     parameters = estimates(numbers, points.unit)
+    share = share_of(parts, b, baseline)
+    hysteretic = (0.5 if share is None else share) * b
+    checks = check_decrement(
+        points, Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c)
+    )
+    light, reason = light_of(checks, misfit=stretched, unit=points.unit)
     result = FitResult(
         method="turning-points",
         baseline=baseline,
@@ -99,8 +111,12 @@ def fit_points(
         turning_points=len(points),
         quality_factor_hysteretic=_held(fixed, "quality_factor_hysteretic"),
         quality_factor_viscous=_held(fixed, "quality_factor_viscous"),
+        settled=envelope.converged,
+        decrement_check=checks,
+        light=light,
+        light_reason=reason,
     )
-    said = [*points.notes, *warnings_of(result, stretched), *_said(envelope, period)]
+    said = [*points.notes, *warnings_of(result, stretched), *_said(period)]
     return replace(result, warnings=tuple(said))
 
 
@@ -109,10 +125,8 @@ def _held(fixed: Mapping[str, float], name: str) -> Estimate | None:
     return Estimate(fixed[name], 0.0, "") if name in fixed else None
 
 
-def _said(envelope: EnvelopeFit, period: Period) -> list[str]:
+def _said(period: Period) -> list[str]:
     said = []
-    if not envelope.converged:
-        said.append("the fit of Eq. 14 did not settle")
     if period.chi2_per_dof > _LATE:
         said.append(
             "the period changes along the record as Eq. 8's does not"
@@ -154,7 +168,8 @@ def _numbers(
         )
     )
     at_bound = [
-        name for index, name in enumerate("abc")
+        name
+        for index, name in enumerate("abc")
         if index not in envelope.held and envelope.value[index] <= 0.0
-    ]  # fmt: skip
+    ]
     return Numbers(value, matrix, intervals, at_bound)

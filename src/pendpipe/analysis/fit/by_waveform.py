@@ -20,6 +20,7 @@ from pendpipe.analysis.fit.assemble import (
 )
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.decrement import check_decrement, light_of
 from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
@@ -103,9 +104,12 @@ def fit_plain_waveform(samples: Samples) -> FitResult | None:
 
 
 def _result(
-    fitted: _Fitted, samples: Samples, points: TurningPoints, baseline: Baseline,
+    fitted: _Fitted,
+    samples: Samples,
+    points: TurningPoints,
+    baseline: Baseline,
     fixed: Mapping[str, float],
-) -> tuple[FitResult, float]:  # fmt: skip
+) -> tuple[FitResult, float]:
     """Judge what the fit has left; return the result and what its variances were enlarged by."""
     # Of where the last step began, if that was so small that it was taken on trust.
     residual = fitted.problem.residual(fitted.minimum.at)
@@ -137,21 +141,31 @@ def _result(
     )
     hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, matrix, fixed)
     warnings = [*points.notes, *warnings_of(result, stretched), *said, *fitted.start.warnings]
-    if not fitted.minimum.converged:
-        warnings.append("the waveform fit did not settle")
+    times = fitted.problem.time_s
+    inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
+    law, _ = fitted.problem.model(fitted.minimum.value)
+    checks = check_decrement(points.chosen(inside), law)
+    light, reason = light_of(checks, misfit=stretched, unit=points.unit)
     full = replace(
         result,
         quality_factor_hysteretic=hysteretic,
         quality_factor_viscous=viscous,
         warnings=tuple(warnings),
+        settled=fitted.minimum.converged,
+        decrement_check=checks,
+        light=light,
+        light_reason=reason,
     )
     return full, stretched
 
 
 def _fit(
-    samples: Samples, points: TurningPoints, start: Start, held: tuple[int, ...],
+    samples: Samples,
+    points: TurningPoints,
+    start: Start,
+    held: tuple[int, ...],
     parts: Mapping[str, float],
-) -> _Fitted:  # fmt: skip
+) -> _Fitted:
     """Search from the start; grow the window where the phase would slip."""
     span = usable_span(samples, points, start)
     value, used = start.value, start.reliable
@@ -160,9 +174,13 @@ def _fit(
         part = slice(span.start, stop)
         problem = Waveform(samples.time_s[part], samples.values[part], points.noise_rms_rad, parts)
         minimum = minimise(
-            problem.evaluate, value, waveform.BOUNDS, held=held, chi2_only=problem.chi2,
+            problem.evaluate,
+            value,
+            waveform.BOUNDS,
+            held=held,
+            chi2_only=problem.chi2,
             foresee=problem.foresee,
-        )  # fmt: skip
+        )
         if used >= len(points):
             return _Fitted(problem, minimum, held, start)
         value = minimum.value
@@ -204,9 +222,11 @@ def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> i
 
 
 def _held(
-    held_rates: Mapping[str, float], fixed: Mapping[str, float], parts: Mapping[str, float],
+    held_rates: Mapping[str, float],
+    fixed: Mapping[str, float],
+    parts: Mapping[str, float],
     baseline: Baseline,
-) -> tuple[int, ...]:  # fmt: skip
+) -> tuple[int, ...]:
     """Indices of what is not fitted."""
     index = {"a": 0, "b": 1, "c": 2, "amplitude": waveform.ANGLE, "offset": waveform.OFFSET}
     held = [index[name] for name in held_rates]
@@ -226,9 +246,14 @@ def _numbers(fitted: _Fitted, scale: float, samples: Samples) -> tuple[Numbers, 
     first, jacobian = _first_turning_point(fitted, float(samples.time_s[0]))
     matrix = covariance(normal, held)
     numbers = np.array(
-        [*value[:3], 0.5 * value[waveform.OMEGA] / math.pi, first[0], first[1],
-         value[waveform.OFFSET]]
-    )  # fmt: skip
+        [
+            *value[:3],
+            0.5 * value[waveform.OMEGA] / math.pi,
+            first[0],
+            first[1],
+            value[waveform.OFFSET],
+        ]
+    )
     intervals = dict(
         zip(
             "abc",

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from pendpipe.analysis.fit.decrement import Decrement, Light
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
@@ -17,6 +18,7 @@ from pendpipe.files import read_json
 
 Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
+Restoring = Literal["linear", "sine"]
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
@@ -60,6 +62,14 @@ class FitResult:
         Spans left out: ``start_s``, ``stop_s``, ``reason``.
     provenance, warnings
         Where it comes from; and what the reader should know.
+    restoring
+        Which restoring torque the numbers belong to.
+    settled
+        Whether the search came to its end; a fit that did not is no result.
+    decrement_check
+        The law's loss beside that of the turning points, the large amplitude first.
+    light, light_reason
+        How far the numbers may be believed (`decrement.light_of`), and why.
     """
 
     method: Method
@@ -78,6 +88,11 @@ class FitResult:
     cuts: tuple[Mapping[str, Any], ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    restoring: Restoring = "linear"
+    settled: bool = True
+    decrement_check: tuple[Decrement, ...] = ()
+    light: Light = "amber"
+    light_reason: str = "the decrement was not checked"
 
     def value(self, name: str) -> float:
         """Value of one parameter."""
@@ -92,6 +107,10 @@ class FitResult:
             "schema_version": 1,
             "method": self.method,
             "baseline": self.baseline,
+            "restoring": self.restoring,
+            "light": self.light,
+            "light_reason": self.light_reason,
+            "decrement_check": [check.as_json() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
             "quality_factor_limit": limit.as_json(),
             "quality_factor_hysteretic": _optional(self.quality_factor_hysteretic),
@@ -132,6 +151,10 @@ class FitResult:
             cuts=tuple(content["cuts"]),
             provenance=content["provenance"],
             warnings=tuple(content["warnings"]),
+            restoring=content["restoring"],
+            light=content["light"],
+            light_reason=content["light_reason"],
+            decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
         )
 
 
@@ -172,6 +195,9 @@ def _maybe(entry: Mapping[str, Any] | None) -> Estimate | None:
 def _estimate(entry: Mapping[str, Any]) -> Estimate:
     low, high = (_number(end) for end in entry["interval95"])
     return Estimate(
-        _number(entry["value"]), _number(entry["sd"]), entry["unit"], (low, high),
+        _number(entry["value"]),
+        _number(entry["sd"]),
+        entry["unit"],
+        (low, high),
         bool(entry["at_bound"]),
-    )  # fmt: skip
+    )

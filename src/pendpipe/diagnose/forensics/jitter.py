@@ -22,6 +22,8 @@ from pendpipe.estimate import Estimate
 
 _FAR: Final = 3.0
 """Standard deviations beyond which an error counts as if it were only that large."""
+_STEADY: Final = 1e-3
+"""Relative scatter of v^2's mean over a cycle below which it is the same all along."""
 _AGREE: Final = 2.6
 """Standard deviations by which the part at twice the frequency may fall short."""
 _DITHERED: Final = 0.7
@@ -90,10 +92,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if squares is None or len(squares.square) < 50:
         return nothing("jitter")
     p_value = _chance(squares, squares.mean + squares.double)
-    size, covariance = _fitted(squares, [squares.mean, squares.double])
-    spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
-    if size[2] - size[1] < -_AGREE * spread:
-        p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
+    # Where the amplitude hardly falls, the mean of v^2 can't be told from the level of the noise.
+    if float(np.std(squares.mean)) > _STEADY * float(np.mean(squares.mean)):
+        size, covariance = _fitted(squares, [squares.mean, squares.double])
+        spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
+        if size[2] - size[1] < -_AGREE * spread:
+            p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
     return _described(data, fit, squares, p_value)
 
 

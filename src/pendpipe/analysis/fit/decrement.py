@@ -1,0 +1,219 @@
+"""Whether a fitted law loses what the decay loses.
+
+A law may follow the readings badly and still be printed with small errors. So its loss is
+compared with the decrement of the turning points, which needs no model, at the largest, a
+middle and the smallest amplitude that was analysed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics import Eq8, Release, turning_points
+
+Light = Literal["green", "amber", "red"]
+TOLERANCE: Final = 0.05
+"""Part of the decrement by which a law may miss it whatever the errors are."""
+_CONFIRMED: Final = 0.10
+"""A decrement known worse than this confirms nothing."""
+_CERTAIN: Final = 2.0
+"""Standard deviations from which a difference contradicts."""
+_FEWEST: Final = 5
+"""Turning points of a window: a parabola, the level's error, and one to judge the scatter."""
+_FALL: Final = 0.4
+"""Of ln amplitude in a window; beyond, a parabola does not follow Coulomb's straight line."""
+_STEEP: Final = 1.0
+"""The same over the fewest turning points: nearer to the stop no decrement can be seen."""
+_SEEN: Final = 4.0
+"""Standard deviations that a turning point must stand out."""
+
+
+class Decrement(NamedTuple):
+    """Relative loss of amplitude -d ln y/dt at one amplitude, by the law and as seen."""
+
+    amplitude_rad: float
+    fitted: float
+    """1/s, averaged over a cycle of the law's own motion."""
+    seen: float
+    """1/s, of the turning points."""
+    seen_sd: float
+
+    @property
+    def excess(self) -> float:
+        """By what part of the seen loss the law loses more."""
+        return (self.fitted - self.seen) / abs(self.seen) if self.seen else math.inf
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether they differ by more than 5 % and by more than two standard deviations."""
+        off = abs(self.fitted - self.seen)
+        return not (off <= TOLERANCE * abs(self.seen) or off <= _CERTAIN * self.seen_sd)
+
+    @property
+    def confirms(self) -> bool:
+        """Whether they agree, and so closely that this says something."""
+        return not self.contradicts and abs(self.excess) <= _CONFIRMED
+
+    def as_json(self) -> dict[str, float]:
+        """Return the form of ``fit.json``."""
+        return self._asdict()
+
+    def sentence(self, unit: str) -> str:
+        """Say it in a clause."""
+        return (
+            f"at {self.amplitude_rad:.3g} {unit} it loses {self.fitted:.3g} 1/s, the turning points"
+            f" show {self.seen:.3g} +- {self.seen_sd:.1g} 1/s ({100.0 * self.excess:+.0f} %)"
+        )
+
+
+def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
+    """Compare a law's loss with the decrement at a large, a middle and a small amplitude.
+
+    Parameters
+    ----------
+    points
+        The turning points that were analysed.
+    law
+        What was fitted.
+
+    Returns
+    -------
+    tuple of Decrement
+        The large amplitude first; empty where there are too few turning points.
+    """
+    clear = points.chosen(points.amplitude_rad > _SEEN * points.angle_sd_rad)
+    while len(clear) > 3 * _FEWEST and _end_is_steep(clear.amplitude_rad):
+        clear = clear.first(len(clear) - 1)
+    if len(clear) < 4:
+        return ()
+    found = [
+        seen_loss(clear.chosen(np.isin(np.arange(len(clear)), part)))
+        for part in _windows(np.log(clear.amplitude_rad))
+    ]
+    return tuple(
+        Decrement(amplitude, loss_of(law, amplitude), loss, sd) for amplitude, loss, sd in found
+    )
+
+
+def _end_is_steep(amplitude: FloatArray) -> bool:
+    return float(amplitude[-_FEWEST]) > math.exp(_STEEP) * float(amplitude[-1])
+
+
+def _windows(log_amplitude: FloatArray) -> list[IntArray]:
+    """Indices of the turning points about the large, the middle and the small amplitude."""
+    count = len(log_amplitude)
+    most = max(_FEWEST, -(-count // 3))
+    index = np.arange(count)
+    middle = int(np.argmin(np.abs(log_amplitude - 0.5 * (log_amplitude[0] + log_amplitude[-1]))))
+    windows = []
+    for centre in (0, middle, count - 1):
+        order = np.argsort(np.abs(index - centre), kind="stable")[:most]
+        reach = 0.5 * _FALL if centre == middle else _FALL
+        fallen = np.abs(log_amplitude[order] - log_amplitude[centre]) > reach
+        fallen[:_FEWEST] = False
+        last = int(np.argmax(fallen)) if fallen.any() else len(order)
+        windows.append(np.sort(order[:last]))
+    return windows
+
+
+def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
+    """Relative loss of amplitude of some neighbouring turning points.
+
+    A parabola in time is fitted to ln y, beside an error of the level, which raises the
+    amplitudes of one side and lowers those of the other.
+
+    Returns
+    -------
+    amplitude, loss, sd
+        In the middle of the window: y in rad, -d ln y/dt in 1/s, and its standard deviation from
+        the scatter about the parabola (neighbours may scatter alike) and not below the turning
+        points' own.
+    """
+    amplitude = points.amplitude_rad
+    centre = float(np.mean(points.time_s))
+    span = float(np.ptp(points.time_s))
+    z = (points.time_s - centre) / span
+    columns = [np.ones_like(z), z]
+    if len(points) > 4:
+        columns.append(points.side * float(np.mean(amplitude)) / amplitude)
+    if len(points) > 5:
+        columns.append(z**2)
+    weight = amplitude / points.angle_sd_rad
+    design = np.stack(columns, axis=1) * weight[:, None]
+    scale = np.linalg.norm(design, axis=0)
+    inverse = np.linalg.pinv(design / scale, rcond=1e-9)
+    values = inverse @ (weight * np.log(amplitude)) / scale
+    residual = weight * np.log(amplitude) - design @ values
+    freedom = len(points) - len(columns)
+    variance = float(inverse[1] @ inverse[1]) / scale[1] ** 2
+    if freedom > 0:
+        square = float(residual @ residual)
+        alike = float(residual[1:] @ residual[:-1]) / max(square, 1e-300)
+        alike = min(max(alike, 0.0), 0.8)
+        variance *= max(1.0, square / freedom * (1.0 + alike) / (1.0 - alike))
+    return math.exp(values[0]), -float(values[1]) / span, math.sqrt(variance) / span
+
+
+def loss_of(law: Eq8, amplitude: float) -> float:
+    """Relative loss of a law, 1/s, averaged over the cycle in whose middle y is `amplitude`."""
+    start = amplitude
+    for _ in range(2):
+        try:
+            cycle = turning_points(law, Release(0.0, start), count=3)
+        except ValueError:
+            # Overdamped.
+            return _slow_loss(law, amplitude)
+        if len(cycle.time_s) < 3 or not abs(cycle.angle_rad[2]) > 0.0:
+            # It stops within the cycle.
+            return _slow_loss(law, amplitude)
+        fall = math.log(start / abs(float(cycle.angle_rad[2])))
+        loss = fall / float(cycle.time_s[2])
+        start = amplitude * math.exp(0.5 * fall)
+    return loss
+
+
+def _slow_loss(law: Eq8, amplitude: float) -> float:
+    """Eq. 13: a y + b + c/y."""
+    b = law.hysteretic + law.viscous
+    return law.quadratic * amplitude + b + law.coulomb / amplitude
+
+
+def light_of(checks: Sequence[Decrement], *, misfit: float, unit: str) -> tuple[Light, str]:
+    """Say how far a fit may be believed.
+
+    Parameters
+    ----------
+    checks
+        Of the decrement.
+    misfit
+        By what the variances were enlarged; 1 where the noise explains what is left.
+    unit
+        Of the amplitude.
+
+    Returns
+    -------
+    light
+        ``"red"``: the law contradicts the decay. ``"amber"``: it loses what the decay loses, but
+        the readings differ from it by more than noise (the errors are enlarged), or the decrement
+        is not seen well enough to confirm it. ``"green"``: neither.
+    reason
+        A clause.
+    """
+    wrong = [check for check in checks if check.contradicts]
+    if wrong:
+        worst = max(wrong, key=lambda check: abs(check.excess))
+        return "red", f"the fitted law contradicts the decay: {worst.sentence(unit)}"
+    if len(checks) < 3 or not all(check.confirms for check in checks):
+        return "amber", "the turning points do not show the decrement well enough to check the law"
+    if misfit > 1.0:
+        return "amber", (
+            "the law loses what the decay loses, but the readings differ from it by more than"
+            " noise: the standard deviations are enlarged"
+        )
+    return "green", "the law loses what the decay loses, and noise explains the rest"
