@@ -94,7 +94,7 @@ def _module_of(name: str) -> Any:
 
 def _parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
-    module = _module_of(argv[0]) if argv else None
+    module = _module_of(argv[0]) if argv and not argv[0].startswith("-") else None
     if module is not None:
         parser = _Parser(
             prog=f"pendpipe {argv[0]}",

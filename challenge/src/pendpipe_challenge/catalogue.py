@@ -11,7 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe_challenge import hidden_instrument, hidden_pendulum
+# Importing them enters their effects.
+from pendpipe_challenge import hidden_instrument, hidden_pendulum  # noqa: F401
 from pendpipe_challenge.hidden import (
     CATALOGUE,
     OUTSIDE,
@@ -165,9 +166,6 @@ def delay(r: Random, s: Scenario) -> Hidden:
         own=False,
     )
 
-
-REGISTERED: Final = (hidden_instrument, hidden_pendulum)
-"""Importing these enters their effects."""
 
 MEASUREMENT: Final = frozenset(
     {

@@ -1,0 +1,258 @@
+"""The measures of the house: how much code there is, how it hangs together, what it costs.
+
+    python -m benchmarks.house                      # of the working tree's tracked files
+    python -m benchmarks.house --commit 2af5a66     # of that commit beside it
+
+The library and the challenge are measured apart. Statements are those of the syntax tree;
+strings that stand alone (docstrings) are not counted. A file's importers are the other files of
+the two packages that name it in an import. A definition is unused if its name stands nowhere
+else in the repository's code, templates and configuration; what a decorator enters into a
+registry counts as used. Duplicates are lines of six or more that have the same shape.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import io
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import tokenize
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+
+ROOT: Final = Path(__file__).parents[1]
+LONG_LINES, MANY_PARAMETERS, SAME_LINES, SAME_TOKENS = 60, 7, 6, 40
+STARTS: Final = 7
+"""Starts of the interpreter, of which the median is printed."""
+USES: Final = ("*.py", "*.smk", "Snakefile", "*.html", "*.j2", "*.toml", "*.yaml", "run")
+"""Files in which a name may be used."""
+PLAIN: Final = frozenset({"property", "cached_property", "staticmethod", "classmethod", "cache"})
+"""Decorators that enter nothing into a registry."""
+PROTOCOLS: Final = frozenset({"from_param"})
+"""Methods that a library calls by name."""
+LAYOUT: Final = frozenset(
+    {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
+)
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def files_of(tree: Path) -> dict[str, list[Path]]:
+    """Python files by part; in old commits the challenge lies within the library."""
+    within = tree / "src/pendpipe/challenge"
+    return {
+        "library": [p for p in sorted((tree / "src").rglob("*.py")) if within not in p.parents],
+        "challenge": sorted([*within.rglob("*.py"), *(tree / "challenge/src").rglob("*.py")]),
+        "tests": sorted((tree / "tests").rglob("*.py")),
+        "benchmarks": sorted((tree / "benchmarks").rglob("*.py")),
+    }
+
+
+def is_text(node: ast.AST) -> bool:
+    """Whether a node is a string that stands alone."""
+    value = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+
+
+def module_name(path: Path) -> str:
+    """The dotted name by which a file of a package is imported."""
+    parts = path.with_suffix("").parts
+    start = len(parts) - parts[::-1].index("src")
+    return ".".join(parts[start:]).removesuffix(".__init__")
+
+
+def importers(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
+    """By module: the modules that import it."""
+    names = {module_name(path) for path in trees}
+    found: dict[str, set[str]] = defaultdict(set)
+    for path, tree in trees.items():
+        for node in ast.walk(tree):
+            wanted: list[str] = []
+            if isinstance(node, ast.Import):
+                wanted = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                below = [f"{node.module}.{alias.name}" for alias in node.names]
+                wanted = [name if name in names else node.module for name in below]
+            for name in names.intersection(wanted):
+                found[name].add(module_name(path))
+    return found
+
+
+def definitions(module: ast.Module) -> Iterator[tuple[str, int]]:
+    """Functions, classes, methods and constants that no decorator enters anywhere."""
+    classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
+    for node in [*module.body, *(inner for each in classes for inner in each.body)]:
+        if isinstance(node, Function | ast.ClassDef):
+            if PLAIN.issuperset(map(ast.unparse, node.decorator_list)):
+                yield node.name, node.lineno
+        elif isinstance(node, ast.Assign | ast.AnnAssign) and node in module.body:
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                if isinstance(target, ast.Name):
+                    yield target.id, node.lineno
+
+
+def tokens(path: Path) -> list[tokenize.TokenInfo]:
+    """A file's tokens without comments, layout and long strings."""
+    found = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
+    return [t for t in found if t.type not in LAYOUT and '"""' not in t.string and t.string]
+
+
+def unused(tree: Path, trees: dict[Path, ast.Module]) -> list[str]:
+    """Definitions whose name stands nowhere else, as ``file:line name``."""
+    words: Counter[str] = Counter()
+    for path in (path for pattern in USES for path in tree.rglob(pattern)):
+        python = path.suffix == ".py"
+        text = " ".join(t.string for t in tokens(path)) if python else path.read_text("utf-8")
+        words.update(re.findall(r"\w+", text))
+    own = Counter(name for module in trees.values() for name, _ in definitions(module))
+    return [
+        f"{path.relative_to(tree)}:{line} {name}"
+        for path, module in trees.items()
+        for name, line in definitions(module)
+        if words[name] <= own[name] and not name.startswith("__") and name not in PROTOCOLS
+    ]
+
+
+def duplicates(paths: list[Path]) -> int:
+    """Lines that belong to a run of `SAME_LINES` whose shape stands elsewhere as well."""
+    runs: dict[tuple[object, ...], list[set[tuple[Path, int]]]] = defaultdict(list)
+    for path in paths:
+        rows: dict[int, list[tokenize.TokenInfo]] = defaultdict(list)
+        for token in tokens(path):
+            rows[token.start[0]].append(token)
+        lines = [(n, row) for n, row in rows.items() if row[0].string not in ("import", "from")]
+        for at in range(len(lines) - SAME_LINES + 1):
+            run = lines[at : at + SAME_LINES]
+            shape = shape_of([row for _, row in run])
+            if len(shape) >= SAME_TOKENS:
+                runs[shape].append({(path, number) for number, _ in run})
+    # A table's rows repeat themselves; only runs apart from each other count.
+    again = [same for same in runs.values() if any(not same[0] & other for other in same[1:])]
+    return len({line for same in again for run in same for line in run})
+
+
+def shape_of(rows: list[list[tokenize.TokenInfo]]) -> tuple[object, ...]:
+    """Tokens of some lines, names numbered as they come, numbers and strings by kind."""
+    names: dict[str, int] = {}
+    shape: list[object] = []
+    for row in rows:
+        for token in row:
+            if token.type == tokenize.NAME:
+                shape.append(names.setdefault(token.string, len(names)))
+            else:
+                kinds = {tokenize.NUMBER: "number", tokenize.STRING: "string"}
+                shape.append(kinds.get(token.type, token.string))
+        shape.append("\n")
+    return tuple(shape)
+
+
+def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """All counts of a tree, by part and measure, and the definitions that nobody uses."""
+    parts = files_of(tree)
+    trees = {path: ast.parse(path.read_text("utf-8")) for paths in parts.values() for path in paths}
+    packages = {path: trees[path] for path in parts["library"] + parts["challenge"]}
+    by, dead = importers(packages), unused(tree, packages)
+    table: dict[str, dict[str, Any]] = {}
+    for part, paths in parts.items():
+        texts = [path.read_text("utf-8") for path in paths]
+        lengths = [len(text.splitlines()) for text in texts]
+        nodes = [node for path in paths for node in ast.walk(trees[path])]
+        functions = [node for node in nodes if isinstance(node, Function)]
+        long = [f for f in functions if f.end_lineno and f.end_lineno - f.lineno >= LONG_LINES]
+        kinds = ("posonlyargs", "args", "kwonlyargs")
+        counts = [sum(len(getattr(f.args, kind)) for kind in kinds) for f in functions]
+        alone = [p for p in paths if p in packages and len(by[module_name(p)]) == 1]
+        table[part] = {
+            "files": len(paths),
+            "statements": sum(isinstance(n, ast.stmt) and not is_text(n) for n in nodes),
+            "lines": sum(lengths),
+            "median file, lines": round(median(lengths)),
+            f"functions over {LONG_LINES} lines": len(long),
+            f"functions over {MANY_PARAMETERS} parameters": sum(
+                n > MANY_PARAMETERS for n in counts
+            ),
+            "files with exactly one importer": len(alone),
+            "definitions nobody uses": sum(
+                name.startswith(f"{path.relative_to(tree)}:") for path in paths for name in dead
+            ),
+            "lines that stand twice": duplicates(paths),
+            "`# fmt: skip`": sum(text.count("# fmt: skip") for text in texts),
+        }
+    return table, dead
+
+
+def costs(tree: Path) -> dict[str, str]:
+    """What starting costs, and how large the wheel is."""
+    environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
+
+    def start(*words: str) -> str:
+        """Time of a start over that of the bare interpreter, each beside the other."""
+        took = []
+        for _ in range(STARTS):
+            times = [time.perf_counter()]
+            for each in (("-c", "pass"), words):
+                subprocess.run([sys.executable, *each], env=environment, capture_output=True)
+                times.append(time.perf_counter())
+            took.append(times[2] - 2 * times[1] + times[0])
+        return f"{1e3 * median(took):.0f} ms"
+
+    with tempfile.TemporaryDirectory() as folder:
+        words = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder]
+        built = subprocess.run([*words, str(tree)], capture_output=True, text=True)
+        wheels = [f"{path.stat().st_size / 1e3:.0f} kB" for path in Path(folder).glob("*.whl")]
+    why = (built.stderr.strip() or "no reason given").splitlines()[-1]
+    return {
+        "`import pendpipe`": start("-c", "import pendpipe"),
+        "`pendpipe --version`": start("-m", "pendpipe.cli", "--version"),
+        "wheel of the library": (wheels or [f"not built: {why}"])[0],
+    }
+
+
+def git(*words: str) -> bytes:
+    """What git prints."""
+    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, check=True).stdout
+
+
+def copy_of(commit: str | None, folder: Path) -> Path:
+    """A commit's files, or the working tree's that are tracked, in a new folder."""
+    found = commit or git("stash", "create").decode().strip() or "HEAD"
+    with tarfile.open(fileobj=io.BytesIO(git("archive", found))) as archive:
+        archive.extractall(folder / str(commit), filter="data")
+    return folder / str(commit)
+
+
+def main() -> None:
+    """Print the tables; a commit's beside the working tree's."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--commit", metavar="REF", help="a commit to set beside the working tree")
+    parser.add_argument("--list", action="store_true", help="name the definitions nobody uses")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        trees = {"here": copy_of(None, Path(folder))}
+        if arguments.commit:
+            trees = {arguments.commit: copy_of(arguments.commit, Path(folder)), **trees}
+        found = {name: measure(tree) for name, tree in trees.items()}
+        prices = {name: costs(tree) for name, tree in trees.items()}
+    parts = list(found["here"][0])
+    print("| |", " | ".join(f"{part}, {name}" for part in parts for name in trees), "|")
+    print("|---" * (1 + len(parts) * len(trees)) + "|")
+    for what in found["here"][0]["library"]:
+        cells = [str(found[name][0][part][what]) for part in parts for name in trees]
+        print(f"| {what} | {' | '.join(cells)} |")
+    print(f"\n| | {' | '.join(trees)} |\n{'|---' * (1 + len(trees))}|")
+    for what in prices["here"]:
+        print(f"| {what} | {' | '.join(prices[name][what] for name in trees)} |")
+    if arguments.list:
+        print("\nNobody uses:", *found["here"][1], sep="\n- ")
+
+
+if __name__ == "__main__":
+    main()
