@@ -42,3 +42,7 @@ class InputError(Exception):
 
 class NotAnalysableError(InputError):
     """The recording can be read, but holds no free decay that could be analysed."""
+
+
+class DamagedError(InputError):
+    """A result is not what its stage wrote; the record that it belongs to may be sound."""

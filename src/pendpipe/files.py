@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from pendpipe.errors import InputError
+from pendpipe.errors import DamagedError, InputError
 
 
 @contextmanager
@@ -99,8 +99,25 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
 
 
 def read_json(path: str | Path) -> Any:
-    """Read a JSON file that a stage has written."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
+    """Read a JSON file that a stage has written.
+
+    Raises
+    ------
+    InputError
+        If there is no such file.
+    DamagedError
+        If it is no JSON: empty, torn or altered.
+    """
+    place = Path(path)
+    try:
+        return json.loads(place.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(place, "there is no such file", "run the stage that makes it") from None
+    except OSError as fault:
+        raise InputError(place, f"it can't be read ({fault.strerror})", "check the path") from None
+    except (ValueError, RecursionError) as fault:
+        problem = f"this is no JSON ({fault})" if place.stat().st_size else "it is empty"
+        raise DamagedError(place, problem, "delete it and run again") from None
 
 
 def sha256(path: str | Path) -> str:

@@ -260,7 +260,7 @@ def write_plain(path: str | Path, recording: Recording) -> None:
 
 
 def read_plain(path: str | Path) -> Recording:
-    """Read the plain CSV form.
+    """Read the plain CSV form; a last row without its line end may be cut and is no sample.
 
     Raises
     ------
@@ -275,7 +275,7 @@ def read_plain(path: str | Path) -> Recording:
         raise InputError(place, "there is no such file", "check the path") from None
     except UnicodeDecodeError:
         raise InputError(place, "this is no UTF-8 text", "run pendpipe convert first") from None
-    lines = text.splitlines()
+    lines, notes = whole_lines(text)
     metadata: dict[str, str] = {}
     first = 0
     while first < len(lines) and (lines[first].startswith("#") or not lines[first].strip()):
@@ -295,9 +295,31 @@ def read_plain(path: str | Path) -> Recording:
         quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
         weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
+        notes=notes,
     )
     check(place, recording, first_line=first + 2)
     return replace(recording, resolution=converter_step(recording, place))
+
+
+def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
+    r"""Split a table into its lines, without a last row that may be cut.
+
+    Returns
+    -------
+    lines
+        Those that end; a first line is kept in any case.
+    notes
+        What the user should know of it.
+
+    Examples
+    --------
+    >>> whole_lines("time_s,volts\\n0.0,1.5\\n0.1,1.")
+    (['time_s,volts', '0.0,1.5'], ('the last row has no line end and may be cut: not used',))
+    """
+    lines = text.splitlines()
+    if len(lines) < 2 or text.endswith(("\n", "\r")):
+        return lines, ()
+    return lines[:-1], ("the last row has no line end and may be cut: not used",)
 
 
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pendpipe.errors import DamagedError
 from pendpipe.files import read_json, replaced, write_json
 
 
@@ -24,3 +25,12 @@ def test_json_has_null_where_there_is_no_finite_value(tmp_path: Path) -> None:
     content = {"a": np.float64("nan"), "b": [1.0, float("inf")], "c": np.arange(2)}
     write_json(tmp_path / "x.json", content)
     assert read_json(tmp_path / "x.json") == {"a": None, "b": [1.0, None], "c": [0, 1]}
+
+
+@pytest.mark.parametrize("content", ["", '{"a": 1', "[" * 100_000, "\x00"])
+def test_a_torn_json_is_named_in_one_line(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "fit.json"
+    path.write_text(content)
+    with pytest.raises(DamagedError, match=r"fit\.json: ") as caught:
+        read_json(path)
+    assert "\n" not in str(caught.value)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe.errors import InputError
-from pendpipe.files import read_json, write_json
+from pendpipe.errors import DamagedError, InputError
+from pendpipe.files import read_json
 from pendpipe.stages.refusal import reason_of, run_stage
 
 
@@ -41,13 +41,14 @@ def test_the_stages_after_a_refusal_pass_it_on(tmp_path: Path) -> None:
 def test_a_mended_record_is_no_longer_refused(tmp_path: Path) -> None:
     refused, out = tmp_path / "refused.json", tmp_path / "turning_points.csv"
     run_stage("turning-points", "x", fails, outputs=[out], refused=refused)
-    run_stage("acquire", "x", lambda: None, outputs=[], refused=refused)
+    recording = tmp_path / "recording.csv"
+    run_stage("acquire", "x", lambda: write(recording, ""), outputs=[recording], refused=refused)
     assert reason_of(refused) is None
 
 
-def test_without_a_place_for_refusals_the_fault_ends_the_program() -> None:
+def test_without_a_place_for_refusals_the_fault_ends_the_program(tmp_path: Path) -> None:
     with pytest.raises(InputError):
-        run_stage("fit", "x", fails, outputs=[], refused=None)
+        run_stage("fit", "x", fails, outputs=[tmp_path / "fit.json"], refused=None)
 
 
 def test_a_fault_of_the_programs_own_is_never_a_refusal(tmp_path: Path) -> None:
@@ -55,6 +56,24 @@ def test_a_fault_of_the_programs_own_is_never_a_refusal(tmp_path: Path) -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        run_stage("fit", "x", breaks, outputs=[], refused=tmp_path / "refused.json")
-    write_json(tmp_path / "other.json", {})
+        run_stage(
+            "fit", "x", breaks, outputs=[tmp_path / "fit.json"], refused=tmp_path / "refused.json"
+        )
     assert not (tmp_path / "refused.json").exists()
+
+
+def test_a_damaged_result_refuses_no_record(tmp_path: Path) -> None:
+    recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
+    refused = tmp_path / "refused.json"
+    run_stage(
+        "acquire", "x", lambda: write(recording, "whole"), outputs=[recording], refused=refused
+    )
+    write(recording, "torn")
+    with pytest.raises(DamagedError):
+        run_stage("fit", "x", fails, outputs=[fit], refused=refused, inputs=[recording])
+    assert not refused.exists()
+    assert not fit.exists()
+
+
+def write(path: Path, text: str) -> None:
+    path.write_text(text)

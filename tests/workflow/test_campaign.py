@@ -8,11 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+
+from pendpipe.cli import main
 
 ROOT = Path(__file__).parents[2]
 SMALL = ROOT / "tests/workflow/small"
@@ -170,3 +173,58 @@ def test_the_results_name_no_path_of_the_machine(campaign: Campaign) -> None:
         text = path.read_text(encoding="utf-8")
         assert str(ROOT) not in text
         assert str(campaign.results) not in text
+
+
+def damage(path: Path, change: Callable[[bytes], bytes]) -> None:
+    """Change a file and put its old time back."""
+    before = path.stat()
+    path.write_bytes(change(path.read_bytes()))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def test_damaged_results_are_named_and_made_again(campaign: Campaign) -> None:
+    """Torn, emptied and altered with their old times: the next run ends as the first."""
+    damages: dict[str, Callable[[bytes], bytes]] = {
+        "air-03/recording.csv": lambda content: content[: len(content) // 2],
+        "water-low-4/fit.json": lambda content: content.replace(b"1", b"2", 1),
+        "water-low-5/diagnosis/diagnosis.json": lambda content: content[:0],
+        "water-high-4/figures/decay.svg": lambda content: content[:100],
+        "broken/refused.json": lambda content: content[:20],
+        "calibration/sensor.json": lambda content: content.replace(b"3.8", b"3.9"),
+        "separation.json": lambda content: content[:0],
+        "campaign.json": lambda content: content[:-2],
+    }
+    before = (campaign.results / "campaign.json").read_bytes()
+    source = SMALL / "no-decay.csv"
+    source_before = (source.read_bytes(), source.stat().st_mtime_ns)
+    for name, change in damages.items():
+        damage(campaign.results / name, change)
+    planned = campaign.snakemake("-n")
+    assert not list(campaign.results.rglob("*.damaged-*")), "a dry run moves nothing"
+    ran = campaign.snakemake()
+    for name in damages:
+        assert f"{campaign.results / name}: " in planned
+        assert f"{campaign.results / name}: " in ran
+        assert len(list(campaign.results.glob(f"{name}.damaged-*"))) == 1
+    assert (campaign.results / "campaign.json").read_bytes() == before
+    assert (source.read_bytes(), source.stat().st_mtime_ns) == source_before
+    assert "Nothing to be done" in campaign.snakemake("-n")
+
+
+def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
+    campaign: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Damage between planning and job: status 2, one line, and no refusal."""
+    record = tmp_path / "results/air-07"
+    shutil.copytree(campaign.results / "air-07", record)
+    damage(record / "turning_points.csv", lambda content: content[:3000])
+    call = ["fit", str(record / "recording.csv"), "--record", "air-07"]
+    call += ["--calibration", str(record / "calibration.json")]
+    call += ["--turning-points", str(record / "turning_points.csv")]
+    call += ["--out", str(record / "fit.json"), "--refused", str(record / "refused.json")]
+    assert main(call) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "turning_points.csv: it is torn" in line
+    assert "run snakemake again" in line
+    assert not (record / "refused.json").exists()
+    assert not (record / "turning_points.csv").exists()

@@ -12,6 +12,7 @@ rule acquire:
     params:
         refusal=refusal,
         depends=lambda wildcards: jobs.acquisition(CAMPAIGN, wildcards.record),
+        repaired=repaired("{record}", "acquire"),
         code=code_version("pendpipe.commands.acquire"),
     message:
         "{wildcards.record}: acquire"

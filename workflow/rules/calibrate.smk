@@ -11,6 +11,7 @@ rule caliper:
     params:
         arm=jobs.caliper_arm(CAMPAIGN),
         depends=jobs.caliper(CAMPAIGN),
+        repaired=repaired("calibration", "caliper", "sensor"),
         code=code_version("pendpipe.stages.caliper")
         + code_version("pendpipe.commands.calibrate"),
     message:
@@ -36,6 +37,7 @@ rule calibrate:
             f"--sensor {input.sensor}" if input.sensor else ""
         ),
         given=lambda wildcards: jobs.sensor_constant(CAMPAIGN, wildcards.record),
+        repaired=repaired("{record}", "calibrate"),
         code=code_version("pendpipe.stages.calibrate"),
     message:
         "{wildcards.record}: calibrate"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
+from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
@@ -30,6 +31,30 @@ STRICT = CAMPAIGN.configuration.strict
 # The rules hand it on as a resource: unlike a parameter, that is nothing to rerun for. What
 # a rule takes from the configuration is digested in its own parameters.
 CONFIGURATION = jobs.store(CAMPAIGN, ".snakemake/pendpipe")
+
+
+def repaired(folder, *stages):
+    """The damages that made a job's stages run again: a new one is a changed parameter."""
+
+    def of_job(wildcards):
+        home = Path(RESULTS, folder.format(**wildcards))
+        return " ".join(
+            filter(None, (manifest.history(home, stage) for stage in stages))
+        )
+
+    return of_job
+
+
+def damaged_files(look):
+    """What `look` tells of every folder of results, a line for each damaged file."""
+    try:
+        return [
+            line
+            for folder in ("", "calibration", *RECORDS)
+            for line in look(Path(RESULTS, folder))
+        ]
+    except InputError as fault:
+        raise WorkflowError(str(fault)) from None
 
 
 wildcard_constraints:

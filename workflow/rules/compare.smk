@@ -13,6 +13,7 @@ rule compare:
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
+        repaired=repaired("", "compare"),
         code=code_version("pendpipe.commands.compare"),
     message:
         "the losses beside Eq. 16"

@@ -17,6 +17,7 @@ rule diagnose:
         level=CAMPAIGN.configuration.diagnose.level,
         figures=CAMPAIGN.configuration.diagnose.figures,
         seed=CAMPAIGN.configuration.seed,
+        repaired=repaired("{record}", "diagnose"),
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "{wildcards.record}: what physics is missing"

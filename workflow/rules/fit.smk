@@ -13,6 +13,7 @@ rule fit:
         refusal=refusal,
         method=CAMPAIGN.configuration.fit.method,
         seed=CAMPAIGN.configuration.seed,
+        repaired=repaired("{record}", "fit"),
         code=code_version("pendpipe.commands.fit"),
     message:
         "{wildcards.record}: fit a, b, c"

@@ -17,6 +17,7 @@ rule report:
     resources:
         configuration=CONFIGURATION,
     params:
+        repaired=repaired("", "report"),
         code=code_version("pendpipe.commands.report"),
         proof=proof_option,
     message:

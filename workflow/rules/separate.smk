@@ -11,6 +11,7 @@ rule separate:
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
+        repaired=repaired("", "separate"),
         code=code_version("pendpipe.commands.separate"),
     message:
         "hysteretic and viscous losses"

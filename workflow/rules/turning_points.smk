@@ -10,6 +10,7 @@ rule turning_points:
         "../envs/pendpipe.yaml"
     params:
         refusal=refusal,
+        repaired=repaired("{record}", "turning-points"),
         code=code_version("pendpipe.commands.turning_points"),
     message:
         "{wildcards.record}: turning points"

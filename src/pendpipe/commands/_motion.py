@@ -46,6 +46,6 @@ def _calibrated(path: Any) -> float | None:
         return None
     try:
         constant = read_json(path)["volts_per_radian"]
-    except (OSError, ValueError, KeyError):
+    except (KeyError, TypeError):
         raise InputError(path, "this is no calibration", "run pendpipe calibrate") from None
     return None if constant is None else float(constant["value"])

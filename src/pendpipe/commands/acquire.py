@@ -116,19 +116,26 @@ def _stage(arguments: argparse.Namespace) -> int:
 
     campaign, out = load(arguments.campaign), Path(arguments.out)
     if arguments.caliper:
+        from pendpipe.configuration.jobs import caliper_source
+        from pendpipe.manifest import job
         from pendpipe.stages.caliper import run_caliper
 
-        run_caliper(campaign, out)
+        source = caliper_source(campaign)
+        with job(out.parent, "caliper", sources=[source] if source else []) as running:
+            run_caliper(campaign, out)
+            running.outputs.append(out)
         return 0
     from pendpipe.stages.acquire import acquire_record
     from pendpipe.stages.refusal import run_stage
 
+    source = campaign.record(arguments.record).file
     return run_stage(
         "acquire",
         arguments.record,
         lambda: acquire_record(campaign, arguments.record, out),
         outputs=[out],
         refused=arguments.refused,
+        sources=[source] if source else [],
     )
 
 

@@ -47,7 +47,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate a sensor, or pick the constant of a record."""
-    return _sensor(arguments) if arguments.record is None else _record(arguments)
+    if arguments.record is not None:
+        return _record(arguments)
+    from pendpipe import manifest
+
+    if arguments.out is None or not (arguments.out.parent / manifest.FOLDER).is_dir():
+        return _sensor(arguments)
+    # The campaign's caliper run, in its folder of results.
+    with manifest.job(arguments.out.parent, "sensor", inputs=[arguments.file]) as running:
+        running.outputs.append(arguments.out)
+        return _sensor(arguments)
 
 
 def _sensor(arguments: argparse.Namespace) -> int:
@@ -120,4 +129,5 @@ def _record(arguments: argparse.Namespace) -> int:
         ),
         outputs=[arguments.out],
         refused=arguments.refused,
+        inputs=[arguments.file, arguments.sensor],
     )

@@ -18,8 +18,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare."""
+    from pendpipe.manifest import job
     from pendpipe.stages.compare import compare_campaign
+    from pendpipe.stages.results import record_files, sensor_file
 
     campaign = load(arguments.campaign)
-    compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
+    inputs = [
+        arguments.separation,
+        sensor_file(campaign),
+        *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
+    ]
+    with job(arguments.out.parent, "compare", inputs=inputs) as running:
+        compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
+        running.outputs += [arguments.out, arguments.summary]
     return 0

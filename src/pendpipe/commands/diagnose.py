@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.analysis.fit.fixed import parse_fixed
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
-    from pendpipe.stages.diagnose import DiagnosisOptions, refused_before
+    from pendpipe.stages.diagnose import DiagnosisOptions
 
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
@@ -92,6 +92,27 @@ def run(arguments: argparse.Namespace) -> int:
     if Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a place for it.
         make_folder(arguments.out)
+    if arguments.record is None:
+        return _answer(arguments, question)
+    from pendpipe.manifest import check, job
+    from pendpipe.stages.diagnose import RESULT
+
+    check([arguments.refused] if arguments.refused is not None else [])
+    read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
+    inputs = [path for path in read if path is not None]
+    with job(arguments.out.parent, "diagnose", inputs=inputs) as running:
+        status = _answer(arguments, question)
+        running.outputs.append(arguments.out / RESULT)
+        running.extras += sorted(
+            path for path in arguments.out.iterdir() if path.suffix in (".svg", ".png")
+        )
+    return status
+
+
+def _answer(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
+    """Diagnose, unless the record was refused before."""
+    from pendpipe.stages.diagnose import refused_before
+
     earlier = refused_before(arguments.refused)
     if earlier is not None:
         return _not_analysable(arguments, question, earlier, {})
@@ -100,7 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _diagnose(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
     from pendpipe.commands._motion import read_motion
-    from pendpipe.errors import InputError
+    from pendpipe.errors import DamagedError, InputError
     from pendpipe.stages.diagnose import diagnose_motion, write_diagnosis
 
     provenance: dict[str, Any] = {"seed": question.seed, "fixed": list(arguments.fix)}
@@ -116,7 +137,7 @@ def _diagnose(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
             progress=_say,
         )
     except InputError as fault:
-        if not Path(arguments.file).is_file():
+        if isinstance(fault, DamagedError) or not Path(arguments.file).is_file():
             raise
         from pendpipe.stages.refusal import within_results
 

@@ -9,6 +9,10 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pendpipe.manifest import Job
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,23 +36,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from pendpipe.figures.campaign import draw_all
     from pendpipe.figures.inputs import read_comparison, read_content, results_folder
-    from pendpipe.files import write_json
+    from pendpipe.manifest import check, job
 
     folder = results_folder(read_content(arguments.campaign))
-    drawn = draw_all(
-        read_comparison(arguments.comparison), folder, arguments.out, processes=arguments.processes
-    )
+    check([arguments.comparison])
+    comparison = read_comparison(arguments.comparison)
+    inputs = [
+        folder / entry["record"] / name
+        for entry in comparison["records"]
+        for name in ("recording.csv", "turning_points.csv", "fit.json")
+    ]
+    with job(folder, "figures", inputs=[arguments.comparison, *inputs]) as running:
+        return _draw(arguments, folder, comparison, running)
+
+
+def _draw(
+    arguments: argparse.Namespace, folder: Path, comparison: dict[str, Any], running: Job
+) -> int:
+    from pendpipe.figures.campaign import draw_all
+    from pendpipe.files import write_json
+
+    drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
     for name, reason in drawn.left_out.items():
         print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
     names = [
         (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
         for file in drawn.files
     ]
-    write_json(
-        arguments.out / "drawn.json",
-        {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)},
-    )
+    listed = arguments.out / "drawn.json"
+    write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
+    running.outputs.append(listed)
+    running.extras += drawn.files
     print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
     return 0

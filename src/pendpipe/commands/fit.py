@@ -71,10 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
     lights: list[str] = []
     status = run_stage(
         "fit",
-        arguments.record or arguments.file,
+        arguments.record,
         lambda: lights.append(_fit(arguments)),
         outputs=[arguments.out],
         refused=arguments.refused,
+        inputs=[Path(arguments.file), arguments.calibration, arguments.turning_points],
     )
     # In a campaign the light stands in the result, and the other records go on.
     contradicted = "red" in lights and not arguments.accept and arguments.refused is None

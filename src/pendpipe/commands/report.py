@@ -41,21 +41,28 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
     from pendpipe.figures.inputs import read_comparison, read_content, results_folder
     from pendpipe.files import replaced
+    from pendpipe.manifest import check, job
     from pendpipe.report.headline import as_text, headline
-    from pendpipe.report.page import render
+    from pendpipe.report.page import page_files, render
 
     configuration = read_content(arguments.campaign)
+    folder = results_folder(configuration)
+    figures = arguments.figures or arguments.out.parent / "figures"
+    check([arguments.comparison])
     comparison = read_comparison(arguments.comparison)
-    page = render(
-        configuration,
-        comparison,
-        read_content(arguments.summary, "run pendpipe compare first"),
-        results_folder(configuration),
-        arguments.figures or arguments.out.parent / "figures",
-        arguments.proof,
-    )
-    with replaced(arguments.out) as stream:
-        stream.write(page)
+    inputs = [arguments.comparison, arguments.summary, *page_files(comparison, folder, figures)]
+    with job(folder, "report", inputs=inputs) as running:
+        page = render(
+            configuration,
+            comparison,
+            read_content(arguments.summary, "run pendpipe compare first"),
+            folder,
+            figures,
+            arguments.proof,
+        )
+        with replaced(arguments.out) as stream:
+            stream.write(page)
+        running.outputs.append(arguments.out)
     print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
     if rows := headline(comparison, configuration.get("simulated") or {}):
         print(as_text(rows))

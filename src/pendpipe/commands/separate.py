@@ -16,7 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Separate."""
+    from pendpipe.manifest import job
+    from pendpipe.stages.results import record_files
     from pendpipe.stages.separate import separate_campaign
 
-    separate_campaign(load(arguments.campaign), arguments.out)
+    campaign = load(arguments.campaign)
+    inputs = record_files(campaign, "fit.json", "calibration.json")
+    with job(arguments.out.parent, "separate", inputs=inputs) as running:
+        separate_campaign(campaign, arguments.out)
+        running.outputs.append(arguments.out)
     return 0

@@ -31,10 +31,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     return run_stage(
         "turning-points",
-        arguments.record or arguments.file,
+        arguments.record,
         lambda: _measure(arguments),
         outputs=[arguments.out],
         refused=arguments.refused,
+        inputs=[Path(arguments.file), arguments.calibration],
     )
 
 

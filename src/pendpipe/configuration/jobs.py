@@ -12,6 +12,7 @@ from typing import Any
 
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import replaced
+from pendpipe.manifest import source_sha256
 from pendpipe.process import one_thread
 
 
@@ -58,10 +59,13 @@ def source_files(campaign: Campaign, record: str) -> list[str]:
 
 
 def acquisition(campaign: Campaign, record: str) -> str:
-    """Digest all that a record's acquisition depends on."""
+    """Digest all that a record's acquisition depends on, a file's content included."""
     row = campaign.record(record)
     settings = campaign.configuration
     content: dict[str, Any] = {"row": asdict(row)}
+    if row.file is not None:
+        home = Path(settings.results, record)
+        content["source_sha256"] = source_sha256(home, "acquire", row.file)
     if row.source == "simulated":
         assert settings.simulated is not None
         truth = settings.simulated.model_dump()
@@ -84,10 +88,20 @@ def caliper(campaign: Campaign) -> str:
         "run": settings.calibration and settings.calibration.model_dump(),
         "seed": settings.seed,
     }
+    source = caliper_source(campaign)
+    if source is not None:
+        home = Path(settings.results, "calibration")
+        content["source_sha256"] = source_sha256(home, "caliper", source)
     if settings.simulated is not None:
         content["sensor"] = settings.simulated.sensor.model_dump()
         content["device"] = settings.simulated.device.model_dump()
     return digest(content)
+
+
+def caliper_source(campaign: Campaign) -> Path | None:
+    """The user's table of the caliper run, where the run is not simulated."""
+    run = campaign.configuration.calibration
+    return None if run is None or run.source == "simulated" else Path(run.source)
 
 
 def caliper_arm(campaign: Campaign) -> str:

@@ -106,6 +106,22 @@ def render(
     )
 
 
+def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
+    """The results beside the comparison that a page is made of, where they are there."""
+    files = [figures / f"{name}.svg" for name in CAPTIONS]
+    files += [
+        folder / str(entry["record"]) / name
+        for entry in comparison["records"]
+        for name in (
+            "fit.json",
+            "figures/decay.svg",
+            "diagnosis/diagnosis.json",
+            "diagnosis/residual_map.svg",
+        )
+    ]
+    return [path for path in files if path.is_file()]
+
+
 def _campaign_figures(figures: Path) -> dict[str, Markup]:
     """The figures that are there, ready for the page."""
     drawn = {}

@@ -22,7 +22,7 @@ from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
 from pendpipe.stages.provenance import stamp
-from pendpipe.stages.results import RecordResult, read_results
+from pendpipe.stages.results import RecordResult, read_results, sensor_file
 from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.stages.summary import campaign_summary
 from pendpipe.stages.theory import branch_curves, record_theory
@@ -263,7 +263,5 @@ def _calibration(campaign: Campaign) -> dict[str, Any] | None:
     """The caliper run with its line and its test."""
     if campaign.configuration.calibration is None:
         return None
-    content: dict[str, Any] = read_json(
-        Path(campaign.configuration.results) / "calibration" / "sensor.json"
-    )
+    content: dict[str, Any] = read_json(sensor_file(campaign))
     return content

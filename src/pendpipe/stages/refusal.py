@@ -8,12 +8,13 @@ see ``refused.json``, write their stubs and go on.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.errors import InputError
+from pendpipe.errors import DamagedError, InputError
 from pendpipe.files import read_json, replaced, write_json
+from pendpipe.manifest import check, job
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
 """The stages that run once a record, in the order of the data."""
@@ -21,25 +22,58 @@ ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
 
 def run_stage(
     stage: str,
-    record: str,
+    record: str | None,
     work: Callable[[], None],
     *,
     outputs: Sequence[Path],
     refused: Path | None,
+    inputs: Iterable[Path | None] = (),
+    sources: Iterable[Path] = (),
 ) -> int:
-    """Run one stage of one record; on the record's own fault refuse it.
+    """Run one stage of one record; if the record can't be used, refuse it.
 
     Parameters
     ----------
-    stage, record
-        What runs, for whom; `stage` is one of `ORDER`.
+    stage
+        What runs, one of `ORDER`.
+    record
+        The campaign's record; ``None`` outside a campaign, where nothing is checked or
+        recorded.
     work
         Does it, and writes all of `outputs`.
     outputs
-        The files that the stage declares.
+        The files that the stage declares, in the record's folder.
     refused
-        Where a refusal is written; ``None`` lets the fault end the program (status 2).
+        Where a refusal is written; ``None`` lets the error end the program (status 2).
+    inputs, sources
+        The results and the user's files that are read (`pendpipe.manifest`).
+
+    Raises
+    ------
+    DamagedError
+        If a result that is read is not what its stage wrote. That refuses no record.
     """
+    if record is None:
+        return _work_or_refuse(stage, str(outputs[0]), work, outputs, refused)
+    if refused is not None:
+        check([refused])
+    home = outputs[0].parent
+    given = [path for path in inputs if path is not None]
+    with job(home, stage, inputs=given, sources=sources) as running:
+        status = _work_or_refuse(stage, record, work, outputs, refused)
+        running.outputs += outputs
+        if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
+            running.extras.append(refused)
+    return status
+
+
+def _work_or_refuse(
+    stage: str,
+    record: str,
+    work: Callable[[], None],
+    outputs: Sequence[Path],
+    refused: Path | None,
+) -> int:
     if refused is None:
         work()
         return 0
@@ -51,6 +85,8 @@ def run_stage(
     refused.unlink(missing_ok=True)
     try:
         work()
+    except DamagedError:
+        raise
     except InputError as fault:
         reason = within_results(fault, refused)
         write_json(

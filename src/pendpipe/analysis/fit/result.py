@@ -166,12 +166,7 @@ def read_fit(path: str | Path) -> FitResult:
     InputError
         If the file is absent, is no fit, or holds the refusal of its record.
     """
-    try:
-        content = read_json(path)
-    except FileNotFoundError:
-        raise InputError(path, "there is no such file", "run pendpipe fit") from None
-    except ValueError:
-        raise InputError(path, "this is no JSON", "make it again with pendpipe fit") from None
+    content = read_json(path)
     if "refused" in content:
         raise InputError(path, f"the record was refused ({content['refused']})", "mend it first")
     try:

@@ -13,6 +13,7 @@ import numpy as np
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
+from pendpipe.recording import whole_lines
 
 COLUMNS: Final = (
     "half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad",
@@ -154,7 +155,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     """
     place = Path(path)
     try:
-        lines = place.read_text(encoding="utf-8").splitlines()
+        lines, cut_short = whole_lines(place.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(place, "there is no such file", "run pendpipe turning-points") from None
     start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
@@ -189,7 +190,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         wanders=metadata.pop("level", "constant") == "wanders",
         cuts=cuts,
         metadata=metadata,
-        notes=tuple(value for key, value in head if key == "note"),
+        notes=(*(value for key, value in head if key == "note"), *cut_short),
     )
 
 

@@ -1,0 +1,363 @@
+"""What each stage read and wrote: length and hash, kept beside the results.
+
+A stage that ends leaves ``manifest/<stage>.json`` in its folder (a record's, or the
+campaign's), a file for each stage since fit and diagnosis run at once. A job hashes every
+result that it reads and compares it with the manifest of the stage that wrote it: a
+damaged file is set aside under another name, and Snakemake makes it again.
+
+Planning must notice a file whose old time was put back, without hashing thousands of
+files. No program can set a file's time of change (``st_ctime``): a file of the right
+length that has not changed since its manifest was written is sound.
+
+Snakemake compares a rule's parameters with those of its last run. `history` is such a
+parameter: it lists every damage of a stage's results, and keeps those that were repaired,
+so that each damage runs the stage once.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from pendpipe.errors import DamagedError, InputError
+from pendpipe.files import read_json, sha256, write_json
+
+FOLDER: Final = "manifest"
+SET_ASIDE: Final = ".damaged-"
+"""Stands in the name of a damaged file, before the first digits of its hash."""
+
+
+class Sum(NamedTuple):
+    """Length and hash of a file."""
+
+    length: int
+    sha256: str
+
+
+class Damage(NamedTuple):
+    """A result that is not what its stage wrote."""
+
+    path: Path
+    problem: str
+    found: str
+    """First digits of the hash of what is there now; ``missing`` where nothing is."""
+
+    @property
+    def mark(self) -> str:
+        """Name the damage in a manifest's history."""
+        return f"{self.path.name}:{self.found}"
+
+
+@dataclass
+class Manifest:
+    """What one stage read and wrote.
+
+    Parameters
+    ----------
+    home
+        The folder that the names are relative to.
+    stage
+        Its name.
+    outputs
+        The files that Snakemake knows, by name.
+    extras
+        Others: a figure of a record, ``refused.json``.
+    inputs
+        Results of other stages that were read, by name, with their hashes.
+    sources
+        Files of the user, by name alone.
+    repaired
+        Marks of the damages that made the stage run again.
+    """
+
+    home: Path
+    stage: str
+    outputs: dict[str, Sum] = field(default_factory=dict)
+    extras: dict[str, Sum] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, Sum] = field(default_factory=dict)
+    repaired: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """The manifest's own file."""
+        return self.home / FOLDER / f"{self.stage}.json"
+
+    def write(self) -> None:
+        """Write it; two runs of the same campaign write the same bytes."""
+        content: dict[str, Any] = {"schema_version": 1, "stage": self.stage}
+        for name in ("outputs", "extras", "sources"):
+            content[name] = {key: entry._asdict() for key, entry in getattr(self, name).items()}
+        write_json(self.path, content | {"inputs": self.inputs, "repaired": list(self.repaired)})
+
+    def damages(self, *, hash_all: bool = False) -> list[Damage]:
+        """Compare the results with what was written.
+
+        A missing output is none: Snakemake sees it by itself. Only files whose length or
+        time of change differs are hashed, unless `hash_all`.
+        """
+        if not self.path.is_file():
+            return []
+        since = None if hash_all else self.path.stat().st_mtime_ns
+        found = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
+        found = [damage for damage in found if damage and damage.found != "missing"]
+        found += [_compare(self.home / name, made, since) for name, made in self.extras.items()]
+        return [damage for damage in found if damage]
+
+
+def read_manifest(home: Path, stage: str) -> Manifest:
+    """Read a stage's manifest; an empty one where there is none.
+
+    Raises
+    ------
+    DamagedError
+        If the file is no manifest.
+    """
+    manifest = Manifest(home, stage)
+    if not manifest.path.is_file():
+        return manifest
+    try:
+        content = read_json(manifest.path)
+        for name in ("outputs", "extras", "sources"):
+            entries = content[name].items()
+            setattr(manifest, name, {key: Sum(**entry) for key, entry in entries})
+        manifest.inputs, manifest.repaired = dict(content["inputs"]), tuple(content["repaired"])
+    except (InputError, AttributeError, KeyError, TypeError, ValueError):
+        raise DamagedError(
+            manifest.path, "this is no manifest", "run snakemake again: its stage makes it anew"
+        ) from None
+    return manifest
+
+
+def manifests(home: Path) -> Iterator[Manifest]:
+    """Read all manifests of a folder; one that can't be read holds nothing."""
+    for path in sorted((home / FOLDER).glob("*.json")):
+        try:
+            yield read_manifest(home, path.stem)
+        except DamagedError:
+            yield Manifest(home, path.stem)
+
+
+def damages_of(home: Path, stage: str) -> tuple[Manifest, list[Damage]]:
+    """Look for damage among a stage's results, its manifest included."""
+    try:
+        manifest = read_manifest(home, stage)
+    except DamagedError as fault:
+        manifest = Manifest(home, stage)
+        return manifest, [Damage(manifest.path, fault.problem, sha256(manifest.path)[:8])]
+    return manifest, manifest.damages()
+
+
+def history(home: Path, stage: str) -> str:
+    """List the damages of a stage's results, repaired or not: a parameter of its rule."""
+    manifest, found = damages_of(home, stage)
+    return " ".join((*manifest.repaired, *(damage.mark for damage in found)))
+
+
+def noticed(home: Path) -> list[str]:
+    """Name what is damaged in a folder of results, and leave it there."""
+    return [
+        f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
+        for path in sorted((home / FOLDER).glob("*.json"))
+        for damage in damages_of(home, path.stem)[1]
+    ]
+
+
+def set_aside_damaged(home: Path) -> list[str]:
+    """Before the jobs run: set aside what is damaged in a folder of results.
+
+    Returns
+    -------
+    list of str
+        A line for each damaged file.
+    """
+    lines = []
+    for path in sorted((home / FOLDER).glob("*.json")):
+        manifest, found = damages_of(home, path.stem)
+        lines += [f"{damage.path}: {damage.problem}; {set_aside(damage)}" for damage in found]
+        if found:
+            damaged = {damage.path for damage in found}
+            manifest.outputs = {
+                name: made for name, made in manifest.outputs.items() if home / name not in damaged
+            }
+            manifest.extras = {}
+            manifest.repaired += tuple(damage.mark for damage in found)
+            manifest.write()
+        elif path.is_file():
+            # All is sound: files whose time of change is younger need no second hash.
+            with suppress(OSError):
+                os.utime(path)
+    return lines
+
+
+def set_aside(damage: Damage) -> str:
+    """Give a damaged file another name beside its own, and say which."""
+    if damage.found == "missing":
+        return "its stage runs again"
+    kept = damage.path.with_name(f"{damage.path.name}{SET_ASIDE}{damage.found}")
+    try:
+        damage.path.replace(kept)
+    except OSError as fault:
+        raise InputError(
+            damage.path,
+            f"{damage.problem}, and it can't be renamed ({fault.strerror})",
+            "make the folder writable",
+        ) from None
+    return f"set aside as {kept.name}"
+
+
+@dataclass
+class Job:
+    """What a running stage will leave in its manifest."""
+
+    outputs: list[Path] = field(default_factory=list)
+    extras: list[Path] = field(default_factory=list)
+
+
+@contextmanager
+def job(
+    home: Path, stage: str, *, inputs: Iterable[Path] = (), sources: Iterable[Path] = ()
+) -> Iterator[Job]:
+    """Run a stage between a check of what it reads and a record of what it wrote.
+
+    Parameters
+    ----------
+    home, stage
+        The folder of the results, and the stage's name.
+    inputs
+        Results of other stages. What is damaged is set aside, and the stage doesn't run.
+    sources
+        Files of the user: recorded and never touched. A missing one is left to the stage.
+
+    Raises
+    ------
+    DamagedError
+        If an input is not what its stage wrote, or was made from other files than those
+        that are there now.
+    """
+    checked = check(inputs)
+    try:
+        repaired = read_manifest(home, stage).repaired
+    except DamagedError:
+        repaired = ()
+    # Until the stage has ended its old results are nobody's.
+    Manifest(home, stage, repaired=repaired).write()
+    running = Job()
+    yield running
+    Manifest(
+        home,
+        stage,
+        outputs={_name(path, home): sum_of(path) for path in running.outputs if path.is_file()},
+        extras={_name(path, home): sum_of(path) for path in running.extras if path.is_file()},
+        inputs={_name(path, home): made for path, made in checked.items()},
+        sources={path.name: sum_of(path) for path in sources if path.is_file()},
+        repaired=repaired,
+    ).write()
+
+
+def check(paths: Iterable[Path]) -> dict[Path, str]:
+    """Hash results before they are read; set aside the first that is damaged.
+
+    A file that no manifest lists, from before there were manifests, is read as it is.
+    """
+    index = _Index()
+    hashes = {}
+    for path in paths:
+        if not path.is_file():
+            continue  # the stage says what is missing, and how to make it
+        found = index.find(path)
+        if found is None:
+            hashes[path] = sha256(path)
+            continue
+        owner, made = found
+        damage = _compare(path, made, None) or index.made_from_others(path, owner)
+        if damage is not None:
+            raise DamagedError(
+                path,
+                f"{damage.problem}, {set_aside(damage)}",
+                f"run snakemake again: stage {owner.stage} makes it anew",
+            )
+        hashes[path] = made.sha256
+    return hashes
+
+
+class _Index:
+    """Finds the manifest that lists a file, reading each folder's manifests once."""
+
+    def __init__(self) -> None:
+        self._homes: dict[Path, dict[str, tuple[Manifest, Sum]]] = {}
+
+    def find(self, path: Path) -> tuple[Manifest, Sum] | None:
+        """Look in the file's own folder and in the two above it."""
+        for home in path.absolute().parents[:3]:
+            if home not in self._homes:
+                self._homes[home] = {
+                    name: (manifest, made)
+                    for manifest in manifests(home)
+                    for name, made in (manifest.outputs | manifest.extras).items()
+                }
+            if found := self._homes[home].get(_name(path, home)):
+                return found
+        return None
+
+    def made_from_others(self, path: Path, owner: Manifest) -> Damage | None:
+        """Whether a result was made from other files than those that are there now."""
+        for name, was in owner.inputs.items():
+            found = self.find(owner.home / name)
+            if found is not None and found[1].sha256 != was:
+                problem = f"it was made from another {Path(name).name} than the one there now"
+                return Damage(path, problem, sha256(path)[:8])
+        return None
+
+
+def sum_of(path: Path) -> Sum:
+    """Measure and hash a file."""
+    return Sum(path.stat().st_size, sha256(path))
+
+
+def source_sha256(home: Path, stage: str, source: Path) -> str | None:
+    """Hash a file of the user; from the manifest if it has not changed since."""
+    if not source.is_file():
+        return None
+    try:
+        manifest = read_manifest(home, stage)
+    except DamagedError:
+        manifest = Manifest(home, stage)
+    made = manifest.sources.get(source.name)
+    if made is not None and _unchanged(source, made, manifest.path.stat().st_mtime_ns):
+        return made.sha256
+    return sha256(source)
+
+
+def _name(path: Path, home: Path) -> str:
+    return Path(os.path.relpath(path.absolute(), home.absolute())).as_posix()
+
+
+def _unchanged(path: Path, made: Sum, since_ns: int) -> bool:
+    """Whether a file has its length, and nobody has changed it since a moment."""
+    status = path.stat()
+    # On Windows st_ctime is the time of creation, and st_mtime all there is.
+    changed_ns = max(status.st_ctime_ns, status.st_mtime_ns)
+    return status.st_size == made.length and changed_ns < since_ns
+
+
+def _compare(path: Path, made: Sum, since_ns: int | None) -> Damage | None:
+    """Compare a file with what was written; hash it if it has changed since."""
+    if not path.is_file():
+        return Damage(path, "it is missing", "missing")
+    if since_ns is not None and _unchanged(path, made, since_ns):
+        return None
+    length, found = sum_of(path)
+    if found == made.sha256:
+        return None
+    if length == 0:
+        problem = "it is empty"
+    elif length < made.length:
+        problem = f"it is torn or altered ({length} bytes of {made.length})"
+    else:
+        problem = "it was altered"
+    return Damage(path, problem, found[:8])

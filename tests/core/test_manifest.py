@@ -1,0 +1,149 @@
+"""A result that is not what its stage wrote is named, set aside, and never read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pendpipe import manifest
+from pendpipe.errors import DamagedError
+from pendpipe.files import read_json
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A record whose stage `acquire` wrote a recording, and `fit` a fit made from it."""
+    recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
+    with manifest.job(tmp_path, "acquire") as running:
+        recording.write_text("time_s,volts\n0.0,1.0\n0.1,2.0\n")
+        running.outputs.append(recording)
+    with manifest.job(tmp_path, "fit", inputs=[recording]) as running:
+        fit.write_text('{"a": 1}\n')
+        running.outputs.append(fit)
+    return tmp_path
+
+
+def with_its_old_time(path: Path, change: Callable[[bytes], bytes]) -> None:
+    """Change a file and put its time of modification back."""
+    before = path.stat()
+    path.write_bytes(change(path.read_bytes()))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def cut(content: bytes) -> bytes:
+    return content[:-5]
+
+
+def emptied(_: bytes) -> bytes:
+    return b""
+
+
+def altered(content: bytes) -> bytes:
+    return content.replace(b"1", b"7")
+
+
+DAMAGES = pytest.mark.parametrize(
+    ("change", "problem"),
+    [(cut, "torn"), (emptied, "empty"), (altered, "altered")],
+)
+
+
+@DAMAGES
+def test_a_job_sets_a_damaged_input_aside_and_does_not_run(
+    home: Path, change: Callable[[bytes], bytes], problem: str
+) -> None:
+    recording = home / "recording.csv"
+    with_its_old_time(recording, change)
+    damaged = recording.read_bytes()
+    with (
+        pytest.raises(DamagedError, match=f"recording.csv: it .*{problem}.* snakemake") as caught,
+        manifest.job(home, "fit", inputs=[recording]),
+    ):
+        raise AssertionError
+    assert "\n" not in str(caught.value)
+    assert not recording.exists()
+    (kept,) = home.glob("recording.csv.damaged-*")
+    assert kept.read_bytes() == damaged
+
+
+@DAMAGES
+def test_planning_notices_a_damage_whose_time_was_put_back_and_touches_nothing(
+    home: Path, change: Callable[[bytes], bytes], problem: str
+) -> None:
+    assert manifest.noticed(home) == []
+    with_its_old_time(home / "fit.json", change)
+    before = sorted(home.rglob("*"))
+    (line,) = manifest.noticed(home)
+    assert line.startswith(f"{home / 'fit.json'}: ")
+    assert problem in line
+    assert sorted(home.rglob("*")) == before
+
+
+def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
+    """It is new when the damage is noticed, and the same after the repair."""
+    assert manifest.history(home, "fit") == ""
+    with_its_old_time(home / "fit.json", emptied)
+    planned = manifest.history(home, "fit")
+    assert planned == "fit.json:e3b0c442"
+    manifest.set_aside_damaged(home)
+    assert manifest.history(home, "fit") == planned
+    with manifest.job(home, "fit", inputs=[home / "recording.csv"]) as running:
+        (home / "fit.json").write_text('{"a": 1}\n')
+        running.outputs.append(home / "fit.json")
+    assert manifest.history(home, "fit") == planned
+    assert manifest.noticed(home) == []
+    with_its_old_time(home / "fit.json", emptied)
+    assert manifest.history(home, "fit") == f"{planned} {planned}"
+
+
+def test_a_damaged_manifest_is_damage_too(home: Path) -> None:
+    with_its_old_time(home / "manifest/fit.json", cut)
+    assert manifest.history(home, "fit") != ""
+    (line,) = manifest.set_aside_damaged(home)
+    assert "this is no manifest" in line
+    assert manifest.noticed(home) == []
+
+
+def test_a_sound_copy_of_the_results_is_sound(home: Path) -> None:
+    """A copy has new times of change: its files are hashed, and found as they were."""
+    for path in [*home.glob("*.*"), *home.glob("manifest/*")]:
+        path.write_bytes(path.read_bytes())
+    assert manifest.noticed(home) == []
+
+
+def test_a_result_made_from_another_recording_is_not_read(home: Path) -> None:
+    with manifest.job(home, "acquire") as running:
+        (home / "recording.csv").write_text("time_s,volts\n0.0,3.0\n")
+        running.outputs.append(home / "recording.csv")
+    with pytest.raises(DamagedError, match=r"made from another recording\.csv"):
+        manifest.check([home / "fit.json"])
+
+
+def test_a_result_from_before_there_were_manifests_is_read(home: Path) -> None:
+    for path in home.glob("manifest/*"):
+        path.unlink()
+    with_its_old_time(home / "recording.csv", cut)
+    assert home / "recording.csv" in manifest.check([home / "recording.csv"])
+
+
+def test_a_source_is_recorded_and_never_touched(home: Path, tmp_path: Path) -> None:
+    source = tmp_path / "run 7.csv"
+    source.write_text("mine\n")
+    with manifest.job(home, "acquire", sources=[source]):
+        pass
+    before = manifest.source_sha256(home, "acquire", source)
+    with_its_old_time(source, bytes)  # written again as it was
+    assert manifest.source_sha256(home, "acquire", source) == before
+    with_its_old_time(source, cut)
+    assert manifest.source_sha256(home, "acquire", source) != before
+    assert manifest.noticed(home) == []
+    assert source.exists()
+
+
+def test_a_stage_that_fails_leaves_no_claim_about_its_results(home: Path) -> None:
+    with pytest.raises(ZeroDivisionError), manifest.job(home, "fit"):
+        raise ZeroDivisionError
+    assert read_json(home / "manifest/fit.json")["outputs"] == {}
