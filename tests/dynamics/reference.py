@@ -166,13 +166,15 @@ class MpmathPendulum:
 
 
 @functools.cache
-def _heyoka_integrator() -> tuple[Any, list[tuple[float, float]]]:
+def _heyoka_integrator(restoring: str) -> tuple[Any, list[tuple[float, float]]]:
     """Return an integrator of the half cycle from the right to the left, and the log of its end."""
     heyoka = pytest.importorskip("heyoka", reason="heyoka is not installed")
     x, v = heyoka.make_vars("x", "v")
     f_c, f_h, f_q, damping, omega2 = (heyoka.par[i] for i in range(5))
-    square = omega2 * x**2 + v**2
+    sine = restoring == "sine"
+    square = v**2 + omega2 * (4.0 * heyoka.sin(0.5 * x) ** 2 if sine else x**2)
     friction = f_c + f_h * heyoka.sqrt(square) + f_q * square
+    torque = omega2 * (heyoka.sin(x) if sine else x)
     log: list[tuple[float, float]] = []
 
     def turned(integrator: Any, _slope: int) -> bool:
@@ -182,31 +184,50 @@ def _heyoka_integrator() -> tuple[Any, list[tuple[float, float]]]:
     # The velocity falls from zero at the start, and rises to zero at the end.
     event = heyoka.t_event(v, callback=turned, direction=heyoka.event_direction.positive)
     integrator = heyoka.taylor_adaptive(
-        [(x, v), (v, friction - omega2 * x - damping * v)], [1.0, 0.0], pars=[0.0] * 5,
+        [(x, v), (v, friction - torque - damping * v)], [1.0, 0.0], pars=[0.0] * 5,
         tol=1e-16, t_events=[event],
     )  # fmt: skip
     return integrator, log
 
 
+def _released(model: Eq8, amplitude: float) -> tuple[Any, list[tuple[float, float]], float]:
+    """Return heyoka's half cycle from an amplitude, the log of its end, and the unit of angle."""
+    integrator, log = _heyoka_integrator(model.restoring)
+    w = model.angular_frequency
+    # In units of the amplitude: below 1 heyoka's tolerance is absolute. (sin x has no unit.)
+    unit = amplitude if model.restoring == "linear" else 1.0
+    integrator.pars[:] = [
+        math.pi * w * model.coulomb / 2 / unit, math.pi * model.hysteretic / 2,
+        math.pi * model.quadratic / (2 * w) * unit, 2 * model.viscous, w**2,
+    ]  # fmt: skip
+    integrator.time, integrator.state[:] = 0.0, [amplitude / unit, 0.0]
+    integrator.reset_cooldowns()
+    log.clear()
+    return integrator, log, unit
+
+
 def heyoka_turning_points(
-    model: Eq8, y: float, count: int, moves: Any
+    model: Eq8, y: float, count: int, moves: Any = lambda _: True
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return turning points by heyoka; `moves(amplitude)` says if the pendulum leaves one."""
-    integrator, log = _heyoka_integrator()
-    w = model.angular_frequency
     times, angles = [0.0], [y]
     while len(times) < count and moves(abs(angles[-1])):
-        # In units of the amplitude: below 1 heyoka's tolerance is absolute.
-        unit = abs(angles[-1])
-        integrator.pars[:] = [
-            math.pi * w * model.coulomb / 2 / unit, math.pi * model.hysteretic / 2,
-            math.pi * model.quadratic / (2 * w) * unit, 2 * model.viscous, w**2,
-        ]  # fmt: skip
-        integrator.time, integrator.state[:] = 0.0, [1.0, 0.0]
-        integrator.reset_cooldowns()
-        log.clear()
-        integrator.propagate_until(100.0 * math.pi / w)
+        integrator, log, unit = _released(model, abs(angles[-1]))
+        integrator.propagate_until(100.0 * math.pi / model.angular_frequency)
         ((duration, angle),) = log
         times.append(times[-1] + duration)
-        angles.append(angles[-1] * angle)
+        angles.append(math.copysign(unit, angles[-1]) * angle)
     return np.array(times), np.array(angles)
+
+
+def heyoka_samples(model: Eq8, y: float, time_s: np.ndarray) -> np.ndarray:
+    """Return the angles at ascending times, half cycle after half cycle."""
+    count = int(model.angular_frequency * time_s[-1] / math.pi) + 2
+    times, angles = heyoka_turning_points(model, y, count)
+    found = np.empty(len(time_s))
+    for begin, end, start in zip(times, times[1:], angles, strict=False):
+        integrator, _, unit = _released(model, abs(start))
+        for i in np.flatnonzero((time_s >= begin) & (time_s < end)):
+            integrator.propagate_until(time_s[i] - begin)
+            found[i] = math.copysign(unit, start) * integrator.state[0]
+    return found

@@ -153,9 +153,9 @@ def test_the_engine_writes_only_where_it_may(
     buffer, buffer_at = guarded(size)
     inside = buffer[guard : guard + size]
     inside[:] = 0.0
-    inside[:9] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0)
-    inside[9 : 9 + directions] = 0.1
-    inside[9 + directions : inputs_size(directions)] = model.shape_derivatives()[
+    inside[:10] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0)
+    inside[10 : 10 + directions] = 0.1
+    inside[10 + directions : inputs_size(directions)] = model.shape_derivatives()[
         :directions
     ].ravel()
     time_s = np.linspace(0.0, 100.0, samples)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
 from pendpipe.dynamics.layout import NODE_COUNT
-from pendpipe.dynamics.panel import kernel, part
+from pendpipe.dynamics.panel import angle_of, curve, kernel, part
 from pendpipe.dynamics.polynomials import horner
 
 if TYPE_CHECKING:
@@ -142,16 +142,16 @@ def rest(
 ) -> None:  # fmt: skip
     """Write the samples after the stop: the last turning point, exactly."""
     directions, omega = work.rates.size, work.motion[0]
-    level = signs[0] * y + work.motion[2]
+    level, bend = signs[0] * angle_of(work.shape, y) + work.motion[2], curve(work.shape, y)
     if work.amplitude.size > 0:
         if work.readings.size > 0:
             add_batch(work)
         by_omega = 0.0
         for c in range(directions):
-            work.some[c, 0] = signs[0] * work.amplitude[c + 1]
+            work.some[c, 0] = signs[0] * work.amplitude[c + 1] / bend
             by_omega -= work.rates[c] / omega * work.some[c, 0]
         work.some[directions, 0] = by_omega
-        work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0]
+        work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0] / bend
         work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
         if work.readings.size > 0:
             compare_rest(work, level, first)

@@ -38,11 +38,14 @@ def run(
     sums: FloatArray = NO_SAMPLES,
 ) -> tuple[int, bool]:
     """Call the engine; return the number of turning points and whether the last is the stop."""
+    if model.restoring == "sine" and not abs(release.angle_rad) < math.pi:
+        message = f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
+        raise ValueError(message)
     count = rates.size
     sensitivities = count + 1 if count else 0
     polynomials = sensitivities + 1 if time_s.size else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
-    buffer = np.zeros(_buffer_size(count, sensitivities, polynomials))
+    buffer = np.empty(_buffer_size(count, sensitivities, polynomials))
     buffer[:CONSTANTS] = (
         *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
     )  # fmt: skip

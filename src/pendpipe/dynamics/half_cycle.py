@@ -4,10 +4,13 @@ What a half cycle hands on is one row of numbers, the same whether it was solved
 from the table (`table.py`):
 
     [0]  ln(y/y'), the loss of amplitude          [1]  duration in radians, less pi
+         (for the sine ln(y C'/(C y')), the loss of `panel.log_amplitude`)
     [HEAD ...]  for each sensitivity (the amplitude y at the start, then the rates)
                 dy'/dy or (dy'/dp)/y, and after these y dtau/dy or dtau/dp
-    then for each panel   tau - psi at its end, and the polynomials of degree 16 in time:
+    then for each panel   tau - w at its end, and the polynomials of degree 16 in time:
                 x/y, dx/dy, (dx/dp)/y at fixed time since the start of the half cycle.
+
+An amplitude y is one of s (see `panel.py`), x is the angle.
 """
 
 from __future__ import annotations
@@ -16,11 +19,16 @@ import math
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit
-from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT
+from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS
 from pendpipe.dynamics.panel import (
     COS,
+    CURVATURE,
     EXCESS,
     LOSS,
+    angle_of,
+    complement_for,
+    curve,
+    log_amplitude,
     part,
     place,
     polynomial,
@@ -37,7 +45,7 @@ if TYPE_CHECKING:
 
 LOSS_TOLERANCE = 5e-9
 """Bound of `solve`'s estimate, a thousand times the error: that is 5e-12 of a half cycle's loss."""
-WAVEFORM_TOLERANCE = 1e-12
+WAVEFORM_TOLERANCE, SINE_TOLERANCE = 1e-12, 2e-11
 """Of the polynomial in time, relative to the amplitude."""
 FINEST = 30
 """The finest panel is a half cycle halved so often; it is accepted as it is."""
@@ -66,36 +74,40 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
 
 @part
 def _solve_panel(
-    work: Work, radius: float, start: float, half_width: float, y: float, finest: bool,
-    polynomials: FloatArray,
+    work: Work, node: FloatArray, radius: float, p: int, panels: int, y: float, complement: float,
+    finest: bool, polynomials: FloatArray,
 ) -> bool:  # fmt: skip
-    """Solve a panel with all that is asked of it; say whether it is resolved."""
-    place(work.node, work.placed, start, half_width)
+    """Solve panel p of `panels` with all that is asked of it; say whether it is resolved."""
+    half_width = 0.5 * math.pi / panels
+    place(node, 2.0 * p * half_width, half_width, complement)
     tolerance = math.inf if finest else LOSS_TOLERANCE
-    if not solve(work.node, work.shape, radius, half_width, tolerance):
+    if not solve(node, work.shape, radius, half_width, tolerance):
         return False
     if work.sigma.size > 0:
         sensitivities(
-            work.node, work.shape, work.directions, radius, half_width,
+            node, work.shape, work.directions, radius, half_width,
             work.sigma, work.shift, work.columns,
         )  # fmt: skip
     if polynomials.size == 0:
         return True
-    return _in_time(work, radius, half_width, y, polynomials) or finest
+    return _in_time(work, node, radius, half_width, y, polynomials) or finest
 
 
 @part
 def _in_time(
-    work: Work, radius: float, half_width: float, y: float, polynomials: FloatArray
-) -> bool:
+    work: Work, node: FloatArray, radius: float, half_width: float, y: float,
+    polynomials: FloatArray,
+) -> bool:  # fmt: skip
     """Write a solved panel's polynomials in time; say whether they resolve the waveform."""
-    n, node, count = NODE_COUNT, work.node, work.sigma.size
+    n, count = NODE_COUNT, work.sigma.size
     time_nodes(node, half_width, work.chebyshev)
     waveform = work.columns[count]
     for j in range(n):
-        waveform[j] = (work.shape[0] + radius * (1.0 + node[LOSS + j]) * node[COS + j]) / y
+        s = work.shape[0] + radius * (1.0 + node[LOSS + j]) * node[COS + j]
+        waveform[j] = angle_of(work.shape, s) / y
     polynomial(node, waveform, work.chebyshev, polynomials, 0)
-    resolved = unresolved(waveform, 0) <= WAVEFORM_TOLERANCE
+    bent = work.shape[CURVATURE] > 0.0
+    resolved = unresolved(waveform, 0) <= (SINE_TOLERANCE if bent else WAVEFORM_TOLERANCE)
     for c in range(count):
         column = work.columns[c]
         if c > 0:
@@ -106,27 +118,32 @@ def _in_time(
 
 
 @part
-def even_half_cycle(work: Work, y: float, panels: int, polynomials: int, row: FloatArray) -> bool:
+def even_half_cycle(
+    work: Work, y: float, complement: float, panels: int, polynomials: int, row: FloatArray
+) -> bool:
     """Solve a half cycle on `panels` equal panels into `row`; say whether these resolve it."""
     m = work.shape[0]
     radius = y - m
     _start(work, radius)
-    half_width = 0.5 * math.pi / panels
     change, excess = 0.0, 0.0
     width = panel_width(polynomials)
     at = HEAD + 2 * work.sigma.size
     for p in range(panels):
+        node = work.nodes[(panels + p) % SLOTS]
         if not _solve_panel(
-            work, radius * (1.0 + change), 2.0 * p * half_width, half_width, y, False,
+            work, node, radius * (1.0 + change), p, panels, y, complement, False,
             row[at + 1 : at + width],
         ):  # fmt: skip
             return False
-        excess += work.node[EXCESS + DEGREE]
+        excess += node[EXCESS + DEGREE]
         if polynomials > 0:
             row[at] = excess
             at += width
-        change += work.node[LOSS + DEGREE] * (1.0 + change)
-    row[0] = -math.log1p((radius * change - 2.0 * m) / y)
+        change += node[LOSS + DEGREE] * (1.0 + change)
+    gain = radius * change - 2.0 * m
+    row[0] = -math.log1p(gain / y)
+    if work.shape[CURVATURE] > 0.0:
+        row[0] += 0.5 * math.log1p(-0.25 * gain * (2.0 * y + gain) / curve(work.shape, y) ** 2)
     row[1] = excess
     _end(work, radius * (1.0 + change), y, row)
     return True
@@ -146,17 +163,18 @@ def direct_half_cycle(
     """
     m, row = work.shape[0], work.row
     radius = y - m
+    complement = complement_for(work.shape, log_amplitude(work.shape, y))
     _start(work, radius)
     change, excess, k = 0.0, 0.0, 0
     coarsest, at = -1, HEAD + 2 * work.sigma.size
     width = polynomials * NODE_COUNT
     while k < 1 << level:
-        half_width = 0.5 * math.pi / (1 << level)
-        start = 2.0 * k * half_width
+        panels = 1 << level
+        node = work.nodes[(panels + k) % SLOTS]
         for c in range(work.sigma.size):
             work.kept[0, c], work.kept[1, c] = work.sigma[c], work.shift[c]
         if not _solve_panel(
-            work, radius * (1.0 + change), start, half_width, y, level >= FINEST,
+            work, node, radius * (1.0 + change), k, panels, y, complement, level >= FINEST,
             row[at : at + width],
         ):  # fmt: skip
             if level >= FINEST:
@@ -167,15 +185,15 @@ def direct_half_cycle(
             continue
         if coarsest < 0:
             coarsest = level
-        duration = 2.0 * half_width + work.node[EXCESS + DEGREE]
+        duration = math.pi / panels + node[EXCESS + DEGREE]
         if polynomials > 0:
             end = emit(
-                work, row[at : at + width], begin + start + excess, duration, y, signs,
-                time_s, first, guess, angle_rad, jacobian,
+                work, row[at : at + width], begin + math.pi * k / panels + excess, duration, y,
+                signs, time_s, first, guess, angle_rad, jacobian,
             )  # fmt: skip
             first, guess = end, end - first
-        excess += work.node[EXCESS + DEGREE]
-        change += work.node[LOSS + DEGREE] * (1.0 + change)
+        excess += node[EXCESS + DEGREE]
+        change += node[LOSS + DEGREE] * (1.0 + change)
         k += 1
         if k % 2 == 0 and level > 0:
             k, level = k // 2, level - 1

@@ -5,18 +5,20 @@ from __future__ import annotations
 DEGREE = 16
 """Of the polynomials on a panel."""
 NODE_COUNT = DEGREE + 1
-NODE_SIZE = 360
+NODE_SIZE = 504
 """Of the workspace of one panel; see `panel.py`."""
+SLOTS = 16
+"""Panels whose nodes and last solutions are kept."""
 HEAD = 2
 """The first numbers of a half cycle's row; see `half_cycle.py`."""
 FEW_POINTS, MOST_POINTS = 12, 18
 """Half cycles in a table: multiples of six (see `table.look_up`)."""
-MOST_PANELS = 4
+MOST_PANELS = 8
 """Panels to a half cycle in a table."""
 DESCRIPTION = 6
 THETA = 512
-CONSTANTS = 9
-"""m, h, q, g, omega; time and offset of the release, and twice the side of the release."""
+CONSTANTS = 10
+"""m, h, q, g, k, omega; time and offset of the release, and twice the side of the release."""
 MOMENTS = NODE_COUNT + 1
 PLACES = 8
 """Of a panel, at which the normal matrix is taken; see `comparison.py`."""
@@ -43,7 +45,7 @@ def work_size(sensitivities: int, polynomials: int) -> int:
     s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
     matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
     compared = MOMENTS + THETA + (most_columns(s) + 1) * BATCH
-    return NODE_SIZE + 5 + 6 * s + matrices + DESCRIPTION + THETA + compared
+    return SLOTS * NODE_SIZE + 3 + 6 * s + matrices + DESCRIPTION + THETA + compared
 
 
 def most_columns(sensitivities: int) -> int:

@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit, rest
 from pendpipe.dynamics.half_cycle import direct_half_cycle
-from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, STOPPED
-from pendpipe.dynamics.panel import kernel, part
+from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, SLOTS, STOPPED
+from pendpipe.dynamics.panel import (
+    CURVATURE,
+    PLACED,
+    amplitude_at,
+    angle_of,
+    curve,
+    kernel,
+    log_amplitude,
+    part,
+)
 from pendpipe.dynamics.table import (
     DONE,
     HIGH,
@@ -17,12 +26,12 @@ from pendpipe.dynamics.table import (
     NARROWEST,
     PANELS,
     SMOOTH_FROM,
-    WIDEST,
     build,
     half_cycles_and_span,
     look_up,
     look_up_turning_point,
     points_for,
+    widest,
 )
 from pendpipe.dynamics.workspace import carve, panel_width, row_width
 
@@ -33,13 +42,17 @@ if TYPE_CHECKING:
 
 @kernel
 def sticks(shape: FloatArray, y: float) -> bool:
-    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y.
+    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y C(y).
 
     So it does, for all that could ever matter, below 1e-120 rad, where squares soon underflow.
     """
     m, h, q = shape[0], shape[1], shape[2]
-    # The friction less the restoring torque is q (y - m)(y - larger root).
-    return bool(y <= m or q * (y + m) >= 1.0 - h or y < 1e-120)
+    if y <= m or y < 1e-120:
+        return True
+    # The friction less the restoring torque is (y - m) [h + q (y + m) - (y C(y) - m C(m))/(y - m)].
+    squares = 0.25 * shape[CURVATURE] * (y * y + m * m)
+    slope = (y + m) * (1.0 - squares) / (y * curve(shape, y) + m * curve(shape, m))
+    return bool(h + q * (y + m) >= slope)
 
 
 @part
@@ -63,12 +76,12 @@ def _lay_out(
 
     `wanted` holds the number of panels last used, and the ln y down to which no table is tried.
     """
-    room = WIDEST
+    room = widest(work.shape, log_y)
     if work.shape[0] > 0.0:
         room = min(room, log_y - math.log(SMOOTH_FROM * work.shape[0]))
     count, span = half_cycles_and_span(work.shape, log_y, half_cycles, room)
-    panels = int(wanted[0])
-    while count > 1.5 * points_for(span) and span >= NARROWEST:
+    panels = max(1, int(wanted[0]) // 2)  # what is smaller may need fewer
+    while count > 1.5 * points_for(work.shape, log_y, span) and span >= NARROWEST:
         outcome = build(work, log_y, span, panels, polynomials)
         if outcome == DONE:
             wanted[0] = panels
@@ -89,19 +102,20 @@ def _record(
     """Write the time and the angle of turning point k, and their derivatives if there is room."""
     omega, release_s, offset = work.motion[0], work.motion[1], work.motion[2]
     turning[0, k] = release_s + tau / omega
-    turning[1, k] = signs[0] * y + offset
+    turning[1, k] = signs[0] * angle_of(work.shape, y) + offset
     directions, columns = work.rates.size, work.amplitude.size
     if columns == 0:
         return
     times, angles = turning[2 : 2 + directions + 4, k], turning[6 + directions :, k]
+    bend = curve(work.shape, y)
     times[directions], angles[directions] = -tau / (omega * omega), 0.0
     for c in range(directions):
         times[c] = work.clock[c + 1] / omega
-        angles[c] = signs[0] * work.amplitude[c + 1]
+        angles[c] = signs[0] * work.amplitude[c + 1] / bend
         times[directions] -= work.rates[c] / omega * times[c]
         angles[directions] -= work.rates[c] / omega * angles[c]
     times[directions + 1] = signs[1] * work.clock[0] / omega
-    angles[directions + 1] = signs[0] * signs[1] * work.amplitude[0]
+    angles[directions + 1] = signs[0] * signs[1] * work.amplitude[0] / bend
     times[directions + 2], angles[directions + 2] = 1.0, 0.0
     times[directions + 3], angles[directions + 3] = 0.0, 1.0
 
@@ -125,7 +139,7 @@ def _emit_row(
 
 
 def march(
-    constants: FloatArray, directions: FloatArray, rates: FloatArray, y: float, tabulate: bool,
+    constants: FloatArray, directions: FloatArray, rates: FloatArray, angle: float, tabulate: bool,
     most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray,
     turning: FloatArray, readings: FloatArray, sums: FloatArray, buffer: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
@@ -134,12 +148,12 @@ def march(
     Parameters
     ----------
     constants
-        m, h, q, g, omega; time and offset of the release, and its side twice (the first is
+        m, h, q, g, k, omega; time and offset of the release, and its side twice (the first is
         changed: the side of the turning point in hand).
     directions, rates
         See `workspace.Work`.
-    y
-        The amplitude of the release.
+    angle
+        Of the release, positive.
     tabulate
         Whether to tabulate the half-cycle map where that pays.
     most, until_s
@@ -161,13 +175,16 @@ def march(
     columns = rates.size + 1 if rates.size > 0 else 0
     polynomials = columns + 1 if time_s.size > 0 else 0
     work = carve(buffer, constants, directions, rates, readings, sums, columns, polynomials)
-    shape, motion, signs = work.shape, work.motion, constants[7:9]
+    shape, motion, signs = work.shape, work.motion, constants[8:10]
     work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
+    for slot in range(SLOTS):
+        work.nodes[slot, PLACED + 1] = 0.0  # and no panel
+    y = 2.0 * math.sin(0.5 * angle) if shape[CURVATURE] > 0.0 else angle
     for c in range(columns):
-        work.amplitude[c], work.clock[c] = (1.0 if c == 0 else 0.0), 0.0
+        work.amplitude[c], work.clock[c] = (curve(shape, y) if c == 0 else 0.0), 0.0
     wanted = work.wanted
     wanted[0], wanted[1], wanted[2] = 1.0, math.inf, 0.0
-    log_y, excess, k, level, first, guess = math.log(y), 0.0, 0, 0, 0, 0
+    log_y, excess, k, level, first, guess = log_amplitude(shape, y), 0.0, 0, 0, 0, 0
     narrow = columns == 0 and polynomials == 0
     while True:
         tau = math.pi * k + excess
@@ -189,7 +206,7 @@ def march(
         if listed and narrow:
             loss, more = look_up_turning_point(work.segment, work.table, log_y)
             log_y -= loss
-            y = math.exp(log_y)
+            y = amplitude_at(shape, log_y)
             excess += more
         elif listed:
             width = row_width(columns, polynomials, int(work.segment[PANELS]))
@@ -200,7 +217,7 @@ def march(
                 )
             _advance(work, y)
             log_y -= work.row[0]
-            y = math.exp(log_y)
+            y = amplitude_at(shape, log_y)
             excess += work.row[1]
         else:
             if k % 8 == 0 and level > 0:
@@ -212,6 +229,6 @@ def march(
                 return k, OVERDAMPED
             _advance(work, y)
             y = after
-            log_y = math.log(y) if y > 0.0 else -math.inf
+            log_y = log_amplitude(shape, y)
             excess += more
         signs[0] = -signs[0]

@@ -1,20 +1,32 @@
 """The phase clock: one panel of a half cycle of Eq. 8.
 
-Time is counted in radians, tau = omega t, and u = dx/dtau. In a half cycle in which the
-pendulum moves towards negative x, Eq. 8 reads
+Time is counted in radians, tau = omega t, and u = dx/dtau. The place is s, with C = ds/dx
+(`curve`): s = x and C = 1 for the linear torque, s = 2 sin(x/2) and C = cos(x/2) =
+sqrt(1 - s^2/4) for the sine. The restoring torque is then s C, twice its potential s^2, and in
+a half cycle in which the pendulum moves towards negative x, Eq. 8 reads
 
-    x'' = -x + delta + h R + q R^2 - 2 g u,    R = sqrt(x^2 + u^2),
+    ds/dtau = C u,    du/dtau = -s C + delta + h R + q R^2 - 2 g u,    R = sqrt(s^2 + u^2),
     delta = pi c/(2 omega), h = pi b_h/(2 omega), q = pi a/(2 omega), g = b_v/omega.
 
-m, the smaller root of delta + h m + q m^2 = m, is where the sliding pendulum would be in
-equilibrium (m = delta if h = q = 0), and the amplitude at and below which it sticks. About this
-centre, x = m + r cos(psi), u = -r sin(psi),
+Counted in C dtau the sine is therefore the linear pendulum with its friction divided by C.
+m, the smallest root of delta + h m + q m^2 = m C(m), is where the sliding pendulum would be in
+equilibrium (m = delta if h = q = 0 and C = 1), and the amplitude at and below which it sticks.
+About this centre, s = m + r cos(psi), u = -r sin(psi), and with k = 0 (linear) or 1 (sine)
 
-    dr/dpsi   = -r nu sin(psi)/(1 - nu cos(psi)),     dtau/dpsi = 1/(1 - nu cos(psi)),
-    nu = (r + 2 m cos(psi)) [h/(R + m) + q] + 2 g sin(psi),
+    dr/dpsi   = -r nu sin(psi)/(1 - nu cos(psi)),     dtau/dpsi = 1/[C (1 - nu cos(psi))],
+    C nu = (r + 2 m cos(psi)) [h/(R + m) + q] + 2 g sin(psi)
+           + k m cos(psi) (s + m)/(4 [C + C(m)]),
 
 so the turning points (u = 0) are exactly psi = 0 and pi, and everything between them is smooth.
 delta itself has dropped out: the difference to m is taken analytically.
+
+Where the sine's pendulum is released near the top it dwells there, and C has a zero at the
+complex phase psi = i arctanh(C) about. The nodes therefore lie evenly not in psi but in w,
+
+    dpsi/dw = W = (2 K/pi) sqrt(1 - k~^2 cos(psi)^2),     0 <= w <= pi,
+
+which for k~ = sin(y/2) is the time of the motion without losses (psi by Jacobi's elliptic
+functions); w = psi for the linear torque, and at small amplitudes.
 """
 
 from __future__ import annotations
@@ -35,9 +47,16 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
-COS, SIN, LOSS, BEFORE, EARLIER, SLIP, EXCESS, SLOPE = range(0, 160, 20)
-COLUMN, ZETA, VALUE, SCRATCH = range(160, 240, 20)
-BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(240, 360, 20)  # sensitivities.py
+COS, SIN, WEIGHT, BEND, LEAN, LOSS, BEFORE, EARLIER = range(0, 160, 20)
+SLIP, LATE, EXCESS, SLOPE, COLUMN, ZETA, VALUE, SCRATCH = range(160, 320, 20)
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(320, 440, 20)  # sensitivities.py
+PULL, LAG, TILT = range(440, 500, 20)
+PLACED = 500  # start, half width and complementary modulus of the panel that it holds
+
+PHASE_BELOW = -1.2
+"""Up to this `log_amplitude` (0.3 rad) w = psi."""
+CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE = range(5)
+"""m, h, q, g and k in the array `shape`."""
 
 # No exceptions, no reference counts (which forbids to allocate), and no entry from Python: each
 # costs more than it is worth here. Multiplications and additions may be fused.
@@ -102,18 +121,84 @@ def unresolved(values: FloatArray, at: int) -> float:
 
 
 @kernel
-def place(node: FloatArray, placed: FloatArray, start: float, half_width: float) -> None:
-    """Set cos(psi) and sin(psi) of a panel and forget the last guess, if it is another panel."""
-    if placed[0] == start and placed[1] == half_width:
+def curve(shape: FloatArray, s: float) -> float:
+    """Return C at s."""
+    # |.| because rounding can make the square negative at the top
+    return math.sqrt(abs(1.0 - 0.25 * shape[CURVATURE] * s * s))
+
+
+@kernel
+def angle_of(shape: FloatArray, s: float) -> float:
+    """Return x at s."""
+    return 2.0 * math.asin(0.5 * s) if shape[CURVATURE] > 0.0 else s
+
+
+@kernel
+def log_amplitude(shape: FloatArray, s: float) -> float:
+    """Return ln(s/C) of the amplitude s, the ln of x or of 2 tan(x/2); -inf if s is negative."""
+    return math.log(s / curve(shape, s)) if s > 0.0 else -math.inf
+
+
+@kernel
+def amplitude_at(shape: FloatArray, log_y: float) -> float:
+    """Return the amplitude s from its `log_amplitude`."""
+    tangent = math.exp(log_y)
+    if shape[CURVATURE] > 0.0:
+        return tangent / math.sqrt(1.0 + 0.25 * tangent * tangent)
+    return tangent
+
+
+@kernel
+def place(node: FloatArray, start: float, half_width: float, complement: float) -> None:
+    """Set a panel's nodes and forget the last guess, if it is another panel.
+
+    `complement` is the complementary modulus sqrt(1 - k~^2); 1 for w = psi.
+    """
+    here = node[PLACED:]
+    if here[0] == start and here[1] == half_width and here[2] == complement:
         return
-    placed[0], placed[1] = start, half_width
+    here[0], here[1], here[2] = start, half_width, complement
+    # Jacobi's amplitude by the arithmetic-geometric mean: with its last term a = pi/(2 K), the
+    # phases are 2^count w, ..., and in the end am(2 K w/pi).
+    a, b, count = 1.0, complement, 0
+    while a - b > 1e-14:
+        a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
+        node[SCRATCH + count] = c / a
+        count += 1
     for j in range(NODE_COUNT):
-        psi = start + half_width * (1.0 + NODES[j])
-        node[COS + j] = math.cos(psi)
-        node[SIN + j] = math.sin(psi)
-        node[LOSS + j] = 0.0
-        node[BEFORE + j] = 0.0
-        node[EARLIER + j] = 0.0
+        phase = (start + half_width * (1.0 + NODES[j])) * (1 << count)
+        for n in range(count - 1, -1, -1):
+            phase = 0.5 * (phase + math.asin(node[SCRATCH + n] * math.sin(phase)))
+        cos, sin = math.cos(phase), complement * math.sin(phase)
+        scale = 1.0 / math.sqrt(cos * cos + sin * sin)
+        node[COS + j] = cos * scale
+        node[SIN + j] = sin * scale
+        node[WEIGHT + j] = complement * scale / a
+        node[BEND + j], node[LEAN + j] = 1.0, 0.0
+        node[LOSS + j], node[BEFORE + j], node[EARLIER + j] = 0.0, 0.0, 0.0
+
+
+@kernel
+def complement_for(shape: FloatArray, log_y: float) -> float:
+    """Return the complementary modulus for amplitudes up to this one, rounded to a few values."""
+    if shape[CURVATURE] == 0.0 or log_y < PHASE_BELOW:
+        return 1.0
+    tangent = math.exp(0.5 * math.ceil(2.0 * log_y)) / 2.0
+    return 1.0 / math.sqrt(1.0 + tangent * tangent)
+
+
+@kernel
+def _bend(node: FloatArray, shape: FloatArray, radius: float) -> None:
+    """Write 1/C, and what the sine adds to C nu about a shifted centre."""
+    if shape[CURVATURE] == 0.0:
+        return
+    m, centre = shape[CENTRE], curve(shape, shape[CENTRE])
+    for j in range(NODE_COUNT):
+        cos = node[COS + j]
+        s = m + radius * (1.0 + node[LOSS + j]) * cos
+        c = math.sqrt(abs(1.0 - 0.25 * s * s))
+        node[BEND + j] = 1.0 / c
+        node[LEAN + j] = 0.25 * m * cos * (s + m) / (c + centre)
 
 
 @kernel
@@ -157,13 +242,16 @@ def solve(
         node[LOSS + j] = 3.0 * (latest - before) + earlier
     before = 0.0
     for _ in range(60):
+        _bend(node, shape, radius)
         for j in range(NODE_COUNT):
             grown, cos, sin = 1.0 + node[LOSS + j], node[COS + j], node[SIN + j]
             r = radius * grown
-            # |.| because rounding can make the square negative where x and u vanish together
+            # |.| because rounding can make the square negative where s and u vanish together
             reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-            force = (r + 2.0 * m * cos) * (h + q * reach) + 2.0 * g * sin * reach  # nu (R + m)
-            node[SLOPE + j] = -grown * force * sin / (reach - force * cos)
+            force = (r + 2.0 * m * cos) * (h + q * reach)
+            force += (2.0 * g * sin + node[LEAN + j]) * reach
+            force *= node[BEND + j]  # nu (R + m)
+            node[SLOPE + j] = -grown * force * sin * node[WEIGHT + j] / (reach - force * cos)
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = _renew(node, half_width)
         # The error left is the change times the rate at which changes shrink, once that is known.
@@ -177,23 +265,31 @@ def solve(
 def _finish(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
-    """Integrate tau - psi, and say whether the panel is resolved to `tolerance`."""
+    """Integrate tau - w, and say whether the panel is resolved to `tolerance`."""
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
+    _bend(node, shape, radius)
     turned_back = 0
     for j in range(NODE_COUNT):
         cos, sin = node[COS + j], node[SIN + j]
         r = radius * (1.0 + node[LOSS + j])
         reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-        force = (r + 2.0 * m * cos) * (h + q * reach) + 2.0 * g * sin * reach
+        force = (r + 2.0 * m * cos) * (h + q * reach)
+        force += (2.0 * g * sin + node[LEAN + j]) * reach
+        force *= node[BEND + j]
         scale = 1.0 / (reach - force * cos)
+        still = node[WEIGHT + j] * node[BEND + j]
         node[SLIP + j] = reach * scale
-        node[SCRATCH + j] = force * cos * scale
+        node[SCRATCH + j] = still * force * cos * scale
+        node[LATE + j] = node[SCRATCH + j] + (still - 1.0)
         turned_back += node[SLIP + j] <= 0.0
     if turned_back > 0:
         return False
-    multiply(INTEGRATION_T, node, SCRATCH, node, EXCESS)
+    multiply(INTEGRATION_T, node, LATE, node, EXCESS)
     for j in range(NODE_COUNT):
         node[EXCESS + j] *= half_width
+    # What the losses do is small, and judged by its own size; what the sine does is not.
+    if shape[CURVATURE] > 0.0 and unresolved(node, LATE) * half_width > 2e-3 * tolerance:
+        return False
     error = max(unresolved(node, SLOPE), unresolved(node, SCRATCH))
     strength = max(abs(node[SLOPE + DEGREE // 2]), abs(node[SCRATCH]), abs(node[SCRATCH + DEGREE]))
     return bool(error * half_width <= tolerance * strength)
@@ -207,9 +303,9 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
     Newton's iteration on tau(zeta) = half_width (1 + zeta) + excess(zeta), all nodes at once.
     """
     duration = 2.0 * half_width + node[EXCESS + DEGREE]
-    multiply(ANALYSIS_T, node, EXCESS, node, COLUMN)  # the coefficients of tau - psi
+    multiply(ANALYSIS_T, node, EXCESS, node, COLUMN)  # the coefficients of tau - w
     for j in range(NODE_COUNT):
-        node[VALUE + j] = half_width * (node[SLIP + j] - 1.0)
+        node[VALUE + j] = half_width * node[LATE + j]
     multiply(ANALYSIS_T, node, VALUE, node, SCRATCH)  # those of its derivative
     for i in range(NODE_COUNT):
         late = node[EXCESS + i] - 0.5 * node[EXCESS + DEGREE] * (1.0 + NODES[i])

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS
-from pendpipe.dynamics.panel import kernel, part
+from pendpipe.dynamics.panel import CURVATURE, amplitude_at, complement_for, curve, kernel, part
 from pendpipe.dynamics.workspace import panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.workspace import Work
 
-WIDEST = 5.2
-"""The widest range of ln y that one table spans, and its points; see `points_for`."""
+_WIDEST, _FEW = 5.2, 0.31
+"""The widest range of ln y that one table spans, and the share of it that few points resolve."""
 NARROWEST = 0.01
 """A narrower range would suffer from the rounding of ln y."""
 SMOOTH_FROM = 20.0
@@ -30,6 +30,7 @@ SMOOTH_FROM = 20.0
 _LOSS_TOLERANCE = 5e-11
 """Of the last two coefficients, relative to the least loss; what follows is 30 times less."""
 _WAVEFORM_TOLERANCE = 1e-10
+_EXCESS_TOLERANCE = 1e-11
 _LOW_POWERS = 4
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
@@ -42,9 +43,22 @@ DONE, MORE_PANELS, LESS_SPAN = range(3)
 
 
 @kernel
-def points_for(span: float) -> int:
-    """Return how many points, a multiple of six, resolve exp(+-ln y) over a span to 1e-13."""
-    return FEW_POINTS if span < 1.6 else MOST_POINTS
+def widest(shape: FloatArray, log_y: float) -> float:
+    """Return the widest span below ln y that a table resolves to 1e-12.
+
+    What a half cycle of the linear pendulum does is a sum of powers of y, entire in ln y. The
+    sine's elliptic integrals have a branch point at ln y = ln 2 + i pi/2, where k^2 is infinite.
+    """
+    if shape[CURVATURE] == 0.0:
+        return _WIDEST
+    above = max(0.0, math.log(2.0) - log_y)
+    return min(_WIDEST, 0.8 * math.sqrt(above * above + 0.25 * math.pi * math.pi))
+
+
+@kernel
+def points_for(shape: FloatArray, log_y: float, span: float) -> int:
+    """Return how many points, a multiple of six, resolve a span below ln y."""
+    return FEW_POINTS if span < _FEW * widest(shape, log_y) else MOST_POINTS
 
 
 @kernel
@@ -57,19 +71,18 @@ def half_cycles_and_span(
     only used to lay out tables: nothing is lost but time if it is wrong.
     """
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
-    delta = m * (1.0 - h - q * m)
+    delta = m * (curve(shape, m) - h - q * m)
     step = min(0.125, room / 8.0)
-    factor = math.exp(-step)
-    y = math.exp(log_y - 0.5 * step)
     count, span = 0.0, 0.0
     while span < room:
+        y = amplitude_at(shape, log_y - span - 0.5 * step)
         loss = 2.0 * (delta / y + h + q * y) + math.pi * g + 1e-300
+        loss /= curve(shape, y) ** 2
         if count + step / loss >= half_cycles:
             span += (half_cycles - count) * loss * 1.03 + 2.0 * loss
             return half_cycles, min(max(span, NARROWEST), room)
         count += step / loss
         span += step
-        y *= factor
     return count, room
 
 
@@ -80,18 +93,21 @@ def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) 
     Returns DONE, or what stands in the way: a half cycle needs more panels, or the span is too
     wide for the points.
     """
-    points, half = points_for(span), 0.5 * span
+    points, half = points_for(work.shape, log_y, span), 0.5 * span
     segment = work.segment
     segment[MIDDLE], segment[INVERSE] = log_y - half, 1.0 / half
     segment[POINTS], segment[PANELS] = points, panels
     width = row_width(work.sigma.size, polynomials, panels)
+    complement = complement_for(work.shape, log_y)
     nodes = _MANY_NODES if points == MOST_POINTS else _FEW_NODES
     for i in range(points):
-        y = math.exp(log_y - half + half * nodes[i])
-        if not even_half_cycle(work, y, panels, polynomials, work.rows[i]):
+        y = amplitude_at(work.shape, log_y - half + half * nodes[i])
+        if not even_half_cycle(work, y, complement, panels, polynomials, work.rows[i]):
             return MORE_PANELS
+    # The sine's excess is no work of the losses, and not to be measured by them.
+    excess = _EXCESS_TOLERANCE if work.shape[CURVATURE] > 0.0 else 0.0
     first, per_panel = HEAD + 2 * work.sigma.size, panel_width(polynomials)
-    if not _interpolate(points, width, work.rows, first, per_panel, work.table):
+    if not _interpolate(points, width, work.rows, first, per_panel, excess, work.table):
         return LESS_SPAN
     segment[LOW], segment[HIGH] = log_y - span, log_y
     return DONE
@@ -104,6 +120,7 @@ def _interpolate(
     rows: FloatArray,
     first: int,
     per_panel: int,
+    excess: float,
     table: FloatArray,
 ) -> bool:
     """Turn the solved rows into polynomials in z; say whether their coefficients have died out."""
@@ -125,7 +142,7 @@ def _interpolate(
                 scratch[j] += weight * rows[i, j]
         if k >= points - 2:
             resolved = resolved and abs(scratch[0]) <= _LOSS_TOLERANCE * least
-            resolved = resolved and abs(scratch[1]) <= _LOSS_TOLERANCE * least
+            resolved = resolved and abs(scratch[1]) <= max(_LOSS_TOLERANCE * least, excess)
             # The low powers of time in x/y stand for all: the high ones are mostly rounding.
             for j in range(first, width):
                 if 0 < (j - first) % per_panel <= _LOW_POWERS:

@@ -13,6 +13,7 @@ from pendpipe.dynamics.layout import (
     MOST_POINTS,
     NODE_COUNT,
     NODE_SIZE,
+    SLOTS,
     THETA,
 )
 from pendpipe.dynamics.panel import kernel
@@ -26,17 +27,15 @@ class Work(NamedTuple):
     """Workspace and constants of a march; S sensitivities (the amplitude and S - 1 rates)."""
 
     shape: FloatArray
-    """m, h, q, g of `panel.py`."""
+    """m, h, q, g, k of `panel.py`."""
     directions: FloatArray
     """(S - 1, 4): the derivatives of m, h, q and g by each rate."""
     rates: FloatArray
     """(S - 1,): the rates themselves."""
     motion: FloatArray
     """omega, the time of the release, the offset."""
-    node: FloatArray
-    """The panel in hand; see `panel.py`."""
-    placed: FloatArray
-    """Start and half width of that panel."""
+    nodes: FloatArray
+    """(SLOTS, NODE_SIZE): the panels of the last half cycles; see `panel.py`."""
     sigma: FloatArray
     """(S,): d ln r/dp at fixed phase, at the end of the panel in hand."""
     shift: FloatArray
@@ -98,8 +97,7 @@ def carve(
     s, n = sensitivities, NODE_COUNT
     width = row_width(s, polynomials, MOST_PANELS)
     points = MOST_POINTS
-    node, rest = buffer[:NODE_SIZE], buffer[NODE_SIZE:]
-    placed, rest = rest[:2], rest[2:]
+    nodes, rest = matrix(buffer, SLOTS, NODE_SIZE), buffer[SLOTS * NODE_SIZE :]
     sigma, rest = rest[:s], rest[s:]
     shift, rest = rest[:s], rest[s:]
     kept, rest = matrix(rest, 2, s), rest[2 * s :]
@@ -122,7 +120,7 @@ def carve(
     some, rest = matrix(rest, columns_shown, BATCH), rest[columns_shown * BATCH :]
     weights, rest = rest[:BATCH], rest[BATCH:]
     return Work(
-        constants[:4], directions, rates, constants[4:7], node, placed, sigma, shift, kept,
+        constants[:5], directions, rates, constants[5:8], nodes, sigma, shift, kept,
         columns, chebyshev, amplitude, clock, row, rows, segment, table, total,
         theta, readings, sums, moments, power, some, weights, rest,
     )  # fmt: skip
