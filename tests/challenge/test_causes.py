@@ -49,7 +49,7 @@ def test_a_wrong_class_is_told_with_the_name_that_was_given() -> None:
         *[(truth("single", K3), answer("jitter"))] * 3, (truth("tie", K3), answer(K3)), *nulls()
     )
     (row,) = because("class at 100", content)["rows"]
-    assert (row["hidden"], row["law"], row["said"]) == (K3, "x", "jitter")
+    assert (row["hidden"], row["law"], row["answer"]) == (K3, "x", "jitter")
     assert (row["count"], row["of"]) == (3, 4)
 
 
@@ -58,7 +58,7 @@ def test_confident_names_outside_are_told_by_law() -> None:
     made["effects"][0]["law"] = "kink of 1/Q"
     content = opened(*[(made, answer("damping-step"))] * 2, (made, answer("unnamed-damping")))
     found = because("confident", content)
-    assert [(row["said"], row["count"], row["of"]) for row in found["rows"]] == [
+    assert [(row["answer"], row["count"], row["of"]) for row in found["rows"]] == [
         ("damping-step", 2, 3)
     ]
     assert [reason["cause"] for reason in found["reasons"]] == ["kink of 1/Q"]
@@ -69,10 +69,10 @@ def test_false_alarms_are_told_by_noise() -> None:
     red["nuisances"] = {**red["nuisances"], "alpha": 1.0}
     content = opened(*[(red, answer(K3))] * 3, (red, answer()), *nulls())
     (row,) = because("false alarms", content)["rows"]
-    assert (row["hidden"], row["said"], row["count"], row["of"]) == ("red noise", K3, 3, 4)
+    assert (row["hidden"], row["answer"], row["count"], row["of"]) == ("red noise", K3, 3, 4)
 
 
-def test_a_boasting_bin_is_told_with_what_fills_it() -> None:
+def test_an_overconfident_bin_names_what_fills_it() -> None:
     """Of thirty stated at 0.95 a third is right; those at 0.5 keep their word."""
     content = opened(
         *[(truth("single", K3), answer(K3, probability=0.95))] * 10,
@@ -81,10 +81,10 @@ def test_a_boasting_bin_is_told_with_what_fills_it() -> None:
         *[(truth("single", K3), answer("jitter", probability=0.55))] * 5,
     )
     (row,) = because("calibration", content)["bins"]
-    assert row["boasts"]
+    assert row["overconfident"]
     assert row["edges"] == pytest.approx([0.9, 1.0])
     assert row["families"] == {"single": [10, 10], "tie": [0, 20]}
-    assert [(each["said"], each["count"]) for each in row["culprits"]] == [("jitter", 20)]
+    assert [(each["answer"], each["count"]) for each in row["culprits"]] == [("jitter", 20)]
     assert row["error"] == pytest.approx((0.95 - 1 / 3) * 30 / 40)
 
 

@@ -140,9 +140,11 @@ def test_probabilities_that_come_true_are_calibrated() -> None:
     random = np.random.default_rng(0)
     stated = random.uniform(0.3, 1.0, 4000)
     honest = intervals.calibration(stated, (random.random(4000) < stated).astype(float))
-    boasting = intervals.calibration(stated, (random.random(4000) < stated - 0.2).astype(float))
+    overconfident = intervals.calibration(
+        stated, (random.random(4000) < stated - 0.2).astype(float)
+    )
     assert honest["expected_calibration_error"] < 0.03
-    assert boasting["expected_calibration_error"] == pytest.approx(0.2, abs=0.03)
+    assert overconfident["expected_calibration_error"] == pytest.approx(0.2, abs=0.03)
 
 
 def test_the_power_curve_is_found_again() -> None:

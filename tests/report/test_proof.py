@@ -30,13 +30,13 @@ def scored(tmp_path: Path) -> Path:
         "causes": {
             "confident": {
                 "promise": "promise 1",
-                "rows": [{"hidden": "unnamed-damping", "law": "kink", "said": "damping-step",
+                "rows": [{"hidden": "unnamed-damping", "law": "kink", "answer": "damping-step",
                           "count": 3, "of": 7, "largest": 90.0}],
                 "reasons": [{"of": "outside", "cause": "kink", "why": "Time & amplitude."}]},
             "calibration": {
                 "promise": "promise 2", "rows": [], "reasons": [],
-                "bins": [{"edges": [0.9, 1.0], "met": 0.59, "of": 123, "boasts": True,
-                          "culprits": [{"hidden": "jitter", "law": "gaussian", "said": "glitches",
+                "bins": [{"edges": [0.9, 1.0], "met": 0.59, "of": 123, "overconfident": True,
+                          "culprits": [{"hidden": "jitter", "law": "gaussian", "answer": "glitches",
                                         "count": 2}]}]},
         },
         "six_cases": [{**row, "item": "item-0007", "law": "<b>", "figure": "case-1.svg",

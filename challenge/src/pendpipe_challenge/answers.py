@@ -21,7 +21,7 @@ class Answer:
     groups
         For each effect found, in order: its name and the rest of its class.
     probability
-        Of the first name; NaN where it is not told.
+        Of the first name; NaN where none is stated.
     """
 
     solved: bool

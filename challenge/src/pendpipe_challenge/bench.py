@@ -130,7 +130,7 @@ class Bench:
 
     @cached_property
     def back(self) -> FloatArray:
-        """Inverse of the propagator; nought where the motion has all but died away."""
+        """Inverse of the propagator; zero where the motion has all but died away."""
         (a, b), (c, d) = self.propagator.transpose(1, 2, 0)
         determinant = a * d - b * c
         alive = np.abs(determinant) > 1e-12

@@ -154,7 +154,7 @@ def draw_cases(
     """Draw the residual of each case without and with what was named.
 
     The answers were given without figures. The same command on the same recording gives the
-    same answer; whether it did is told, since the program may have been changed in between.
+    same answer; whether it did is reported, since the program may have been changed in between.
 
     Parameters
     ----------
@@ -186,9 +186,9 @@ def _draw(
     none = {"figure": None, "same_answer": None}
     if not recording.exists():
         return none
-    with alone(recording, item.truth["baseline"], solver) as (_, said, answer):
+    with alone(recording, item.truth["baseline"], solver) as (_, errors, answer):
         if not (answer / MAP).exists() or not (answer / "diagnosis.json").exists():
-            print(f"{item.name}: no figure of its residual: {said[-200:]}", file=sys.stderr)
+            print(f"{item.name}: no figure of its residual: {errors[-200:]}", file=sys.stderr)
             return none
         (figures / f"case-{number}.svg").write_bytes((answer / MAP).read_bytes())
         again = read_json(answer / "diagnosis.json")

@@ -41,7 +41,7 @@ class Hidden:
     details
         Truth that does not change with the strength, by name.
     parameter
-        Name under which the strength itself is told.
+        Name under which the strength itself is given.
     also
         Other names that would be right for this law.
     """

@@ -121,7 +121,7 @@ def gain_relaxing(r: Random, s: Scenario) -> Hidden:
 
 @law("ac-coupling")
 def ac(r: Random, s: Scenario) -> Hidden:
-    """A capacitor in the way; the level it takes away must not be nought."""
+    """A capacitor in the way; the level it takes away must not be zero."""
     offset = either_sign(r) * s.chain.volts_per_radian * amplitude(s) * 0.1
     offset += s.chain.offset_volts
     prepared = s.with_chain(offset_volts=offset)
@@ -343,7 +343,7 @@ def glitches(r: Random, s: Scenario) -> Hidden:
         )
         return base.with_chain(glitches=wild)
 
-    told = {f"sample_{i}": float(at) for i, at in enumerate(places, 1)}
+    samples = {f"sample_{i}": float(at) for i, at in enumerate(places, 1)}
     return Hidden(
         "glitches",
         "single samples",
@@ -352,7 +352,7 @@ def glitches(r: Random, s: Scenario) -> Hidden:
         True,
         s,
         parameter="volts",
-        details={"number": float(number), **told},
+        details={"number": float(number), **samples},
     )
 
 

@@ -195,11 +195,6 @@ def percent(score: Score | None) -> str:
     )
 
 
-def cell(text: str) -> str:
-    """Text for a cell of a Markdown table."""
-    return text.replace("|", r"\|")
-
-
 def number(value: float | None, form: str = ".2f") -> str:
     """A number or a dash."""
     return "-" if value is None else format(value, form)

@@ -445,7 +445,7 @@ TIES: Final = (
 
 
 def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict[str, Any]]:
-    """What each item of a set hides, in an order that says nothing.
+    """What each item of a set hides, in an order that gives nothing away.
 
     Parameters
     ----------

@@ -140,10 +140,10 @@ def true_of_any(item: Solved) -> bool:
 
 def calibration(items: list[Solved]) -> dict[str, Any]:
     """Compare stated probabilities of the first name with how often they come true."""
-    told = rated(items)
+    named = rated(items)
     return intervals.calibration(
-        np.array([i.answer.probability for i in told]),
-        np.array([true_of_any(i) for i in told], dtype=float),
+        np.array([i.answer.probability for i in named]),
+        np.array([true_of_any(i) for i in named], dtype=float),
     )
 
 
@@ -156,14 +156,14 @@ def abstention(items: list[Solved]) -> list[dict[str, Any]]:
         Of each threshold: ``threshold``; ``answered``, the rate of names above it among all;
         and ``accuracy``, how many of those are right.
     """
-    told = rated(items)
+    named = rated(items)
     rows = []
     for threshold in THRESHOLDS:
-        kept = [item for item in told if item.answer.probability >= threshold]
+        kept = [item for item in named if item.answer.probability >= threshold]
         rows.append(
             {
                 "threshold": threshold,
-                "answered": intervals.rate(len(kept), len(told)),
+                "answered": intervals.rate(len(kept), len(named)),
                 "accuracy": intervals.of([true_of_any(item) for item in kept]),
             }
         )
@@ -330,18 +330,18 @@ def places(items: list[Solved], interval_s: Mapping[str, float]) -> dict[str, An
         for effect in item.truth["effects"]:
             group = GROUPS.get(effect["effect"])
             true = true_place(effect, interval_s.get(item.name))
-            told = _reported(item, effect["effect"]) if group and true else None
-            if group is None or true is None or told is None:
+            reported = _reported(item, effect["effect"]) if group and true else None
+            if group is None or true is None or reported is None:
                 continue
             # A sample's place is known to a sample.
             slack = interval_s[item.name] if group in ("lost samples", "glitches") else 0.0
             if group == "glitches":
-                held = told.low - slack <= true.low and true.high <= told.high + slack
+                held = reported.low - slack <= true.low and true.high <= reported.high + slack
             else:
-                held = told.low - slack <= true.high and true.low <= told.high + slack
-            middle = 0.5 * (told.low + told.high)
+                held = reported.low - slack <= true.high and true.low <= reported.high + slack
+            middle = 0.5 * (reported.low + reported.high)
             error = max(true.low - middle, middle - true.high, 0.0)
-            found.setdefault(group, []).append((held, told.high - told.low, error))
+            found.setdefault(group, []).append((held, reported.high - reported.low, error))
     return {
         group: {
             **intervals.of([held for held, _, _ in found[group]]),
@@ -372,15 +372,15 @@ def true_place(effect: dict[str, Any], interval_s: float | None) -> Place | None
 
 def _reported(item: Solved, name: str) -> Place | None:
     """Where the answer puts an effect that it names: its fitted frequency, or its times."""
-    for told in item.answer.content.get("effects") or []:
-        if told["id"] != name:
+    for entry in item.answer.content.get("effects") or []:
+        if entry["id"] != name:
             continue
         if GROUPS[name] == "tones":
-            fitted = (told.get("parameters") or {}).values()
+            fitted = (entry.get("parameters") or {}).values()
             hertz = [each for each in fitted if each.get("unit") == "Hz"]
             ends = hertz[-1].get("interval95") if hertz else None
         else:
-            ends = (told.get("location") or {}).get("time_s")
+            ends = (entry.get("location") or {}).get("time_s")
         return Place(*map(float, ends)) if ends else None
     return None
 
@@ -438,9 +438,9 @@ def pulls_of(items: list[tuple[dict[str, Any], Answer]]) -> dict[str, Any]:
         effect = truth["effects"][0]
         if not (answer.detected and effect["own_form"] and answer.lead == effect["effect"]):
             continue
-        told = answer.content["effects"][0].get("parameters") or {}
+        fitted = answer.content["effects"][0].get("parameters") or {}
         for name, true in expected(truth).items():
-            estimate = told.get(name) or {}
+            estimate = fitted.get(name) or {}
             value, sd = estimate.get("value"), estimate.get("sd")
             if value is None or not sd:
                 continue

@@ -416,7 +416,7 @@ class Motion:
     rubs_rad_s2: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def value(self, name: str) -> float:
-        """A parameter, or what it is when nothing is said."""
+        """A parameter, or its default."""
         return self.parameters.get(name, PARAMETERS[name])
 
     def changed(self, **parameters: float) -> Motion:

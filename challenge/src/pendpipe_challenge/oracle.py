@@ -1,7 +1,7 @@
 """The oracle: it knows nuisances, noise and catalogue, and pays the same look-elsewhere.
 
-Its detection level comes from Monte Carlo of the projected Gaussian scores. Two levels are
-told. `threshold` is that of the largest score over the whole catalogue, scans included.
+Its detection level comes from Monte Carlo of the projected Gaussian scores. There are
+two levels. `threshold` is that of the largest score over the whole catalogue, scans included.
 `threshold_by_effect` first takes each effect's own look-elsewhere off (so that an effect
 without a scan does not pay for the tones' thousands of frequencies); it is the harder
 rival, and its level depends on the effect.
@@ -39,7 +39,7 @@ DRAWS: Final = 800
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the oracle says of one recording.
+    """The oracle's answer about one recording.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ FREEDOM: Final = {
     "dropped-samples": 2,
     "clipping": 2,
 }
-"""Free numbers of each effect; 1 where nothing is said."""
+"""Free numbers of each effect; 1 by default."""
 
 
 def ranked(scores: dict[str, float]) -> tuple[str, ...]:
@@ -294,7 +294,7 @@ def _refit(oracle: Oracle, angle: FloatArray, residual: FloatArray, shape: Shape
 
 
 def _with(oracle: Oracle, details: dict[str, float]) -> Point:
-    """The oracle's point with an effect's shape, its strength nought."""
+    """The oracle's point with an effect's shape, its strength zero."""
     truth = oracle.bench.truth
     return replace(truth, motion=truth.motion.changed(**details))
 

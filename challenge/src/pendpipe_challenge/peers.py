@@ -38,19 +38,19 @@ def peers(nulls: list[Solved], singles: list[Solved]) -> dict[str, Any]:
     found = {}
     for name in ("aic", "bic", "whiteness"):
 
-        def says(item: Solved, name: str = name) -> str:
+        def chooses(item: Solved, name: str = name) -> str:
             if name == "whiteness":
                 return "?" if item.oracle["whiteness_p"] < 0.01 else ""
             cost = 2.0 if name == "aic" else float(np.log(item.truth["nuisances"]["samples"]))
             return chosen(item, cost)
 
-        seen = [item for item in singles if item.oracle and says(item)]
+        seen = [item for item in singles if item.oracle and chooses(item)]
         found[name] = {
-            "false_alarms": intervals.of([bool(says(i)) for i in nulls if i.oracle]),
-            "detected": intervals.of([bool(says(i)) for i in singles if i.oracle]),
+            "false_alarms": intervals.of([bool(chooses(i)) for i in nulls if i.oracle]),
+            "detected": intervals.of([bool(chooses(i)) for i in singles if i.oracle]),
             "top1": None
             if name == "whiteness"
-            else intervals.of([right(says(i), i.effect) for i in seen]),
+            else intervals.of([right(chooses(i), i.effect) for i in seen]),
         }
     return found
 
@@ -71,7 +71,7 @@ SINDY: Final = {
 
 
 class Judgement(NamedTuple):
-    """What a peer says of a recording."""
+    """A peer's answer about a recording."""
 
     missing: bool
     name: str | None
@@ -121,9 +121,9 @@ def by_sindy(time_s: FloatArray, angle_rad: FloatArray, omega: float) -> Judgeme
 
 
 def sindy_scores(items: list[Solved], folder: Path) -> dict[str, Any]:
-    """Judge the first nulls and singles of a set; ``install`` says how where it can't be.
+    """Judge the first nulls and singles of a set; ``install`` is how, where it can't be.
 
-    It is told the frequency and until when the pendulum moves, which flatters it.
+    It is given the frequency and until when the pendulum moves, which flatters it.
     """
     if importlib.util.find_spec("pysindy") is None:
         return {"install": INSTALL}

@@ -32,7 +32,7 @@ def plain_text(
 
 
 def recording_text(scenario: Scenario, codes: IntArray) -> str:
-    """What the laboratory's file of these codes says: nothing about what acted."""
+    """The laboratory's file of these codes, with nothing about what acted."""
     chain = scenario.chain
     metadata = {
         "volts_per_radian": repr(chain.nominal_volts_per_radian),
@@ -210,8 +210,8 @@ def _conceal(
     wild = random.choice(np.arange(50, len(values) - 50), 3, replace=False)
     changed = values.copy()
     changed[wild] += sign * (8.0 * noise + 0.1 * top)
-    told = {f"sample_{i}": float(at) for i, at in enumerate(np.sort(wild), 1)}
-    return changed, {"number": 3.0, **told}
+    samples = {f"sample_{i}": float(at) for i, at in enumerate(np.sort(wild), 1)}
+    return changed, {"number": 3.0, **samples}
 
 
 def _also(effect: str) -> list[str]:

@@ -129,11 +129,11 @@ _SHOWN: Final = 4
 
 
 class Failure(NamedTuple):
-    """What was hidden, by which law, and what the answer said in its place."""
+    """What was hidden, by which law, and what was answered in its place."""
 
     hidden: str
     law: str
-    said: str
+    answer: str
 
 
 def causes(items: list[Solved], promises: list[dict[str, Any]]) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def causes(items: list[Solved], promises: list[dict[str, Any]]) -> dict[str, Any
     Returns
     -------
     dict
-        By the promise's key: ``promise``; ``rows`` (hidden, law, said, how often, of how
+        By the promise's key: ``promise``; ``rows`` (hidden, law, answer, how often, of how
         many, and the largest size); ``reasons`` (of what kind of failure, cause and words);
         for the probabilities ``bins``.
     """
@@ -157,7 +157,7 @@ def _of(items: Iterable[Solved], *families: str) -> list[Solved]:
     return [item for item in items if item.truth["family"] in families]
 
 
-def _told(
+def _by_cause(
     failed: list[tuple[Failure, float]], asked: list[Solved], table: str
 ) -> dict[str, list[dict[str, Any]]]:
     """Failures by cause, the most frequent first, with how many there might have been."""
@@ -182,10 +182,10 @@ def _reasons(failures: Iterable[Failure], table: str) -> list[dict[str, str]]:
     known = tomllib.loads(files("pendpipe_challenge").joinpath("reasons.toml").read_text("utf-8"))
     found: dict[str, str] = {}
     for failure in failures:
-        hidden, law, said = failure
+        hidden, law, answer = failure
         for key in (
-            f"{hidden} ({law}) -> {said}",
-            f"{hidden} -> {said}",
+            f"{hidden} ({law}) -> {answer}",
+            f"{hidden} -> {answer}",
             f"{hidden} ({law})",
             hidden,
             law,
@@ -197,8 +197,8 @@ def _reasons(failures: Iterable[Failure], table: str) -> list[dict[str, str]]:
 
 
 def _failure(item: Solved) -> tuple[Failure, float]:
-    said = item.answer.lead if item.answer.detected else NOTHING
-    return Failure(item.effect["effect"], item.effect["law"], said), item.size
+    answer = item.answer.lead if item.answer.detected else NOTHING
+    return Failure(item.effect["effect"], item.effect["law"], answer), item.size
 
 
 def _undetected(items: list[Solved]) -> dict[str, Any]:
@@ -209,11 +209,11 @@ def _undetected(items: list[Solved]) -> dict[str, Any]:
     tuned = [i for i in _of(items, "single") if i.effect["effect"] not in WITHOUT_STRENGTH]
     seen = [item for item in tuned if item.oracle.get("detected")]
     missed = [item for item in seen if not item.answer.detected]
-    told = _told([_failure(item) for item in missed], seen, "undetected")
-    for row in told["rows"]:
+    found = _by_cause([_failure(item) for item in missed], seen, "undetected")
+    for row in found["rows"]:
         alike = [i for i in missed if _failure(i)[0] == Failure(row["hidden"], row["law"], NOTHING)]
         row["narrowly"] = sum(map(_narrow, alike))
-    return told
+    return found
 
 
 def _narrow(item: Solved) -> bool:
@@ -227,10 +227,12 @@ def _misnamed(band: str) -> Callable[[list[Solved]], dict[str, Any]]:
 
     def rows(items: list[Solved]) -> dict[str, Any]:
         here = [i for i in _of(items, "single", "tie") if low <= i.size < high]
-        told = [i for i in here if i.oracle.get("detected") and _holds(i.oracle["class"], i)]
-        wrong = [i for i in told if not (i.answer.detected and _holds(i.answer.members, i))]
-        named = _told([_failure(i) for i in wrong if i.answer.detected], told, "misnamed")
-        silent = _told([_failure(i) for i in wrong if not i.answer.detected], told, "undetected")
+        known = [i for i in here if i.oracle.get("detected") and _holds(i.oracle["class"], i)]
+        wrong = [i for i in known if not (i.answer.detected and _holds(i.answer.members, i))]
+        named = _by_cause([_failure(i) for i in wrong if i.answer.detected], known, "misnamed")
+        silent = _by_cause(
+            [_failure(i) for i in wrong if not i.answer.detected], known, "undetected"
+        )
         return {key: named[key] + silent[key] for key in named}
 
     return rows
@@ -248,7 +250,7 @@ def _unspecific(band: str) -> Callable[[list[Solved]], dict[str, Any]]:
         here = [i for i in _of(items, "single", "tie") if low <= i.size < high]
         both = [i for i in here if i.answer.detected and i.oracle.get("detected")]
         large = [i for i in both if len(i.answer.members) > len(i.oracle["class"])]
-        return _told([_failure(item) for item in large], both, "unspecific")
+        return _by_cause([_failure(item) for item in large], both, "unspecific")
 
     return rows
 
@@ -256,39 +258,39 @@ def _unspecific(band: str) -> Callable[[list[Solved]], dict[str, Any]]:
 def _confident(items: list[Solved]) -> dict[str, Any]:
     """Laws outside the catalogue that were given one of its names without doubt."""
     hidden = _of(items, "outside")
-    return _told([_failure(i) for i in hidden if confident_and_wrong(i)], hidden, "outside")
+    return _by_cause([_failure(i) for i in hidden if confident_and_wrong(i)], hidden, "outside")
 
 
 def _alarms(items: list[Solved]) -> dict[str, Any]:
     """Nulls that were called something, by the noise that they have."""
     nulls = [item for item in _of(items, "null") if item.answer.solved]
     failed = [(Failure(noise_of(i), "", i.answer.lead), 0.0) for i in nulls if alarmed(i)]
-    told = _told(failed, [], "false-alarm")
-    for row in told["rows"]:
+    found = _by_cause(failed, [], "false-alarm")
+    for row in found["rows"]:
         row["of"] = sum(noise_of(item) == row["hidden"] for item in nulls)
-    return told
+    return found
 
 
 def _uncalibrated(items: list[Solved]) -> dict[str, Any]:
     """The bins whose interval does not hold what was stated, and what fills them."""
-    told = rated(_of(items, "single", "tie", "outside"))
+    named = rated(_of(items, "single", "tie", "outside"))
     bins, culprits = [], []
-    for row in calibration(told)["bins"]:
+    for row in calibration(named)["bins"]:
         if row["interval95"][0] <= row["stated"] <= row["interval95"][1]:
             continue
         low, high = row["edges"]
-        inside = [i for i in told if low <= min(i.answer.probability, 1.0 - 1e-12) < high]
-        boasts = row["stated"] > row["met"]
-        guilty = [_failure(item) for item in inside if true_of_any(item) != boasts]
-        culprits += [failure for failure, _ in guilty if boasts]
-        part = abs(row["stated"] - row["met"]) * row["of"] / len(told)
+        inside = [i for i in named if low <= min(i.answer.probability, 1.0 - 1e-12) < high]
+        overconfident = row["stated"] > row["met"]
+        failures = [_failure(item) for item in inside if true_of_any(item) != overconfident]
+        culprits += [failure for failure, _ in failures if overconfident]
+        part = abs(row["stated"] - row["met"]) * row["of"] / len(named)
         bins.append(
             {
                 **row,
-                "boasts": boasts,
+                "overconfident": overconfident,
                 "error": part,
                 "families": _families(inside),
-                "culprits": _told(guilty, inside, "misnamed")["rows"][:_SHOWN],
+                "culprits": _by_cause(failures, inside, "misnamed")["rows"][:_SHOWN],
             }
         )
     reasons = {
@@ -333,7 +335,7 @@ SEALS: Final = (
     "truth_sha256",
     "answers_sha256",
 )
-"""What of an opened set says which it was, and when what was known."""
+"""Of an opened set: which it was, and when what was known."""
 OBVIOUS: Final = 30.0
 """Delta chi^2 above which an effect that was not detected is listed."""
 
@@ -377,8 +379,8 @@ def score(opened: dict[str, Any], interval_s: Mapping[str, float] | None = None)
         "places": places(family("single", "tie", "combination", "real"), interval_s or {}),
         "peers": peers(nulls, singles),
         "confusion": confusion(named),
-        "missed": [told(item) for item in family("single", "withheld") if missed(item)],
-        "six_cases": [told(item) for item in six_cases(items)],
+        "missed": [in_words(item) for item in family("single", "withheld") if missed(item)],
+        "six_cases": [in_words(item) for item in six_cases(items)],
     }
     judged = promises(found)
     return {**found, "promises": judged, "causes": causes(items, judged)}
@@ -389,7 +391,7 @@ def missed(item: Solved) -> bool:
     return item.size > OBVIOUS and not item.answer.detected
 
 
-def told(item: Solved) -> dict[str, Any]:
+def in_words(item: Solved) -> dict[str, Any]:
     """One item in words, for pages."""
     statement = " ".join(str(item.answer.content.get("statement") or "").split())
     return {
@@ -446,9 +448,9 @@ def held_out(items: list[Solved]) -> dict[str, Any]:
     """
     known = []
     for item in items:
-        told = item.answer.content.get("held_out") or {}
-        if told.get("gain") is not None and told.get("gain_sd") is not None:
-            known.append((item, float(told["gain"]), float(told["gain_sd"])))
+        blocks = item.answer.content.get("held_out") or {}
+        if blocks.get("gain") is not None and blocks.get("gain_sd") is not None:
+            known.append((item, float(blocks["gain"]), float(blocks["gain_sd"])))
     shares = [gain / (0.5 * item.size - 1.0) for item, gain, _ in known if item.size >= 50.0]
     return {
         "improved": intervals.of([gain > 0.0 for _, gain, _ in known]),

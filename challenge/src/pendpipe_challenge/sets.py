@@ -37,7 +37,7 @@ from pendpipe_challenge.recordings import available, make_real, recording_text
 
 @contextmanager
 def process_pool(number: int) -> Iterator[ProcessPoolExecutor]:
-    """Run processes that keep to one thread each, whatever our own environment says.
+    """Run processes that keep to one thread each, whatever the environment sets.
 
     Linear algebra that takes every core in each of several processes spends its time
     waiting for itself: an item cost three times its CPU on two cores, more on busy ones
@@ -223,7 +223,7 @@ def _apart(places: Places) -> None:
 def _make_one(
     task: tuple[Places, str, dict[str, Any], list[int], Path | None],
 ) -> dict[str, str]:
-    """Make one item; its truth is written last, so that it says the item is whole."""
+    """Make one item; its truth is written last, so that it marks the item as whole."""
     places, name, recipe, seed, real = task
     if places.truth(name).exists():  # made before an interruption, and not entered yet
         return {"item": name, "recording": _hash_of(places.recording(name))}
@@ -340,19 +340,19 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) -> None:
     """One recording: copied into an empty folder, solved there, the answer taken home."""
-    with alone(folder / "recordings" / f"{name}.csv", baseline, solver) as (status, said, answer):
+    with alone(folder / "recordings" / f"{name}.csv", baseline, solver) as (status, errors, answer):
         found, diagnosis = answer / "diagnosis.json", None
         if found.exists():
             try:
                 diagnosis = json.loads(found.read_text(encoding="utf-8"))
             except ValueError as fault:
-                said = f"diagnosis.json is no JSON: {fault}"
+                errors = f"diagnosis.json is no JSON: {fault}"
     write_json(
         answer_path(folder, name),
         {
             "item": name,
             "status": status,
-            "stderr": said if status else "",
+            "stderr": errors if status else "",
             "diagnosis": diagnosis,
             "solved_at": now(),
         },
@@ -366,7 +366,7 @@ def alone(recording: Path, baseline: str, solver: Sequence[str]) -> Iterator[tup
     Yields
     ------
     tuple
-        Its exit status (-1: it ran out of its time), what it said on stderr, and the folder
+        Its exit status (-1: it ran out of its time), its standard error, and the folder
         of its answer, which is gone afterwards.
     """
     with tempfile.TemporaryDirectory(prefix="pendulum-") as place:
@@ -386,10 +386,10 @@ def alone(recording: Path, baseline: str, solver: Sequence[str]) -> Iterator[tup
                 check=False,
                 stdin=subprocess.DEVNULL,
             )
-            status, said = run.returncode, run.stderr.strip()[-2000:]
+            status, errors = run.returncode, run.stderr.strip()[-2000:]
         except subprocess.TimeoutExpired:
-            status, said = -1, f"no answer within {PATIENCE_S:g} s"
-        yield status, said, room / "answer"
+            status, errors = -1, f"no answer within {PATIENCE_S:g} s"
+        yield status, errors, room / "answer"
 
 
 def _hash_answers(folder: Path, names: list[str]) -> None:

@@ -438,7 +438,7 @@ class Specials:
         return best
 
     def _colour(self, residuals: FloatArray) -> FloatArray:
-        """Low frequencies stronger than the known spectrum says."""
+        """Low frequencies stronger than in the known spectrum."""
         count = residuals.shape[0]
         length = smooth_length(count)
         # Padding correlates neighbours a little; the bins are few per cent closer only.

@@ -107,7 +107,7 @@ PARAMETERS: Final = {
     "coupling": 0.0,  # w^2 kappa u on x, and w^2 kappa x on u
     "inertial": 0.0,  # u is driven by -inertial x''
 }
-"""Every parameter with the value that it has when it is not spoken of."""
+"""Every parameter with the value that it has by default."""
 
 GROUPS: Final = {
     "any_restoring": (

@@ -115,14 +115,15 @@ PROOF_CAPTIONS: Final = {
     "reliability": Caption(
         "Reliability",
         "How often the first name was right, against the probability that the answer stated.",
-        "On the grey line probabilities mean what they say; below it the answers boast.",
+        "On the grey line probabilities come true as stated; below it answers are overconfident.",
     ),
     "abstention": Caption(
         "Keeping silent",
         "How many first names are right if those below a probability are withheld, and how many"
         " are then given at all.",
         "Where the blue curve rises to the right, the probabilities are worth something: doubt"
-        " goes with mistakes. It should stay above the grey line; below it the answers boast.",
+        " goes with mistakes. It should stay above the grey line; below it the answers are"
+        " overconfident.",
     ),
 }
 """Words for the figures of a scored challenge."""
