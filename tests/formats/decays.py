@@ -14,9 +14,13 @@ SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 
 
 def swing(samples: int = 800, rate: float = 50.0, amplitude: float = 0.5) -> tuple[Floats, Floats]:
-    """Times and angles of a pendulum of 0.8 Hz with a logarithmic decrement of 0.0625."""
+    """Times and angles of a pendulum of 0.8 Hz with a logarithmic decrement of 0.0625.
+
+    Its period is longer by a sixteenth of the amplitude squared, as sin x has it.
+    """
     time = np.arange(samples) / rate
-    return time, amplitude * np.exp(-0.05 * time) * np.cos(2 * np.pi * 0.8 * time)
+    late = amplitude**2 / 16 * (1 - np.exp(-0.1 * time)) / 0.1
+    return time, amplitude * np.exp(-0.05 * time) * np.cos(2 * np.pi * 0.8 * (time - late))
 
 
 @dataclass

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, excel, inspect, matlab_check, read
+from pendpipe.formats import ReadOptions, archives, inspect, matlab_check, read
 
 from .decays import swing
 
@@ -66,7 +66,7 @@ def test_what_unpacks_to_more_than_any_recording_is_refused(
     book.active.append(["t", "angle"])
     book.save(tmp_path / "a.xlsx")
     assert len(read(path)) == len(TIME)
-    for module in (matlab_check, excel):
+    for module in (matlab_check, archives):
         monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)
     with pytest.raises(InputError, match="its compressed data are more than 0 MB"):
         read(path)
@@ -83,12 +83,12 @@ def test_excel_with_or_without_a_header(tmp_path: Path, header: list[str] | None
     if header:
         sheet.append(["Experiment 3"])
         sheet.append(header)
-    for t, x in zip(TIME.tolist(), (10 * np.degrees(ANGLE)).tolist(), strict=True):
+    for t, x in zip(TIME.tolist(), np.degrees(ANGLE).tolist(), strict=True):
         sheet.append([t, x])
     path = tmp_path / "a.xlsx"
     book.save(path)
     recording = read(path)
-    np.testing.assert_allclose(recording.values, 10 * ANGLE)
+    np.testing.assert_allclose(recording.values, ANGLE)
     assert recording.notes[0] == "sheet 'swing'"
     assert inspect(path).format == "excel"
 
@@ -108,7 +108,7 @@ def test_a_cell_of_text_is_named_by_its_row(tmp_path: Path) -> None:
 def test_a_broken_archive_and_an_old_workbook_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.xlsx"
     path.write_bytes(b"PK\x03\x04 nothing of use")
-    with pytest.raises(InputError, match="workbook can't be read"):
+    with pytest.raises(InputError, match="archive can't be read"):
         read(path)
     path.write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600)
     with pytest.raises(InputError, match="old Excel file"):

@@ -66,7 +66,7 @@ def test_flat_tops_are_clipping_and_slow_turns_are_not() -> None:
     assert clipped_samples(coarse, 0.01) == 0
     cut = np.clip(ANGLE, -1.0, 0.3)
     assert clipped_samples(cut, None) == np.sum(cut == 0.3)
-    assert clipped_samples(np.clip(coarse, -0.2, 1.0), 0.01) == np.sum(coarse <= -0.2 + 1e-9)
+    assert clipped_samples(np.clip(coarse, -0.1, 1.0), 0.01) == np.sum(coarse <= -0.1 + 1e-9)
 
 
 def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,6 +88,7 @@ def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert list(told) == [
         *("schema_version", "format", "channels", "samples", "sample_rate_hz", "uniform"),
         *("duration_s", "resolution", "gaps", "markers", "clipped_samples", "warnings"),
+        *("chosen", "unit", "level", "weak_guesses"),
     ]
 
 

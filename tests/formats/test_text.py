@@ -116,13 +116,27 @@ def test_runs_side_by_side_do_not_mix(tmp_path: Path) -> None:
     assert any("neither time nor reading" in note for note in other.notes)
 
 
-def test_an_angular_velocity_alone_is_integrated(tmp_path: Path) -> None:
-    path = tmp_path / "gyro.csv"
-    rate = np.gradient(ANGLE, TIME)
-    path.write_text(table(TIME, rate, head='"Time (s)","Gyroscope x (rad/s)"\n'))
+@pytest.mark.parametrize(
+    ("head", "scale", "unit"),
+    [
+        ("Gyroscope x (rad/s)", 1.0, "rad/s"),
+        ("omega (deg/s)", np.pi / 180, "rad/s"),
+        ("Acceleration y (m/s^2)", 1.0, "m/s^2"),
+        ("Illuminance (lx)", 1.0, "lx"),
+        ("x (px)", 1.0, "pixels"),
+        ("ADC (counts)", 1.0, "counts"),
+        ("Hall (foo)", 1.0, "foo"),
+    ],
+)
+def test_what_is_no_angle_is_read_in_its_own_unit(
+    tmp_path: Path, head: str, scale: float, unit: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(table(TIME, ANGLE, head=f'"Time (s)","{head}"\n'))
     recording = read(path)
-    assert any("integral" in note for note in recording.notes)
-    np.testing.assert_allclose(np.diff(recording.values), np.diff(ANGLE), atol=2e-3)
+    assert (recording.quantity, recording.unit) == ("reading", unit)
+    assert recording.as_motion() is recording
+    np.testing.assert_allclose(recording.values, scale * ANGLE, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -226,15 +240,14 @@ def spoil(row: int, text: str) -> Callable[[list[str]], list[str]]:
         (spoil(1, "oops,0.4"), "line 2: 'oops' is no number"),
         (spoil(2, "restarted here"), "line 3: 'restarted here' is no number"),
         (spoil(7, "0.01,0.4"), "line 8: the time falls"),
-        (spoil(7, "0.10,0.4"), "line 8: the time repeats"),
         (spoil(7, "0.12,nan"), "line 8: 1 reading(s) that are NaN"),
         (spoil(7, "nan,0.4"), "line 8: the time is missing or NaN"),
         (spoil(800, "15.98,abc"), "line 801: 'abc' is no number"),
         (lambda lines: lines[:1], "no block of rows with numbers"),
         (lambda _: [], "the file is empty"),
-        (lambda _: ["hello", "world"], "text table: no block of rows"),
+        (lambda _: ["hello", "world"], "no reader knows this file: no block of rows"),
         (lambda lines: [line.split(",")[1] for line in lines], "no time column and no sample rate"),
-        (lambda lines: [line.split(",")[0] for line in lines], "no column looks like an angle"),
+        (lambda lines: [line.split(",")[0] for line in lines], "no column looks like the motion"),
     ],
 )
 def test_a_fault_is_one_line_with_its_place(

@@ -1,7 +1,7 @@
-"""Files of recordings: any supported layout to a `Recording`, every guess said."""
+"""Files of recordings: any supported layout to a `Recording`, with every guess that was made."""
 
-from pendpipe.formats.inspection import Inspection
+from pendpipe.formats.inspection import Inspection, inspect
 from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.reading import inspect, read
+from pendpipe.formats.reading import read
 
 __all__ = ["Inspection", "ReadOptions", "inspect", "read"]

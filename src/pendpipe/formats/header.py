@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from pendpipe.errors import InputError
 from pendpipe.formats.layout import COMMENT, Layout, is_comment
-from pendpipe.formats.units import split_header, unit_of
+from pendpipe.formats.words import split_header, unit_of
 
 _RATE_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
@@ -27,7 +27,7 @@ _VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]
 
 @dataclass(frozen=True)
 class Header:
-    """Names and units (one a column, ``""`` where not told), interval, remarks."""
+    """Names and units (one a column, ``""`` where absent), interval, remarks."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -47,7 +47,7 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     names_at, cells = _names(filled, layout)
     _refuse_spoilt_rows(place, filled, names_at, layout)
-    interval = _interval([line for _, line in filled])
+    interval = _interval([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
     if not cells:
         return Header((), (), interval, metadata, ("no header: columns are told by their shape",))
@@ -65,13 +65,38 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     return Header(tuple(_unique(names)), tuple(units), interval, metadata, notes)
 
 
+def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
+    """Split a line of names as its rows are, and in the other ways that fit their width."""
+    bare = line.strip().lstrip("".join(COMMENT)).strip()
+    yield layout.split(line)
+    yield layout.split(bare)
+    if is_comment(line):
+        yield bare.split()
+    if any(map(layout.is_number, layout.split(bare))):
+        return
+    # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
+    joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare)
+    for cells in (
+        *(bare.split(sign) for sign in "\t;,|"),
+        re.split(r"\s{2,}", bare),
+        [cell.replace("\0", " ") for cell in joined.split()],
+    ):
+        cells = [cell.strip() for cell in cells]
+        while len(cells) > layout.width and not cells[-1]:
+            cells.pop()
+        if len(cells) == layout.width:
+            yield cells
+
+
 def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list[str]]:
     """Find the line of names: the last (but for a row of units) that fits the columns."""
     candidates: list[tuple[int, int, list[str]]] = []
     for number, line in filled:
         bare = line.strip().lstrip("".join(COMMENT)).strip()
-        by_blanks = [bare.split()] if is_comment(line) else []
-        for cells in (layout.split(line), layout.split(bare), *by_blanks):
+        own = layout.split(line)
+        if candidates and len(own) == layout.width and all(map(layout.is_number, own)):
+            break  # the block has begun: what follows is a fault in it
+        for cells in _splits(line, layout):
             while len(cells) > layout.width and not cells[-1]:
                 cells.pop()
             texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]
@@ -121,7 +146,7 @@ def _refuse_spoilt_rows(
             number, text = below[place_of + 1] if place_of + 1 < len(below) else (number, line)
             wrong = [text.strip()[:60]]
         raise InputError(
-            f"{place}, line {number}", f"'{wrong[0]}' is no number", "mend or drop the row"
+            f"{place}, line {number}", f"'{wrong[0]}' is no number", "correct or drop the row"
         )
 
 

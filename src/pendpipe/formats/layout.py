@@ -1,4 +1,4 @@
-"""How a text file writes its table: the sign between cells, the decimal sign, the rows."""
+"""How a text file writes its table: the signs between cells and in numbers, cells to numbers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+import numpy as np
+
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError
@@ -194,3 +197,144 @@ def _is_row(line: str, layout: Layout) -> bool:
     filled = [cell for cell in cells if cell.lower() not in BLANK_CELLS]
     numbers = sum(map(layout.is_number, filled))
     return numbers > 0 and 2 * numbers >= len(filled)
+
+
+def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
+    """Read rows that hold nothing but numbers; ``None`` where they hold anything else."""
+    if any('"' in row for row in rows[:3]):
+        return None
+    if layout.decimal == ",":
+        rows = [row.replace(",", ".") for row in rows]
+    delimiter = None if layout.delimiter == " " else layout.delimiter
+    try:
+        return np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64)
+    except ValueError:
+        return None
+
+
+_WITH_UNIT: Final = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]\S{0,5})")
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """One column of cells as numbers.
+
+    Parameters
+    ----------
+    values, blank
+        The numbers (NaN where there is none), and which cells are empty; shape (n,).
+    fault
+        Row and text of the first cell that is neither empty nor a number.
+    unit
+        What stands behind every number (``12.3°``); ``""`` where nothing does.
+    """
+
+    values: FloatArray
+    blank: BoolArray
+    fault: tuple[int, str] | None = None
+    unit: str = ""
+
+
+def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
+    """Turn one column into numbers."""
+    if layout.decimal == ",":
+        cells = [cell.replace(",", ".") for cell in cells]
+    blank = np.array([cell.lower() in BLANK_CELLS for cell in cells], dtype=bool)
+    if not blank.any():
+        try:
+            return Numbers(np.array(cells, dtype=np.float64), blank)
+        except ValueError:
+            pass
+    filled = np.flatnonzero(~blank).tolist()
+    matches = [_WITH_UNIT.fullmatch(cells[row]) for row in filled[:2]]
+    if matches and all(matches):
+        bare = _without_unit(cells, filled)
+        if bare is not None:
+            return Numbers(bare[0], blank, None, bare[1])
+    values = np.full(len(cells), np.nan)
+    fault = None
+    for row in filled:
+        try:
+            values[row] = float(cells[row].lower().replace("d", "e"))
+        except ValueError:
+            if fault is None:
+                fault = (row, cells[row])
+    return Numbers(values, blank, fault)
+
+
+def _without_unit(cells: Sequence[str], filled: Sequence[int]) -> tuple[FloatArray, str] | None:
+    """Take off the unit that stands behind every number; ``None`` unless it is one."""
+    values = np.full(len(cells), np.nan)
+    units = set()
+    for row in filled:
+        match = _WITH_UNIT.fullmatch(cells[row])
+        if match is None:
+            return None
+        try:
+            values[row] = float(match[1])
+        except ValueError:
+            return None
+        units.add(match[2])
+    return (values, units.pop()) if len(units) == 1 else None
+
+
+_CLOCK: Final = re.compile(
+    r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ,]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})[T ,]+)?"
+    r"(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,:]\d+)?)"
+    r"\s*(am|pm)?\s*(?:z|utc|[+-]\d{2}:?\d{2})?",
+    re.I,
+)
+
+
+def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
+    """Turn ``12:34:56.7``, ``0:05.2`` or ``2024-05-01T12:34:56`` into seconds.
+
+    Times of day that pass midnight go on; dates are counted from 1 January 1970. Of two
+    parts the last is seconds. A day and month that could be either are taken as month/day
+    with slashes, as day.month else: it matters at midnight only.
+
+    Returns
+    -------
+    seconds
+        ``None`` if the cells are no times.
+    """
+    if not cells:
+        return None
+    matches = [_CLOCK.fullmatch(cell.strip().lstrip("'")) for cell in cells]
+    if any(match is None for match in matches):
+        return None
+    seconds = np.empty(len(cells))
+    days: dict[tuple[str | None, ...], int] = {}
+    for row, match in enumerate(matches):
+        assert match is not None
+        date = match.groups()[:6]
+        hour, minute, second, half = match.groups()[6:]
+        if date not in days:
+            days[date] = _days(date, "/" in match[0])
+        hours = int(hour or 0)
+        hours = hours % 12 + 12 * (half.lower() == "pm") if half else hours
+        of_day = 3600 * hours + 60 * int(minute) + float(re.sub("[,:]", ".", second))
+        seconds[row] = 86400.0 * days[date] + of_day
+    if min(days.values()) < 0:
+        return None
+    if seconds.max() < 86400:
+        seconds += 86400.0 * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -43200)
+    return seconds
+
+
+def _days(date: tuple[str | None, ...], slashed: bool) -> int:
+    """Count the days since 1970; 0 without a date, -1 where there is no such day."""
+    import datetime as dt
+
+    if not any(date):
+        return 0
+    if date[0]:
+        year, month, day = (int(part or 0) for part in date[:3])
+    else:
+        day, month, year = (int(part or 0) for part in date[3:])
+        if month > 12 or (slashed and day <= 12):
+            day, month = month, day
+    try:
+        return max(-1, dt.date(year, month, day).toordinal() - 719163)
+    except ValueError:
+        return -1

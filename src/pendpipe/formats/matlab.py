@@ -11,9 +11,9 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.matlab_check import DamagedError, sound_variables
-from pendpipe.formats.names import role_of
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
+from pendpipe.formats.words import role_of
 
 _SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
 """What a rate or an interval may be."""
@@ -82,7 +82,7 @@ def _load(place: Path, data: bytes) -> dict[str, Any]:
 
 def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, FloatArray]]:
     """Walk through variables and structures; give every real array as columns with a name."""
-    if depth > 6:
+    if depth > 12:
         return
     if isinstance(tree, dict):
         for name, value in tree.items():
@@ -90,11 +90,19 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
         return
     array = np.asarray(tree)
     if array.dtype.names:
-        if array.size == 1:
-            record = array.reshape(-1)[0]
-            yield from _numbers({name: record[name] for name in array.dtype.names}, path, depth)
+        for number, record in enumerate(array.reshape(-1)[:64], start=1):
+            fields = {name: record[name] for name in array.dtype.names}
+            name = path if array.size == 1 else f"{path}({number})"
+            # Simulink's "structure with time" names a signal in its label.
+            label = fields.get("label")
+            if isinstance(label, str) and label.strip() and "values" in fields:
+                name, fields = label.strip(), {"values": fields["values"]}
+            yield from _numbers(fields, name, depth + 1)
         return
     if array.dtype == object:
+        if array.dtype == object and array.ndim == 0:
+            yield from _numbers(array.item(), path, depth + 1)
+            return
         for number, entry in enumerate(array.reshape(-1)[:64], start=1):
             name = path if array.size == 1 else f"{path}({number})"
             yield from _numbers(entry, name, depth + 1)

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Final
 
 from pendpipe.errors import InputError
-from pendpipe.formats.names import role_of
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, Marker, Table
-from pendpipe.formats.units import split_header
+from pendpipe.formats.words import role_of, split_header
 from pendpipe.recording import QUANTITIES, Recording, converter_step, read_plain
 
-_READINGS: Final = ("angle", "volts", "length", "angular velocity")
+_READINGS: Final = ("angle", "volts", "length", "velocity", "acceleration", "signal")
 
 
 def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording | None:

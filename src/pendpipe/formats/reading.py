@@ -2,54 +2,81 @@
 
 from __future__ import annotations
 
-import importlib
+import stat
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import ByteArray
+from pendpipe.arrays import BoolArray, ByteArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
-from pendpipe.formats.examine import clipped_samples, find_gaps, is_uniform, resolution, sample_rate
-from pendpipe.formats.inspection import Inspection
+from pendpipe.formats.examine import resolution
 from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.plain import read_if_plain, table_of_plain
-from pendpipe.formats.readings import readings
+from pendpipe.formats.plain import read_if_plain
+from pendpipe.formats.readings import Readings, readings
 from pendpipe.formats.table import Marker, NotThisFormatError, Table
-from pendpipe.formats.timebase import time_base
-from pendpipe.formats.units import unit_of
+from pendpipe.formats.timebase import TimeBase, time_base
 from pendpipe.recording import GOOD, MISSING, Recording, check
 
-READERS: Final = {
-    "WinDaq": "windaq",
-    "MATLAB": "matlab",
-    "Excel": "excel",
-    "WinDaq CSV": "windaq_csv",
-    "DI-149 capture": "captures",
-    "text table": "text",
-}
-"""The readers in the order in which they are tried, with the modules they live in."""
-
 _ANYTHING: Final = ReadOptions()
+_LARGEST: Final = 1 << 30
+"""Bytes of a file; a day at 1 kHz is 1.7e8 of WinDaq's."""
+
+Reader = Callable[[Path, bytes, ReadOptions], Table]
+
+
+def readers() -> Iterator[tuple[str, Reader]]:
+    """Give the readers in the order in which they are tried, each imported in its turn.
+
+    A new format is a module with `read_table` and a line here. A reader raises
+    `NotThisFormatError` where the file is none of its own.
+    """
+    from pendpipe.formats import windaq
+
+    yield "WinDaq", windaq.read_table
+    from pendpipe.formats import matlab
+
+    yield "MATLAB", matlab.read_table
+    from pendpipe.formats import archives
+
+    yield "zip archive", archives.read_table
+    from pendpipe.formats import xml_tables
+
+    yield "XML", xml_tables.read_table
+    from pendpipe.formats import windaq_csv
+
+    yield "WinDaq CSV", windaq_csv.read_table
+    from pendpipe.formats import captures
+
+    yield "DI-149 capture", captures.read_table
+    from pendpipe.formats import text
+
+    yield "text table", text.read_table
 
 
 def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
-    """Read one channel of any supported file.
+    """Read one channel of any supported file; ``-`` is standard input.
 
-    Every guess stands in the recording's ``notes`` and gives way to `options`.
+    Every guess stands in the recording's ``notes``, or, where it is a weak one, in its
+    ``weak_guesses``, and gives way to `options`.
 
     Raises
     ------
     InputError
-        When no reader knows the file (each with its reason), or its samples can't be true:
-        file, line, what is wrong, what to do.
+        When no reader knows the file, or its samples can't be true: file, line, what is
+        wrong, what to do.
     """
     place = Path(path)
-    data = _bytes(place)
+    data = file_bytes(place)
     plain = read_if_plain(place, data, options)
-    recording = plain if plain is not None else _recording(_table(place, data, options), options)
+    recording = (
+        plain if plain is not None else recording_of(table_of(place, data, options), options)
+    )
     metadata = dict(recording.metadata)
     metadata.setdefault("source", place.name)
     if options.volts_per_radian is not None:
@@ -68,113 +95,108 @@ def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
     return part
 
 
-def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
-    """Say what a file holds, even where none of its channels could be analysed."""
-    place = Path(path)
-    data = _bytes(place)
-    plain = read_if_plain(place, data, options)
-    table = table_of_plain(place, plain) if plain is not None else _table(place, data, options)
-    choice = choose(table, options, reading=False)
-    if not choice.readings:
-        if not choice.channels:
-            raise InputError(place, "there is no column but the time", "give readings beside it")
-        choice = replace(choice, readings=choice.channels[:1])
-    notes = [*table.notes, *choice.notes]
-    try:
-        recording = _recording(table, options) if plain is None else plain
-        unit, values, notes = recording.unit, recording.values, list(recording.notes)
-        time, step = recording.time_s[recording.usable], recording.resolution
-        values = values[recording.usable]
-    except InputError as fault:
-        base = time_base(table, choice, options)
-        column = choice.readings[0]
-        time, values = base.time_s, column.values[base.keep]
-        unit, step = column.unit, column.resolution or resolution(values)
-        notes.append(f"the readings can't be analysed: {fault.problem}")
-    column = choice.readings[0]
-    scale = 1.0
-    known = unit_of(column.unit) if column.unit else None
-    if known is not None and unit in ("rad", "V", "m"):
-        scale = known.factor
-    limits = (column.limits[0] * scale, column.limits[1] * scale) if column.limits else None
-    return Inspection(
-        format=table.format,
-        channels=tuple((column.label, column.unit) for column in choice.channels),
-        samples=len(time),
-        sample_rate_hz=sample_rate(time),
-        uniform=is_uniform(time),
-        duration_s=float(time[-1] - time[0]) if len(time) else 0.0,
-        resolution=step,
-        unit=unit,
-        gaps=tuple(find_gaps(time)),
-        markers=table.markers,
-        clipped_samples=clipped_samples(values, step, limits),
-        warnings=tuple(notes),
-    )
+def file_bytes(place: Path) -> bytes:
+    """Read a file, or standard input (``-``, ``/dev/stdin``), whole.
 
-
-def _bytes(place: Path) -> bytes:
-    """Read the file whole, or say why not."""
-    try:
-        data = place.read_bytes()
-    except FileNotFoundError:
-        raise InputError(place, "there is no such file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(place, "this is a folder", "give a file in it") from None
-    except OSError as fault:
-        reason = fault.strerror or str(fault)
-        raise InputError(place, f"the file can't be read ({reason})", "check it") from None
-    if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
+    Raises
+    ------
+    InputError
+        When it can't be read, holds nothing, is no regular file, or is too large.
+    """
+    if str(place) in ("-", "/dev/stdin"):
+        data = _standard_input()
+    else:
+        try:
+            found = place.stat()
+            if stat.S_ISDIR(found.st_mode):
+                raise InputError(place, "this is a folder", "give a file in it")
+            if not stat.S_ISREG(found.st_mode):
+                raise InputError(
+                    place, "this is a device or a pipe", "give a file, or - for standard input"
+                )
+            _refuse_size(place, found.st_size)
+            data = place.read_bytes()
+        except FileNotFoundError:
+            raise InputError(place, "there is no such file", "check the path") from None
+        except (OSError, ValueError) as fault:
+            reason = getattr(fault, "strerror", None) or str(fault)
+            raise InputError(place, f"the file can't be read ({reason})", "check it") from None
+    if not data[:1024].strip(b"\0 \t\r\n\xef\xbb\xbf") and not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(place, "the file is empty", "record again, or give another file")
     return data
 
 
-def _table(place: Path, data: bytes, options: ReadOptions) -> Table:
+@cache
+def _standard_input() -> bytes:
+    """Read standard input once: it can't be read again for its digest."""
+    data = sys.stdin.buffer.read(_LARGEST + 1)
+    _refuse_size(Path("-"), len(data))
+    return data
+
+
+def _refuse_size(place: Path, size: int) -> None:
+    if size > _LARGEST:
+        raise InputError(
+            place,
+            f"the file holds {size / 1e9:.1f} GB, more than the {_LARGEST / 1e9:.1f} GB of a"
+            " recording",
+            "give a part of it",
+        )
+
+
+def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Try the readers in turn."""
-    reasons = []
-    for name, module in READERS.items():
-        reader = importlib.import_module(f"pendpipe.formats.{module}")
+    reason: NotThisFormatError | None = None
+    for _, reader in readers():
         try:
-            table: Table = reader.read_table(place, data, options)
-        except NotThisFormatError as reason:
-            reasons.append(f"{name}: {reason}")
-        else:
-            return table
+            return reader(place, data, options)
+        except NotThisFormatError as fault:
+            reason = fault
+    # The last reader takes any text, and so it knows what is wrong.
     raise InputError(
         place,
-        f"no reader knows this file ({', '.join(reasons)})",
+        f"no reader knows this file: {reason}",
         "export it as CSV with a time and an angle column",
     )
 
 
-def _recording(table: Table, options: ReadOptions) -> Recording:
+def recording_of(table: Table, options: ReadOptions) -> Recording:
     """Choose the columns of a table and turn them into a recording."""
     choice = choose(table, options)
     _refuse_text(table, choice)
     base = time_base(table, choice, options)
-    time_s = np.full(len(base.keep), np.nan)
-    time_s[base.keep] = base.time_s
-    found = readings(table, choice, options, time_s)
-    if len(found.values) != len(base.keep):
-        raise InputError(table.place, "the columns are of unequal length", "choose with --column")
-    values = found.values[base.keep]
-    quality = _quality(table, choice, values, base.keep)
+    found = converted(table, choice, base, options)
+    values = found.values[base.rows]
+    quality = _quality(table, choice, values, base)
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
     if quality is not None:
         notes.append(f"{np.sum(quality == MISSING)} row(s) without a reading, marked missing")
+    metadata = {**_kept(table), **base.metadata, **_markers(table.markers)}
+    if found.quantity == "reading":
+        metadata["unit"] = found.unit
     own_step = choice.readings[0].resolution
-    step = own_step * found.factor if own_step is not None else resolution(values)
     recording = Recording(
         time_s=np.ascontiguousarray(base.time_s),
         values=np.ascontiguousarray(values),
         quantity=found.quantity,
         quality=quality,
-        metadata={**_kept(table), **base.metadata, **_markers(table.markers)},
-        resolution=step,
+        metadata=metadata,
+        resolution=own_step * found.factor if own_step is not None else resolution(values),
         notes=tuple(notes),
+        weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
     )
     check(table.place, recording)
     return recording
+
+
+def converted(table: Table, choice: Choice, base: TimeBase, options: ReadOptions) -> Readings:
+    """Turn the chosen columns into readings, the unit judged by the times as well."""
+    rows = len(choice.readings[0].values)
+    if any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows:
+        raise InputError(table.place, "the columns are of unequal length", "choose with --column")
+    time_s = np.full(rows, np.nan)
+    time_s[base.rows] = base.time_s
+    return readings(table, choice, options, time_s)
 
 
 def _refuse_text(table: Table, choice: Choice) -> None:
@@ -182,7 +204,7 @@ def _refuse_text(table: Table, choice: Choice) -> None:
         if column.fault is not None:
             row, text = column.fault
             raise InputError(
-                table.where(row), f"'{text}' is no number", "mend the row, or leave it blank"
+                table.where(row), f"'{text}' is no number", "correct the row, or leave it blank"
             )
 
 
@@ -190,24 +212,23 @@ def _quality(
     table: Table,
     choice: Choice,
     values: np.ndarray[tuple[int], np.dtype[np.float64]],
-    keep: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    base: TimeBase,
 ) -> ByteArray | None:
     """Mark rows with an empty cell as missing; a written NaN is a fault."""
-    blank = np.zeros(len(keep), dtype=bool)
+    blank: BoolArray = np.zeros(len(values), dtype=bool)
     for column in choice.readings:
         if column.blank is not None:
-            blank |= column.blank
-    odd = np.flatnonzero(~np.isfinite(values) & ~blank[keep])
+            blank |= column.blank[base.rows]
+    odd = np.flatnonzero(~np.isfinite(values) & ~blank)
     if odd.size:
-        row = int(np.flatnonzero(keep)[odd[0]])
         raise InputError(
-            table.where(row),
+            table.where(int(base.rows[odd[0]])),
             f"{odd.size} reading(s) that are NaN or infinite",
             "drop the rows, or leave the cells blank",
         )
-    if not blank[keep].any():
+    if not blank.any():
         return None
-    return np.where(blank[keep], MISSING, GOOD).astype(np.uint8)
+    return np.where(blank, MISSING, GOOD).astype(np.uint8)
 
 
 def _kept(table: Table) -> dict[str, str]:

@@ -1,18 +1,31 @@
-"""From the chosen column to radians, volts or metres, with every guess told."""
+"""From the chosen column to radians, volts, metres, or the file's own unit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.choose import Choice, meaning
+from pendpipe.formats.choose import Choice
+from pendpipe.formats.examine import resolution
 from pendpipe.formats.options import ReadOptions
+from pendpipe.formats.swing import derivative_slope, follows_sine
 from pendpipe.formats.table import Column, Table
-from pendpipe.formats.units import Unit, unit_of
+from pendpipe.formats.words import Unit, unit_of
 from pendpipe.recording import Quantity
+
+_RADIAN = Unit("angle", 1.0, "rad")
+_DEGREE = Unit("angle", np.pi / 180, "rad")
+_UNKNOWN = Unit("own", 1.0, "1")
+_QUANTITIES: dict[str, Quantity] = {
+    "angle": "angle_rad",
+    "volts": "volts",
+    "length": "displacement_m",
+    "own": "reading",
+}
 
 
 @dataclass(frozen=True)
@@ -22,92 +35,239 @@ class Readings:
     values: FloatArray
     quantity: Quantity
     factor: float
-    notes: tuple[str, ...]
+    unit: str
+    notes: tuple[str, ...] = ()
+    weak_guesses: tuple[str, ...] = ()
 
 
-def readings(
-    table: Table, choice: Choice, options: ReadOptions, time_s: FloatArray, *, as_told: bool = False
-) -> Readings:
+@dataclass(frozen=True)
+class _Guess:
+    """A unit, what to say of it, and whether it stands on slender grounds."""
+
+    unit: Unit
+    why: str = ""
+    weak: bool = False
+
+
+def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatArray) -> Readings:
     """Turn the chosen column, or the pair x, y, into one of the quantities.
 
     Parameters
     ----------
     time_s
-        Times of all rows, NaN where a row is left out (only an angular velocity needs them).
-    as_told
-        Keep an angle's zero where the file has it.
+        Times of all rows, NaN where a row is left out.
     """
     if len(choice.readings) == 2:
         return _position(choice.readings[0], choice.readings[1])
     column = choice.readings[0]
-    unit, notes = _unit(table, column, options)
-    values = column.values * unit.factor
-    if unit.kind == "volts":
-        return Readings(values, "volts", unit.factor, tuple(notes))
-    if unit.kind == "length":
-        return Readings(values, "displacement_m", unit.factor, tuple(notes))
-    if unit.kind == "angular velocity":
-        values = _integrated(values, time_s)
-        notes.append(f"'{column.label}' is an angular velocity: the angle is its integral")
-        return Readings(values, "angle_rad", unit.factor, tuple(notes))
-    if not as_told:
-        values, more = _from_below(values)
-        notes.extend(more)
-    return Readings(values, "angle_rad", unit.factor, tuple(notes))
+    guess = _unit(table, choice, column, options, time_s)
+    values = column.values * guess.unit.factor
+    notes: tuple[str, ...] = ()
+    if guess.unit.kind == "angle":
+        values, notes = _from_below(values)
+    found = Readings(
+        values, _QUANTITIES[guess.unit.kind], guess.unit.factor, guess.unit.name, notes
+    )
+    if not guess.why:
+        return found
+    said = f"'{column.label}' {guess.why}"
+    if guess.weak:
+        return replace(found, weak_guesses=(f"{said} (--unit)",))
+    return replace(found, notes=(said, *notes))
 
 
-def _unit(table: Table, column: Column, options: ReadOptions) -> tuple[Unit, list[str]]:
-    """Find the unit: told by the user, told by the file, or guessed from the numbers."""
+def _unit(
+    table: Table, choice: Choice, column: Column, options: ReadOptions, time_s: FloatArray
+) -> _Guess:
+    """Find the unit: from the user, from the file, or from the numbers."""
     if options.reading_unit is not None:
         told = unit_of(options.reading_unit)
-        if told is None or told.kind not in ("angle", "volts", "length", "angular velocity"):
+        if told is None or told.kind not in _QUANTITIES:
             raise InputError(
                 "--unit",
                 f"'{options.reading_unit}' is not known",
-                "give rad, deg, V, mV, m, mm, ...",
+                "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
             )
-        return told, []
+        return _Guess(told)
     written = unit_of(column.unit) if column.unit else None
-    if written is not None and written.kind in ("angle", "volts", "length", "angular velocity"):
-        return written, []
-    role = meaning(column)
-    if written is not None or role == "other":
+    role = choice.roles.get(column.number, "unknown")
+    if written is not None and written.kind in _QUANTITIES:
+        if role == "velocity" and written.kind in ("angle", "length"):
+            return _Guess(Unit("own", written.factor, f"{written.name}/s"))
+        return _contradicted(column, written, time_s) or _Guess(written)
+    if column.unit and written is None:
+        return _Guess(Unit("own", 1.0, column.unit), f"is in {column.unit}, analysed as it stands")
+    if written is not None or role in ("none", "time", "index"):
         raise InputError(
             table.place,
-            f"'{column.label}' ({column.unit or 'by its name'}) is neither an angle, a voltage nor"
-            " a displacement",
-            "choose another with --channel or --column, or say its unit with --unit",
+            f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
+            " motion is read from",
+            "choose another with --column, or give its unit with --unit",
+        )
+    finite = column.values[np.isfinite(column.values)]
+    whole = bool(len(finite)) and bool(np.all(finite == np.rint(finite)))
+    reach = _reach(finite)
+    if (
+        role in ("volts", "length", "unknown", "signal")
+        and whole
+        and reach > 20.0
+        and (role in ("volts", "signal") or reach > 400.0)
+    ):
+        return _Guess(
+            Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
         )
     if role == "volts":
-        return Unit("volts", 1.0), [f"'{column.label}' has no unit: taken to be volts"]
+        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
     if role == "length":
-        return Unit("length", 1.0), [f"'{column.label}' has no unit: taken to be metres"]
-    if role == "angular velocity":
-        return Unit("angular velocity", 1.0), [f"'{column.label}' is taken to be in rad/s"]
-    return _angle_unit(table, column)
+        if reach <= 2.0:
+            return _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
+        return _Guess(
+            _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
+        )
+    if role in ("velocity", "acceleration", "signal"):
+        return _Guess(_UNKNOWN, f"({role}) has no unit: analysed in its own", weak=True)
+    return _angle_unit(table, choice, column, time_s)
 
 
-def _angle_unit(table: Table, column: Column) -> tuple[Unit, list[str]]:
-    """Tell degrees from radians: no pendulum swings beyond pi about its centre."""
-    words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
+def _reach(finite: FloatArray) -> float:
+    """How far the readings go from their middle."""
+    if not len(finite):
+        return 0.0
+    low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
+    return max(float(high - middle), float(middle - low))
+
+
+def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
+    """Doubt a header that gives the one unit of angles where the period shows the other."""
+    if written.kind != "angle":
+        return None
+    reach = _reach(column.values[np.isfinite(column.values)])
+    if written.factor == _DEGREE.factor and 0.3 < reach < 3.0:
+        other, name, headed = _RADIAN, "radians", "degrees"
+    elif written.factor == 1.0 and 3.6 < reach < 170.0:
+        other, name, headed = _DEGREE, "degrees", "radians"
+    else:
+        return None
+    slope = follows_sine(time_s, column.values, other.factor)
+    if slope is None or abs(slope - 1.0) > 0.25:
+        return None
+    why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
+    return _Guess(other, why, weak=True)
+
+
+def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess:
+    """Tell degrees from radians by whatever the file gives away."""
     finite = column.values[np.isfinite(column.values)]
     if not len(finite):
-        return Unit("angle", 1.0), []
-    low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
-    reach = max(float(high - middle), float(middle - low))
+        return _Guess(_RADIAN)
+    reach = _reach(finite)
+    words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
+    said = re.search(r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b|_deg|°", words)
+    if said and "rad" not in words.replace("grad", ""):
+        return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
+    by_step = _by_step(finite)
+    if by_step is not None:
+        return by_step
+    by_sibling = _by_sibling(choice, column, time_s)
+    if by_sibling is not None:
+        return by_sibling
+    return _by_size(choice, column, finite, reach, time_s)
+
+
+def _by_size(
+    choice: Choice, column: Column, finite: FloatArray, reach: float, time_s: FloatArray
+) -> _Guess:
+    """Judge by how far it swings, and by whether the period follows the amplitude."""
+    named = choice.roles.get(column.number) == "angle"
     # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
     turns = _jumps_of_a_turn(finite) and float(np.ptp(finite)) < 2.02 * np.pi
-    said = ("deg" in words or "°" in words or "grad" in words) and "rad" not in words
-    if not said and (reach <= 1.1 * np.pi or turns):
-        return Unit("angle", 1.0), [f"'{column.label}' has no unit: taken to be radians"]
-    if reach > 1000:
-        raise InputError(
-            table.place,
-            f"'{column.label}' reaches {reach:.4g} and has no unit",
-            "say it with --unit, or turn counts into an angle first",
-        )
-    why = "its name or header says so" if said else f"it reaches {reach:.3g}"
-    return Unit("angle", np.pi / 180), [f"'{column.label}' is taken to be in degrees ({why})"]
+    if turns:
+        return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
+    if reach > 1.1 * np.pi:
+        slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 180 else None
+        if slope is not None and abs(slope - 1.0) < 0.4:
+            return _Guess(
+                _DEGREE, "is taken to be in degrees (its period grows as such swings' does)"
+            )
+        if reach > 400.0 or not named:
+            if reach <= 180.0:
+                return _Guess(
+                    _DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True
+                )
+            return _Guess(
+                _UNKNOWN, f"has no unit and swings by {reach:.4g}: analysed in its own", True
+            )
+        return _Guess(_DEGREE, f"is taken to be in degrees (it swings by {reach:.3g})")
+    slope = follows_sine(time_s, column.values, 1.0)
+    if slope is not None and abs(slope - 1.0) < 0.35:
+        return _Guess(_RADIAN, "is taken to be in radians (its period grows as such swings' does)")
+    if slope is not None and abs(slope) < 0.35 and reach > 0.35:
+        # No pendulum of so many radians: a torsion pendulum, or another unit.
+        odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
+        level = float(np.median(finite))
+        if named and abs(level - 0.5 * np.pi * np.rint(level / (0.5 * np.pi))) > 0.35:
+            return _Guess(_DEGREE, f"{odd}; it hangs at {level:.3g}: taken to be degrees", True)
+        if named:
+            return _Guess(_RADIAN, f"{odd}: taken to be radians of a torsion pendulum", True)
+        return _Guess(_UNKNOWN, f"{odd}: analysed in its own", weak=True)
+    return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
+
+
+def _by_step(finite: FloatArray) -> _Guess | None:
+    """Read the unit off the step: a part of a turn, or a printed digit of the other unit."""
+    step = resolution(finite)
+    if step is None or _is_round(step):
+        return None
+    in_degrees = step * 180 / np.pi
+    if step < 0.1 and _is_round(in_degrees):
+        return _Guess(_RADIAN, f"is taken to be in radians (its step is {in_degrees:.4g} degrees)")
+    for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
+        parts = turn / step
+        whole = round(parts)
+        near = abs(parts - whole) < 1e-6 * whole + 1e-4
+        if near and 100 <= whole <= 1 << 20 and (whole % 4 == 0 or whole % 50 == 0):
+            return _Guess(unit, f"is taken to be in {name} (its step is a turn over {whole})")
+    return None
+
+
+def _is_round(step: float) -> bool:
+    """Say whether a step is 1, 2, 2.5 or 5 of some decimal place: a printed digit."""
+    leading = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
+    return bool(np.min(np.abs(leading - np.array([1.0, 2.0, 2.5, 5.0, 10.0])) / leading) < 2e-5)
+
+
+def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Compare with the same angle in another unit, or with its derivative in a known one."""
+    for other in choice.channels:
+        unit = unit_of(other.unit) if other.unit else None
+        if other is column or unit is None or len(other.values) != len(column.values):
+            continue
+        if unit.kind == "angle":
+            ratio = _ratio(column.values, other.values)
+            scale = unit.factor * ratio if ratio is not None else None
+        elif unit.name == "rad/s":
+            slope = derivative_slope(time_s, column.values, other.values)
+            scale = unit.factor * abs(slope) if slope is not None else None
+        else:
+            continue
+        for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
+            if scale is not None and abs(scale / guess.factor - 1.0) < 0.25:
+                return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
+    return None
+
+
+def _ratio(one: FloatArray, other: FloatArray) -> float | None:
+    """How many times `one` `other` is, where they are the same motion; ``None`` else."""
+    good = np.isfinite(one) & np.isfinite(other)
+    one, other = one[good], other[good]
+    if len(one) < 8 or max(np.abs(one).max(), np.abs(other).max()) > 1e100:
+        return None
+    one, other = one - one.mean(), other - other.mean()
+    both = float(one @ one) * float(other @ other)
+    product = float(one @ other)
+    if not both > 0.0 or product < 0.99 * np.sqrt(both):
+        return None
+    return product / float(one @ one)
 
 
 def _jumps_of_a_turn(values: FloatArray) -> bool:
@@ -116,7 +276,7 @@ def _jumps_of_a_turn(values: FloatArray) -> bool:
     return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
 
 
-def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
+def _from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Count the angle from where the pendulum hangs: undo wraps, then whole half turns.
 
     A centre within 0.35 rad of a multiple of pi is taken to be where the pendulum hangs:
@@ -140,8 +300,8 @@ def _from_below(values: FloatArray) -> tuple[FloatArray, list[str]]:
                 f"the angle swings about {centre:.3f} rad: {shift:.4f} rad"
                 f" ({turns} {words}) taken off, so that it hangs at 0"
             )
-            return values - shift, notes
-    return values, notes
+            return values - shift, tuple(notes)
+    return values, tuple(notes)
 
 
 def _position(x: Column, y: Column) -> Readings:
@@ -150,17 +310,4 @@ def _position(x: Column, y: Column) -> Readings:
     angle = np.arctan2(x.values, down * y.values)
     sign = "-" if down < 0 else ""
     note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
-    return Readings(angle, "angle_rad", 1.0, (note,))
-
-
-def _integrated(rate: FloatArray, time_s: FloatArray) -> FloatArray:
-    """Integrate an angular velocity (trapezoids), its mean taken out against drift."""
-    timed = np.isfinite(time_s)
-    angle: FloatArray = np.full(len(rate), np.nan)
-    if not np.isfinite(rate[timed]).all():
-        return angle
-    free = rate[timed] - np.mean(rate[timed])
-    steps = 0.5 * (free[1:] + free[:-1]) * np.diff(time_s[timed])
-    angle[timed] = np.concatenate(([0.0], np.cumsum(steps)))
-    angle -= float(np.mean(angle[timed]))
-    return angle
+    return Readings(angle, "angle_rad", 1.0, "rad", (note,))

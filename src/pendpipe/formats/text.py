@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -10,15 +11,25 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
-from pendpipe.formats.cells import all_numbers, column_of_clock_times, column_of_numbers
 from pendpipe.formats.header import Header, read_header
-from pendpipe.formats.layout import Layout, first_row, guess_layout, is_comment
+from pendpipe.formats.layout import (
+    Layout,
+    Numbers,
+    all_numbers,
+    column_of_clock_times,
+    column_of_numbers,
+    first_row,
+    guess_layout,
+    is_comment,
+)
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
 
 _CONTROLS: Final = bytes([*range(1, 9), *range(14, 27)])
 _WIDEST: Final = 64
 """Cells that a row may have, however narrow the others are; else at most four times theirs."""
+_LONGEST_LINE: Final = 1 << 20
+_LONGEST_HEADER: Final = 5000
 
 
 def decode(data: bytes) -> str:
@@ -32,6 +43,10 @@ def decode(data: bytes) -> str:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return _unified(data.decode("utf-16", errors="replace"))
     head = data[:65536]
+    for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        zeros = head[start::2].count(0)
+        if zeros > 0.4 * len(head) and not head[1 - start :: 2].count(0):
+            return _unified(data.decode(encoding, errors="replace"))
     if b"\0" in head or len(head) - len(head.translate(None, _CONTROLS)) > len(head) // 50:
         raise NotThisFormatError("the bytes are no text")
     try:
@@ -51,10 +66,18 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
-    lines = text.split("\n")
+    lines = _without_cassy_limits(text.split("\n"))
+    _refuse_long(place, lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
+    if first > _LONGEST_HEADER:
+        raise InputError(
+            place,
+            f"no row of numbers stands in the first {_LONGEST_HEADER} lines",
+            "give a table with a row a sample",
+        )
     header = read_header(place, lines[:first], layout)
+    lines, cut = _without_cut_row(lines, first, layout)
     found = _at_once(lines, first, layout, header)
     if found is None:
         rows, numbers, notes = _rows(lines, first, layout)
@@ -70,8 +93,66 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         lines=numbers,
         interval_s=header.interval_s,
         metadata=header.metadata,
-        notes=(layout.spoken, *header.notes, *notes),
+        notes=(layout.spoken, *header.notes, *notes, *cut),
     )
+
+
+def _without_cassy_limits(lines: list[str]) -> list[str]:
+    """Make of the header that CASSY Lab writes (MIN=, MAX=, SCALE=, DEC=, DEF=) a line of names."""
+    if not any(line.startswith("DEF=") for line in lines[:50]):
+        return lines
+    head = [
+        line.removeprefix("DEF=").replace('"', "").replace("&", "")
+        if line.startswith("DEF=")
+        else re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line)
+        for line in lines[:50]
+    ]
+    return head + lines[50:]
+
+
+def _refuse_long(place: Path, lines: Sequence[str]) -> None:
+    longest = max(range(len(lines)), key=lambda number: len(lines[number]))
+    if len(lines[longest]) > _LONGEST_LINE:
+        raise InputError(
+            f"{place}, line {longest + 1}",
+            f"the line is {len(lines[longest])} letters long",
+            "give a table with a row a sample",
+        )
+
+
+def _without_cut_row(
+    lines: list[str], first: int, layout: Layout
+) -> tuple[list[str], tuple[str, ...]]:
+    """Leave out a last row that a power cut or a full disk has cut short.
+
+    It has fewer cells than every other row; or no end of line, and its last number has fewer
+    letters, or fewer decimals, than that of every other row.
+    """
+    last = len(lines) - 1
+    while last > first and not lines[last].strip():
+        last -= 1
+    others = [line for line in lines[max(first, last - 500) : last] if line.strip()]
+    if last <= first + 2 or not others or is_comment(lines[last]):
+        return lines, ()
+    final, rows = layout.split(lines[last]), [layout.split(line) for line in others]
+    short = len(final) < min(map(len, rows))
+    ended = last < len(lines) - 1
+    if not short and not ended and len(final) == len(rows[-1]) and layout.is_number(final[-1]):
+        sizes = [_size(row[-1], layout) for row in rows if layout.is_number(row[-1])]
+        letters, decimals = _size(final[-1], layout)
+        short = len(sizes) > 2 and (
+            letters < min(size[0] for size in sizes) or decimals < min(size[1] for size in sizes)
+        )
+    if not short or not any(map(layout.is_number, final)):
+        return lines, ()
+    note = f"line {last + 1} is cut short: not taken for a sample"
+    return lines[:last], (note,)
+
+
+def _size(cell: str, layout: Layout) -> tuple[int, int]:
+    """Letters of a number without its sign, and those behind its decimal sign."""
+    bare = cell.lstrip("+-")
+    return len(bare), len(bare.partition(layout.decimal)[2])
 
 
 def _at_once(
@@ -131,9 +212,9 @@ def _columns(
     columns = []
     for column in range(width):
         texts = [row[column] if column < len(row) else "" for row in cells]
-        values, blank, fault = column_of_numbers(texts, layout)
-        if np.isfinite(values).any():
-            columns.append(_column(header, column, values, blank if blank.any() else None, fault))
+        found = column_of_numbers(texts, layout)
+        if np.isfinite(found.values).any():
+            columns.append(_column(header, column, found.values, found))
             continue
         clock = column_of_clock_times(texts)
         if clock is not None:
@@ -142,19 +223,14 @@ def _columns(
     return columns
 
 
-def _column(
-    header: Header,
-    place: int,
-    values: FloatArray,
-    blank: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None,
-    fault: tuple[int, str] | None = None,
-) -> Column:
+def _column(header: Header, place: int, values: FloatArray, found: Numbers | None = None) -> Column:
     known = place < len(header.names)
+    unit = header.units[place] if known else ""
     return Column(
         name=header.names[place] if known else "",
-        unit=header.units[place] if known else "",
+        unit=unit or (found.unit if found is not None else ""),
         values=np.ascontiguousarray(values),
         number=place + 1,
-        blank=blank,
-        fault=fault,
+        blank=found.blank if found is not None and found.blank.any() else None,
+        fault=found.fault if found is not None else None,
     )

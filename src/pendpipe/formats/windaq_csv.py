@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.formats.cells import column_of_clock_times
-from pendpipe.formats.layout import Layout
+from pendpipe.formats.layout import Layout, column_of_clock_times
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
 from pendpipe.formats.text import decode, table_of_text
-from pendpipe.formats.units import unit_of
+from pendpipe.formats.words import unit_of
 
 _CLOCK_NAMES = ("date", "time stamp", "timestamp", "clock")
 

@@ -94,7 +94,7 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         number=int(number) if number.isdecimal() and 0 < int(number) < 32 else 1,
         slope=slope,
         intercept=intercept,
-        unit=_TAGS[recording.quantity],
+        unit=_TAGS.get(recording.quantity, recording.unit),
         range_volts=recording.number("range_volts") if recording.quantity == "volts" else None,
         annotation=recording.metadata.get("model", "")[:31],
     )

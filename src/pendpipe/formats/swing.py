@@ -1,0 +1,179 @@
+"""What the numbers of a column show by themselves: whether they swing, and how far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+
+_ABSURD: Final = 1e100
+"""Beyond this nothing was measured; squares of it are no numbers."""
+_LOOKED_AT: Final = 1 << 15
+"""Samples of a long column that are transformed: means of neighbours."""
+_CLEAR: Final = 0.25
+"""Share of the variance that lies near one frequency; of white noise it is under 0.05."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How a column moves.
+
+    Parameters
+    ----------
+    amplitude
+        Root mean square of its strongest oscillation, in its own unit.
+    clarity
+        Share of the variance about the trend that lies within 15 % of one frequency.
+    samples_per_cycle
+        Samples in a cycle of that frequency; 0 where nothing oscillates.
+    graded
+        Share of the cycles whose size lies between a tenth and 85 % of the largest:
+        large for a free decay, 0 for a drive that is switched on and off.
+    """
+
+    amplitude: float = 0.0
+    clarity: float = 0.0
+    samples_per_cycle: float = 0.0
+    graded: float = 0.0
+
+    @property
+    def clear(self) -> bool:
+        """Whether there is an oscillation at all."""
+        return self.clarity > _CLEAR
+
+
+def swing_of(values: FloatArray) -> Swing:
+    """Find the strongest oscillation about the trend, from two cycles on."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 8 or np.abs(finite).max() > _ABSURD:
+        return Swing()
+    block = -(-len(finite) // _LOOKED_AT)
+    some = finite[: len(finite) // block * block].reshape(-1, block).mean(axis=1)
+    ramp = np.linspace(-1.0, 1.0, len(some))
+    rest = some - some.mean()
+    rest -= float(rest @ ramp) / float(ramp @ ramp) * ramp
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    power[:2] = 0.0
+    whole = len(some) * float(rest @ rest) / 2.0
+    if not whole > 0.0 or not power.any():
+        return Swing()
+    # The decay broadens the line, so it is looked for in bands, not in single bins.
+    peak = int(np.argmax(power))
+    low, high = int(0.85 * peak), int(1.15 * peak) + 2
+    share = min(1.0, float(power[low:high].sum()) / whole)
+    return Swing(
+        amplitude=float(np.sqrt(share * np.mean(rest**2))),
+        clarity=share,
+        samples_per_cycle=block * len(some) / peak,
+        graded=_graded(rest, len(some) / peak),
+    )
+
+
+def _graded(rest: FloatArray, cycle: float) -> float:
+    """Share of the cycles of middling size."""
+    width = max(2, round(cycle))
+    cycles = rest[: len(rest) // width * width].reshape(-1, width)
+    size = np.ptp(cycles, axis=1)
+    large = float(size.max()) if len(size) else 0.0
+    return float(np.mean((size > 0.1 * large) & (size < 0.85 * large))) if large else 0.0
+
+
+def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the periods and the amplitudes of the larger cycles.
+
+    The level is crossed when the reading has gone from a tenth of the largest amplitude on
+    one side to as much on the other, so noise near the level is no crossing.
+
+    Returns
+    -------
+    periods, amplitudes
+        From each crossing to the next but one, shape (n,); empty where there are few.
+    """
+    good = np.isfinite(values) & np.isfinite(time)
+    time, values = time[good], values[good]
+    none = np.empty(0)
+    if len(values) < 8 or np.abs(values).max() > _ABSURD:
+        return none, none
+    low, middle, high = np.percentile(values, (0.5, 50, 99.5))
+    rest = values - middle
+    reach = 0.1 * max(float(high - middle), float(middle - low))
+    outside = np.flatnonzero(np.abs(rest) > reach)
+    if not reach > 0.0 or len(outside) < 8:
+        return none, none
+    turns = np.flatnonzero(np.diff(np.signbit(rest[outside]).astype(np.int8)))
+    before, after = outside[turns], outside[turns + 1]
+    part = rest[before] / (rest[before] - rest[after])
+    crossings = time[before] + part * (time[after] - time[before])
+    if len(crossings) < 5:
+        return none, none
+    edges = before[:-2], before[2:]
+    largest = np.array([np.ptp(rest[a : b + 1]) for a, b in zip(*edges, strict=True)])
+    lasted = crossings[2:] - crossings[:-2]
+    usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
+    return lasted[usual], 0.5 * largest[usual]
+
+
+def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float | None:
+    """How nearly the period grows with the amplitude as a pendulum's does.
+
+    A pendulum's period is that of small swings over the arithmetic-geometric mean of 1 and
+    cos(A/2); a reading is so many `radians` to its unit. The answer is the slope of the
+    logarithm of the measured period against that of the predicted: 1 if it is so, 0 if the
+    period is constant.
+
+    Returns
+    -------
+    slope
+        ``None`` where noise, or too small an amplitude, leaves it open.
+    """
+    lasted, size = periods(time, values)
+    keep = size > 0.3 * size.max(initial=0.0)
+    lasted, angle = lasted[keep], radians * size[keep]
+    if len(lasted) < 8 or angle.max() > 3.0:
+        return None
+    expected = -np.log(_mean_of_gauss(np.cos(0.5 * angle)))
+    found = np.log(lasted)
+    for _ in range(2):
+        across = expected - expected.mean()
+        spread = float(across @ across)
+        if not spread > 0.0 or len(found) < 8:
+            return None
+        slope = float(across @ found) / spread
+        rest = found - found.mean() - slope * across
+        sd = float(np.sqrt(rest @ rest / (len(rest) - 2) / spread))
+        near = np.abs(rest) <= 4.0 * np.median(np.abs(rest))
+        expected, found = expected[near], found[near]
+    return slope if sd < 0.15 else None
+
+
+def _mean_of_gauss(other: FloatArray) -> FloatArray:
+    """Arithmetic-geometric mean of 1 and `other`."""
+    one = np.ones_like(other)
+    for _ in range(6):
+        one, other = 0.5 * (one + other), np.sqrt(one * other)
+    return one
+
+
+def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) -> float | None:
+    """Ratio of `other` to the time derivative of `values`; ``None`` if it is not that.
+
+    Where 1, both are in the same unit; where pi/180, the one is in degrees and the
+    other in radians a second.
+    """
+    good = np.isfinite(time) & np.isfinite(values) & np.isfinite(other)
+    time, values, other = time[good], values[good], other[good]
+    if len(time) < 16 or np.any(np.diff(time) <= 0) or np.abs(values).max() > _ABSURD:
+        return None
+    rate = np.gradient(values, time)
+    # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.
+    kernel = np.array([0.25, 0.5, 0.25])
+    rate, other = np.convolve(rate, kernel, "valid"), np.convolve(other, kernel, "valid")
+    rate, other = rate - rate.mean(), other - other.mean()
+    both = float(rate @ rate) * float(other @ other)
+    if not 0.0 < both < _ABSURD:
+        return None
+    product = float(rate @ other)
+    return product / float(rate @ rate) if abs(product) > 0.8 * np.sqrt(both) else None
