@@ -12,6 +12,7 @@ import math
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,9 @@ OMEGA = 2.0 * math.pi * 0.516
 MODEL = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
 START = Release(0.0, 0.068)
 END_S = 300.0
+SINE = Eq8(OMEGA, 0.02, 0.00596, 0.00596, 1.4e-6, restoring="sine")
+RELEASES_RAD = (0.3, 1.0, 2.0, 2.9)
+"""Of the pendulum with sin x, whose quadratic loss is less: it would not last 300 s."""
 SAMPLES = np.linspace(0.0, END_S, 32768)
 FIRST_CALL = """
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -59,6 +63,11 @@ def _speeds(rounds: int) -> list[Row]:
             lambda: sample_with_jacobian(MODEL, START, SAMPLES, hysteretic_share=0.5), 20,
         ),
     }  # fmt: skip
+    for y in RELEASES_RAD:
+        from_y = (SINE, Release(0.0, y), SAMPLES)
+        ours[f"sine samples {y}"] = (partial(sample, *from_y), 10)
+        jacobian = partial(sample_with_jacobian, *from_y, hysteretic_share=0.5)
+        ours[f"sine {y}"] = (jacobian, 10)
     contenders = dict(ours)
     if importlib.util.find_spec("heyoka"):
         contenders["heyoka"] = (peers.heyoka_turning_points(MODEL, START.angle_rad, END_S), 4)
@@ -74,6 +83,14 @@ def _speeds(rounds: int) -> list[Row]:
         at_least("turning points, map over `solve_ivp` DOP853", t["solve_ivp"] / t["map"], 1e4),
         at_most("32768 samples over one `np.cos` of them", t["samples"] / t["cos"], 0.5),
         at_most("samples and 7-column Jacobian over one `np.cos`", t["jacobian"] / t["cos"], 3.0),
+        *(
+            at_most(
+                f"{what} with sin x from {', '.join(map(str, RELEASES_RAD))} rad",
+                [t[f"{key}{y}"] / t["cos"] for y in RELEASES_RAD],
+                3.0,
+            )
+            for what, key in (("samples", "sine samples "), ("samples and Jacobian", "sine "))
+        ),
     ]
     if "heyoka" in t:
         found += [
@@ -98,10 +115,30 @@ def _accuracies() -> list[Row]:
     error = float(np.max(np.abs(by_map - by_clock) / envelope))
     found.append(at_most("error of the samples (map less clock) over the envelope", error, 1e-9))
     path = ROOT / "tests" / "dynamics" / "reference.py"
+    if path.exists() and importlib.util.find_spec("heyoka") and importlib.util.find_spec("pytest"):
+        reference = _reference(path)
+        times = np.linspace(0.0, END_S, 3000)
+        errors = [
+            float(
+                np.max(
+                    np.abs(
+                        sample(SINE, Release(0.0, y), times)
+                        - reference.heyoka_samples(SINE, y, times)
+                    )
+                )
+                / y
+            )
+            for y in RELEASES_RAD
+        ]
+        found.append(
+            at_most(
+                "error of the samples with sin x against heyoka, over the release", errors, 1e-9
+            )
+        )
     if path.exists() and importlib.util.find_spec("mpmath") and importlib.util.find_spec("pytest"):
         times, angles = _forty_digits(path, points.time_s.size)
         for method in ("map", "clock"):
-            own = turning_points(MODEL, START, until_s=END_S, method=method)  # type: ignore[arg-type]
+            own = turning_points(MODEL, START, until_s=END_S, method=method)
             amplitude = float(np.max(np.abs(own.angle_rad / angles - 1.0)))
             phase = OMEGA * float(np.max(np.abs(own.time_s - times)))
             found.append(
@@ -111,14 +148,20 @@ def _accuracies() -> list[Row]:
     return found
 
 
-def _forty_digits(path: Path, count: int) -> tuple[Any, Any]:
-    """Return the turning points to 40 digits, rounded."""
+def _reference(path: Path) -> Any:
+    """Return the module of the tests that integrates by slow and trusted ways."""
     specification = importlib.util.spec_from_file_location("pendpipe_reference", path)
     assert specification is not None
     assert specification.loader is not None
     reference = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = reference
     specification.loader.exec_module(reference)
+    return reference
+
+
+def _forty_digits(path: Path, count: int) -> tuple[Any, Any]:
+    """Return the turning points to 40 digits, rounded."""
+    reference = _reference(path)
     with reference.mp.workdps(reference.DIGITS):
         times, angles = reference.MpmathPendulum.of(MODEL).turning_points(START.angle_rad, count)
     return np.array([float(t) for t in times]), np.array([float(x) for x in angles])

@@ -80,7 +80,7 @@ class Eq8:
     >>> from pendpipe.dynamics import Eq8, Release, turning_points
     >>> pendulum = Eq8(6.28, viscous=1e-6, restoring="sine")
     >>> points = turning_points(pendulum, Release(0.0, 2.0), count=3)
-    >>> round(6.283185 / 6.28 / points.time_s[2], 4)
+    >>> round(float(6.283185 / 6.28 / points.time_s[2]), 4)
     0.7525
     """
 
