@@ -10,7 +10,7 @@ need no constant of the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -243,24 +243,40 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     return column
 
 
-def write_plain(path: str | Path, recording: Recording) -> None:
-    """Write the plain CSV form: metadata lines, header, a row a sample, all digits."""
+def plain_lines(recording: Recording) -> Iterator[str]:
+    """Give the lines of the plain CSV form: metadata, header, a row a sample, all digits."""
     columns = ["time_s", recording.quantity]
     rows = [map(repr, recording.time_s.tolist()), map(repr, recording.values.tolist())]
     if recording.quality is not None:
         columns.append("quality")
         rows.append(map(str, recording.quality.tolist()))
+    for key, value in recording.metadata.items():
+        yield f"# {key}: {' '.join(str(value).split())}\n"
+    for number, guess in enumerate(recording.weak_guesses, start=1):
+        yield f"# {_WEAK}{number}: {' '.join(guess.split())}\n"
+    yield ",".join(columns) + "\n"
+    for row in zip(*rows, strict=True):
+        yield ",".join(row) + "\n"
+
+
+def write_plain(path: str | Path, recording: Recording) -> None:
+    """Write the plain CSV form: metadata lines, header, a row a sample, all digits."""
     with replaced(path) as stream:
-        for key, value in recording.metadata.items():
-            stream.write(f"# {key}: {' '.join(str(value).split())}\n")
-        for number, guess in enumerate(recording.weak_guesses, start=1):
-            stream.write(f"# {_WEAK}{number}: {' '.join(guess.split())}\n")
-        stream.write(",".join(columns) + "\n")
-        stream.writelines(",".join(row) + "\n" for row in zip(*rows, strict=True))
+        stream.writelines(plain_lines(recording))
 
 
-def read_plain(path: str | Path) -> Recording:
-    """Read the plain CSV form; a last row without its line end may be cut and is no sample.
+def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
+    """Read the plain CSV form.
+
+    Whoever writes it ends every row with a line end: a last row without one was cut short,
+    and is no sample, for half a number is a number too.
+
+    Parameters
+    ----------
+    path
+        The file, for messages too.
+    data
+        Its content, where somebody has read it already.
 
     Raises
     ------
@@ -270,7 +286,7 @@ def read_plain(path: str | Path) -> Recording:
     """
     place = Path(path)
     try:
-        text = place.read_text(encoding="utf-8-sig")
+        text = (place.read_bytes() if data is None else data).decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(place, "there is no such file", "check the path") from None
     except UnicodeDecodeError:
@@ -294,8 +310,8 @@ def read_plain(path: str | Path) -> Recording:
         quantity=quantity,
         quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
-        weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
         notes=notes,
+        weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
     )
     check(place, recording, first_line=first + 2)
     return replace(recording, resolution=converter_step(recording, place))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import Any
 
 from pendpipe.commands import _reading
@@ -16,22 +15,20 @@ def read_motion(arguments: argparse.Namespace) -> tuple[Recording, dict[str, Any
     Returns
     -------
     recording
-        In rad or m.
+        In rad, or in its own unit where no constant makes it an angle.
     provenance
         ``input_sha256``, ``version``, ``volts_per_radian`` (None where none was used).
     """
-    from pendpipe.files import sha256
     from pendpipe.formats import read
     from pendpipe.version import __version__
 
     recording = read(arguments.file, _reading.options(arguments))
-    for note in recording.notes:
-        print(f"{arguments.file}: {note}", file=sys.stderr)
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
     recording = recording.as_motion(constant, arguments.file)
+    _reading.announce(arguments, recording)
     return recording, {
-        "input_sha256": sha256(arguments.file),
+        "input_sha256": _reading.digest(arguments),
         "version": __version__,
         "volts_per_radian": recording.number("volts_per_radian") if was_volts else None,
     }

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pendpipe.formats import ReadOptions
+    from pendpipe.recording import Recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare FILE and the overrides of a reader's guesses."""
-    parser.add_argument("file", metavar="FILE", help="a recording in any supported format")
+    parser.add_argument(
+        "file", metavar="FILE", help="a recording in any supported format; - is standard input"
+    )
     group = parser.add_argument_group("where a guess is wrong")
     group.add_argument("--channel", metavar="CHANNEL", help="number (from 1) or name, see inspect")
     group.add_argument(
@@ -19,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COLUMN",
         help="number (from 1) or name; X,Y for a position; TIME:COLUMN",
     )
-    group.add_argument("--unit", metavar="UNIT", help="rad, deg, V, mV, m, mm, ...; or ms:deg")
+    group.add_argument("--unit", metavar="UNIT", help="rad, deg, V, mm, counts, ...; or ms:deg")
     group.add_argument("--sample-rate", metavar="HZ", type=float, help="samples a second")
     group.add_argument("--decimal", metavar="SIGN", help="decimal sign, '.' or ','")
     group.add_argument("--delimiter", metavar="SIGN", help="sign between cells, or tab, space")
@@ -45,3 +49,21 @@ def options(arguments: argparse.Namespace) -> ReadOptions:
         start_s=arguments.start,
         stop_s=arguments.stop,
     )
+
+
+def announce(arguments: argparse.Namespace, recording: Recording) -> None:
+    """Print what was guessed, the weak guesses first, to stderr."""
+    for guess in recording.weak_guesses:
+        print(f"{arguments.file}: a guess: {guess}", file=sys.stderr)
+    for note in recording.notes:
+        print(f"{arguments.file}: {note}", file=sys.stderr)
+
+
+def digest(arguments: argparse.Namespace) -> str:
+    """SHA-256 of FILE, or of what came through standard input."""
+    import hashlib
+    from pathlib import Path
+
+    from pendpipe.formats.reading import file_bytes
+
+    return hashlib.sha256(file_bytes(Path(arguments.file))).hexdigest()

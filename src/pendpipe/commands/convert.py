@@ -13,7 +13,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe convert``."""
     _reading.add_arguments(parser)
     parser.add_argument(
-        "out", metavar="OUT", type=Path, help="OUT.csv: the plain form; OUT.wdh: WinDaq HiRes"
+        "out",
+        metavar="OUT",
+        type=Path,
+        help="OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
     )
 
 
@@ -21,11 +24,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
     from pendpipe.formats.writing import check_name, write
+    from pendpipe.recording import plain_lines
 
-    check_name(arguments.out)
+    piped = str(arguments.out) == "-"
+    if not piped:
+        check_name(arguments.out)
     recording = read(arguments.file, _reading.options(arguments))
-    for note in recording.notes:
-        print(f"{arguments.file}: {note}", file=sys.stderr)
+    _reading.announce(arguments, recording)
+    if piped:
+        sys.stdout.writelines(plain_lines(recording))
+        return 0
     for note in write(arguments.out, recording):
         print(f"{arguments.out}: {note}", file=sys.stderr)
     print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")

@@ -33,12 +33,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(file: str, found: Inspection) -> Iterator[str]:
-    """Say it in words, a fact a line."""
+    """Print it in words, a fact a line; what is uncertain first."""
+    for guess in found.weak_guesses:
+        yield f"a guess: {guess}"
     yield file
     yield f"  format      {found.format}"
     for number, (name, unit) in enumerate(found.channels, start=1):
         yield f"  channel {number:<3} {name}" + (f" [{unit}]" if unit else "")
     even = "evenly spaced" if found.uniform else "not evenly spaced (median interval)"
+    if found.chosen:
+        yield f"  read        {found.chosen}, in {found.unit or 'no known unit'}"
+        yield f"  hangs at    {found.level:.6g} {found.unit}".rstrip()
     yield f"  samples     {found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"
     yield f"  span        {found.duration_s:.6g} s"
     step = "none found" if found.resolution is None else f"{found.resolution:.6g} {found.unit}"

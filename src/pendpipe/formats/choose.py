@@ -202,10 +202,10 @@ def _time(
     wanted = options.reading_column or options.channel
     if wanted is not None and len(runs) > 1:
         # Runs side by side, each with its own time: the one before the reading is meant.
-        named = [c for c in table.columns if wanted.lower() in (c.name.lower(), str(c.number))]
+        meant = [c for c in table.columns if wanted.lower() in (c.name.lower(), str(c.number))]
         if options.channel is not None and wanted.isdigit():
-            named = []
-        before = [column for column in runs if named and column.number < named[0].number]
+            meant = []
+        before = [column for column in runs if meant and column.number < meant[0].number]
         if before:
             return before[-1], False
     taken = (options.reading_column or "").lower()
@@ -316,7 +316,10 @@ def _of_equals(
     if len(equals) == 1 or len(first) > 1:
         return first, ""
     # A drive has one size from beginning to end; a free decay has all of them.
-    graded = [c for c in equals if swings[c[0].number].graded > 0.3]
+    decaying = [swings[c[0].number] for c in equals]
+    graded = [
+        c for c, swing in zip(equals, decaying, strict=True) if swing.clear and swing.graded > 0.3
+    ]
     if graded and swings[first[0].number].graded < 0.1 and swings[first[0].number].clear:
         return graded[0], ", whose swing decays"
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}

@@ -46,7 +46,7 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
             f"one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
             "name the reading's column, or choose it with --column and --unit",
         )
-    recording = read_plain(place)
+    recording = read_plain(place, data)
     step = recording.resolution
     if step is None:
         from pendpipe.formats.examine import resolution

@@ -64,9 +64,11 @@ def swing_of(values: FloatArray) -> Swing:
     peak = int(np.argmax(power))
     low, high = int(0.85 * peak), int(1.15 * peak) + 2
     share = min(1.0, float(power[low:high].sum()) / whole)
+    # Of a few samples a band is a good part of all there is.
+    chance = min(1.0, 3.0 * (high - low) / len(power))
     return Swing(
         amplitude=float(np.sqrt(share * np.mean(rest**2))),
-        clarity=share,
+        clarity=share if share > chance else 0.0,
         samples_per_cycle=block * len(some) / peak,
         graded=_graded(rest, len(some) / peak),
     )

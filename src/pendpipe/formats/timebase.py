@@ -58,7 +58,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.arange(len(reading.values))
     if options.sample_rate is not None:
-        time: FloatArray = every / options.sample_rate
+        time: FloatArray = every.astype(np.float64) / options.sample_rate
         note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
         return TimeBase(time, every, [note])
     if reading.time_s is not None:
@@ -69,7 +69,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     if table.interval_s is not None:
         note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
         if column is None:
-            return TimeBase(every * table.interval_s, every, [note])
+            return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
         _refuse_holes(table, column, np.ones(len(every), dtype=bool))
         time = (column.values - column.values[0]) * table.interval_s
         base = TimeBase(time, every, [f"{note} and '{column.label}'"])
