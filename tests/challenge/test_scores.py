@@ -223,3 +223,36 @@ def test_a_case_s_figure_says_whether_it_is_of_the_answer_that_was_scored(tmp_pa
     assert [case["same_answer"] for case in cases] == [True, False, None]
     assert [case["figure"] for case in cases] == ["case-1.svg", "case-2.svg", None]
     assert (tmp_path / "to" / "case-2.svg").read_text() == "<svg/>"
+
+
+def test_items_of_one_recording_count_as_little_as_they_tell() -> None:
+    """Where each recording answers alike throughout, there are as many items as recordings."""
+    sources = [f"{k}.csv" for k in range(7) for _ in range(20)]
+    alike = [k < 4 for k in range(7) for _ in range(20)]
+    low, high = intervals.of_clusters(alike, sources)["interval95"]
+    assert low < intervals.rate(4, 7)["interval95"][0] + 0.02
+    assert high > intervals.rate(4, 7)["interval95"][1] - 0.02
+    all_found = intervals.of_clusters([True] * 140, sources)
+    assert all_found["interval95"] == intervals.rate(7, 7)["interval95"]
+    assert (all_found["hits"], all_found["of"], all_found["clusters"]) == (140, 140, 7)
+    mixed = [i % 2 == 0 for i in range(140)]
+    assert intervals.of_clusters(mixed, sources)["interval95"] == pytest.approx(
+        intervals.rate(70, 140)["interval95"]
+    )
+    assert intervals.of_clusters([True] * 20, sources[:20])["interval95"] == [0.0, 1.0]
+
+
+def test_intervals_by_clusters_cover_what_they_promise() -> None:
+    """Of rates that differ between recordings, 95 % of the intervals hold the mean at least."""
+    random = np.random.default_rng(5)
+    sources = np.repeat(list("abcdefg"), 10).tolist()
+    held, plain = [], []
+    for _ in range(400):
+        each = random.beta(2.0, 2.0, 7)
+        found = (random.random((7, 10)) < each[:, None]).ravel().tolist()
+        low, high = intervals.of_clusters(found, sources)["interval95"]
+        held.append(low <= 0.5 <= high)
+        low, high = intervals.of(found)["interval95"]
+        plain.append(low <= 0.5 <= high)
+    assert np.mean(held) > 0.92
+    assert np.mean(plain) < 0.9

@@ -154,6 +154,7 @@ def test_a_set_opens_once_and_every_hash_is_checked(solved: Places) -> None:
     answer.write_text(said)
     opened = json.loads(open_set(solved).read_text())
     assert opened["seed"] == 7
+    assert opened["answered_by"] == sets.code_of_the_solver()
     assert set(opened["items"]) == {"item-0001", "item-0002", "item-0003"}
     with pytest.raises(InputError, match="opened before"):
         open_set(solved)

@@ -26,6 +26,41 @@ def of(truths: Sequence[bool]) -> dict[str, Any]:
     return rate(int(sum(truths)), len(truths))
 
 
+def of_clusters(truths: Sequence[bool], clusters: Sequence[str]) -> dict[str, Any]:
+    """The rate of a list of yes and no whose members of one cluster depend on each other.
+
+    Korn and Graubard (Survey Methodology 24, 193, 1998): Clopper and Pearson's interval for so
+    many independent items as would have the variance that is seen between k clusters,
+    n' = p (1 - p)/V [t(n - 1)/t(k - 1)]^2, and at most n. Where all are yes or all are no,
+    nothing is seen of that variance, and each cluster counts once.
+
+    Returns
+    -------
+    dict
+        As `rate`, and ``clusters``.
+    """
+    from scipy.stats import beta, t
+
+    found, count = of(truths), len(truths)
+    names, at = np.unique(np.asarray(clusters, dtype=object), return_inverse=True)
+    number = len(names)
+    if number < 2:
+        # One cluster shows nothing of how clusters differ.
+        return {**found, "interval95": [0.0, 1.0] if count else [None, None], "clusters": number}
+    p = found["rate"]
+    excess = np.bincount(at, weights=np.asarray(truths, np.float64) - p)
+    variance = number / (number - 1) * float(excess @ excess) / count**2
+    worth = float(number)
+    if 0.0 < p < 1.0:
+        worth = p * (1.0 - p) / variance if variance > 0.0 else np.inf
+        worth *= float(t.ppf(0.975, count - 1) / t.ppf(0.975, number - 1)) ** 2
+    worth = min(worth, count)
+    hits = p * worth
+    low = 0.0 if p == 0.0 else float(beta.ppf(0.025, hits, worth - hits + 1))
+    high = 1.0 if p == 1.0 else float(beta.ppf(0.975, hits + 1, worth - hits))
+    return {**found, "interval95": [low, high], "clusters": number}
+
+
 def ratio(
     above: Sequence[float], below: Sequence[float], *, paired: bool = False, draws: int = 500
 ) -> dict[str, Any]:

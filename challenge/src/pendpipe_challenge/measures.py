@@ -265,14 +265,19 @@ def _oracle_in_class(items: list[Solved]) -> dict[str, Any]:
 
 
 def real(items: list[Solved]) -> dict[str, Any]:
-    """Real recordings: the change is named, and its twin's answer does not name it."""
+    """Real recordings: the change is named, and its twin's answer does not name it.
+
+    Items of one recording share its apparatus and its flaws: the intervals are those of
+    recordings drawn anew, not of items.
+    """
+    sources = [i.truth["source"] for i in items]
     changed = [any(right(n, i.effect) for n in i.answer.names) for i in items]
     before = [i.twin is not None and any(right(n, i.effect) for n in i.twin.names) for i in items]
     pairs = list(zip(changed, before, strict=True))
     return {
-        "named": intervals.of(changed),
-        "named_without_it": intervals.of(before),
-        "newly_named": intervals.of([c and not b for c, b in pairs]),
+        "named": intervals.of_clusters(changed, sources),
+        "named_without_it": intervals.of_clusters(before, sources),
+        "newly_named": intervals.of_clusters([c and not b for c, b in pairs], sources),
         "by_change": {
             i.name: {
                 "effect": i.effect["effect"],

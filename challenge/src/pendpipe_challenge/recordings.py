@@ -120,7 +120,8 @@ def make_real(folder: Path, number: int, random: np.random.Generator) -> RealIte
     if not there:
         raise InputError(folder, "none of the real recordings is there", "leave the family out")
     path, start = there[number % len(there)]
-    effect = CHANGES[(number + number // len(there)) % len(CHANGES)]
+    # Each round over the recordings begins one change later, so that all meet all.
+    effect = CHANGES[(number % len(there) + number // len(there)) % len(CHANGES)]
     time, angle, quantity = _even(path, start)
     noise = _roughness(angle)
     changed, parameters = _conceal(effect, time, angle, noise, random)

@@ -40,6 +40,7 @@ from pendpipe_challenge.measures import (
     withheld,
 )
 from pendpipe_challenge.peers import peers
+from pendpipe_challenge.sets import UNRECORDED
 
 
 def promises(scores: Score) -> list[dict[str, Any]]:
@@ -330,6 +331,7 @@ SEALS: Final = (
     "count",
     "sealed_at",
     "answered_at",
+    "answered_by",
     "opened_at",
     "seed",
     "truth_sha256",
@@ -359,7 +361,7 @@ def score(opened: dict[str, Any], interval_s: Mapping[str, float] | None = None)
     nulls, singles = family("null"), family("single")
     named = [item for item in family("single", "tie") if item.answer.detected]
     found = {
-        "set": {key: opened[key] for key in SEALS},
+        "set": {key: {"answered_by": UNRECORDED, **opened}[key] for key in SEALS},
         "items": len(items),
         "families": dict(Counter(item.truth["family"] for item in items)),
         "unsolved": [item.name for item in items if not item.answer.solved],

@@ -28,9 +28,11 @@ from typing import Any, Final
 
 import numpy as np
 
+import pendpipe
 from pendpipe.errors import InputError
 from pendpipe.files import finite, read_json, replaced, write_json
 from pendpipe.process import ONE_THREAD
+from pendpipe.version import __version__
 from pendpipe_challenge.items import make_item, plan
 from pendpipe_challenge.recordings import available, make_real, recording_text
 
@@ -291,6 +293,8 @@ PASSED_ON: Final = (
     "VIRTUAL_ENV",
 )
 """Of the environment; nothing else of ours reaches the solver."""
+UNRECORDED: Final = "not recorded"
+"""The commit of answers that were given before it was kept."""
 
 
 def solve_set(
@@ -355,8 +359,20 @@ def _solve_one(folder: Path, name: str, baseline: str, solver: Sequence[str]) ->
             "stderr": errors if status else "",
             "diagnosis": diagnosis,
             "solved_at": now(),
+            "solved_by": code_of_the_solver(),
         },
     )
+
+
+def code_of_the_solver() -> str:
+    """The commit of the clone that answers, ``-dirty`` where files differ; or the version."""
+    words = ("git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*")
+    folder = Path(pendpipe.__file__).parent
+    try:
+        found = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return f"pendpipe {__version__}, no commit known"
+    return found.stdout.strip()
 
 
 @contextmanager
@@ -402,6 +418,9 @@ def _hash_answers(folder: Path, names: list[str]) -> None:
         path,
         {
             "answered_at": now(),
+            "answered_by": ", ".join(
+                sorted({a.get("solved_by", UNRECORDED) for a in answers.values()})
+            ),
             "answers_sha256": salted(answers, ""),
             "answers": {name: salted(answer, "") for name, answer in answers.items()},
         },
@@ -450,6 +469,7 @@ def open_set(places: Places) -> Path:
             "salt": salt,
             "sealed_at": manifest["sealed_at"],
             "answered_at": seals["answered_at"],
+            "answered_by": seals["answered_by"],
             "opened_at": now(),
             "truth_sha256": manifest["truth_sha256"],
             "answers_sha256": seals["answers_sha256"],
