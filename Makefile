@@ -52,5 +52,8 @@ check: .venv/installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]" --editable ./challenge
 	touch $@
 
+# Raw files of an instrument (results/RECORD/raw) can't be made again: they stay.
 clean:
-	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis results/*/ results/*.json results/*.html
+	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find results -mindepth 1 ! -type d ! -path 'results/*/raw/*' ! -path results/README.md -delete
+	find results -mindepth 1 -type d -empty -delete

@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.acquisition`` prints the tables and writes them into
 ``docs/acquisition.md`` (``make evidence`` does). A part may be named: ``faults``, ``slips``,
-``clock``, ``kill``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``; parts not run keep
-their tables.
+``clock``, ``live``, ``kill``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``; parts not
+run keep their tables.
 Kills and fuzzing go on where they were broken off, as long as the code is the same.
 """
 
@@ -16,6 +16,7 @@ from pathlib import Path
 
 from benchmarks.acquisition_crash import disk_table, kill_table, plug_table
 from benchmarks.acquisition_faults import clock_table, fault_table
+from benchmarks.acquisition_live import live_table
 from benchmarks.acquisition_slips import slip_table
 from benchmarks.acquisition_speed import speed_table
 from benchmarks.acquisition_windaq import windaq_table
@@ -26,6 +27,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "faults": fault_table,
     "slips": slip_table,
     "clock": clock_table,
+    "live": live_table,
     "kill": kill_table,
     "disk": disk_table,
     "plug": plug_table,

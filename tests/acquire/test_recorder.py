@@ -171,7 +171,7 @@ def test_a_killed_recorder_leaves_a_recording_that_opens(
         assert raw.stat().st_size - kept.damaged_bytes >= size - 5000
         recording = read_plain(out)
         assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
-    with pytest.raises(InputError, match="it holds a recording that was cut short"):
+    with pytest.raises(InputError, match="no raw recording is overwritten"):
         acquire_simulated("di2108", slow, rate_hz=60.0, duration_s=1.0, raw_path=raw)
 
 

@@ -105,9 +105,9 @@ def test_the_recorders_clock_may_be_one_of_its_own() -> None:
 
 
 def test_every_channel_gets_its_own_signal(tmp_path: Path) -> None:
-    raw = tmp_path / "run" / "three.raw"
     signals = {number: (lambda t, v=number: np.full(len(t), float(v))) for number in (1, 2, 4)}
     for kind in ("di154", "di2108"):
+        raw = tmp_path / "run" / f"{kind}.raw"
         acquire_simulated(
             kind, signals, channels=(4, 1, 2), rate_hz=50.0, duration_s=20.0, raw_path=raw
         )

@@ -2,7 +2,10 @@ rule acquire:
     input:
         lambda wildcards: jobs.source_files(CAMPAIGN, wildcards.record),
     output:
-        f"{RESULTS}/{{record}}/recording.csv",
+        # Not deleted before the job, nor after its failure. An instrument's raw files, in the
+        # folder beside it, are no output at all: the job decodes what they keep, and records
+        # only where there is nothing.
+        update(f"{RESULTS}/{{record}}/recording.csv"),
     log:
         f"{RESULTS}/{{record}}/logs/acquire.log",
     conda:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.drivers.base import Loss
-from pendpipe.acquire.raw import RawRecording, read_raw
+from pendpipe.acquire.raw import COMPLETE, NothingRecordedError, RawRecording, read_raw
 from pendpipe.acquire.raw_checks import check_description
 from pendpipe.acquire.segments import Segment, cut, offsets_s, split
 from pendpipe.acquire.timebase import TimeBase, measure_rate
@@ -59,7 +59,9 @@ def decode_recording(
     if kept is not None and len(segments) == 1:
         segments = [cut(segments[0], int(kept))]
     if not segments:
-        raise InputError(place, "no scan was recorded", "check the device, and record again")
+        raise NothingRecordedError(
+            place, "no scan was recorded", "check the device, and record again"
+        )
     longest = max(segments, key=lambda segment: len(segment.arrival_s))
     time_base = measure_rate(
         longest.arrival_s,
@@ -221,10 +223,13 @@ def _notes(
             f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock"
         )
     stopped = raw.event("stopped")
+    extent = f"{time_s[-1]:.6g} s"
+    if isinstance(asked_s := raw.header.get("duration_s"), int | float):
+        extent += f" of {asked_s:g} s"
     if not stopped:
-        notes.append("the recording was cut short: what had arrived is kept")
-    elif stopped.get("reason") not in ("scans", "time", "noise"):
-        notes.append(f"ended early: {stopped.get('reason')}")
+        notes.append(f"the recording was cut short: the {extent} that had arrived are kept")
+    elif stopped.get("reason") not in COMPLETE:
+        notes.append(f"ended early: {stopped.get('reason')} ({extent} kept)")
     if raw.damaged_bytes:
         notes.append(f"{raw.damaged_bytes} bytes at the end of the raw file are no whole frame")
     return tuple(notes)

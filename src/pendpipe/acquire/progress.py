@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from contextlib import suppress
 from typing import TextIO
 
 import numpy as np
@@ -56,8 +57,7 @@ class ProgressLine:
             self._recent.popleft()
         if time.monotonic() - self._shown > _REFRESH_S:
             self._shown = time.monotonic()
-            self._stream.write(f"\r{self.text(elapsed_s)}\x1b[K")
-            self._stream.flush()
+            self._write(f"\r{self.text(elapsed_s)}\x1b[K")
 
     def text(self, elapsed_s: float) -> str:
         """The line without its control characters."""
@@ -73,7 +73,12 @@ class ProgressLine:
         )
 
     def end(self) -> None:
-        """Take leave."""
+        """Close the line."""
         if self._shown:
-            self._stream.write("\n")
+            self._write("\n")
+
+    def _write(self, text: str) -> None:
+        """Show it, unless the terminal has gone: that must not end a recording."""
+        with suppress(OSError):
+            self._stream.write(text)
             self._stream.flush()

@@ -29,7 +29,16 @@ from pendpipe.errors import InputError
 _FRAME: Final = struct.Struct("<cIdI")
 _CHECKED: Final = struct.Struct("<cId")
 _FORMAT: Final = "pendpipe-raw"
+_BEGINNING: Final = b'{"format": "pendpipe-raw"'
 _LONGEST_HEADER: Final = 1 << 16
+
+
+COMPLETE: Final = ("scans", "time", "noise")
+"""Reasons for which a recording ends when it has what was asked for."""
+
+
+class NothingRecordedError(InputError):
+    """The raw file is sound so far, but holds no scan."""
 
 
 class RawWriter:
@@ -75,8 +84,7 @@ class RawWriter:
         self._synced = time.monotonic()
 
     def _frame(self, kind: bytes, time_s: float, content: bytes) -> None:
-        check = zlib.crc32(content, zlib.crc32(_CHECKED.pack(kind, len(content), time_s)))
-        self._write(_FRAME.pack(kind, len(content), time_s, check) + content)
+        self._write(_packed(kind, time_s, content))
         if time.monotonic() - self._synced > self._sync_s:
             self.sync()
 
@@ -85,6 +93,45 @@ class RawWriter:
         left = memoryview(content)
         while left:
             left = left[self._stream.write(left) :]
+
+
+def _packed(kind: bytes, time_s: float, content: bytes) -> bytes:
+    """Make a frame."""
+    check = zlib.crc32(content, zlib.crc32(_CHECKED.pack(kind, len(content), time_s)))
+    return _FRAME.pack(kind, len(content), time_s, check) + content
+
+
+def append_event(path: Path, **event: Any) -> None:
+    """Note in a finished raw file what happened to it later: all of it, or nothing."""
+    frame = _packed(b"E", 0.0, json.dumps(event).encode("ascii"))
+    with path.open("r+b", buffering=0) as stream:
+        end = stream.seek(0, os.SEEK_END)
+        if stream.write(frame) != len(frame):
+            stream.truncate(end)
+
+
+def lock(stream: IO[bytes]) -> bool:
+    """Hold a raw file for as long as it is open; return whether nobody else holds it.
+
+    The system lets go of it when the process ends, however it ends. Windows has no such lock.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def is_being_recorded(path: Path) -> bool:
+    """Whether a process is writing to a raw file at this moment."""
+    with path.open("rb") as stream:
+        return not lock(stream)
 
 
 @dataclass(frozen=True)
@@ -157,6 +204,9 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
 def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     """Return the description and where the frames begin."""
     end = content.find(b"\n", 0, _LONGEST_HEADER)
+    if end < 0 and (content.startswith(_BEGINNING) or _BEGINNING.startswith(content)):
+        problem = "this is no raw recording of pendpipe, or only its beginning"
+        raise NothingRecordedError(place, problem, "give another file")
     try:
         header = json.loads(content[: max(end, 0)])
     except (ValueError, RecursionError):

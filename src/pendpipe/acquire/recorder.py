@@ -14,7 +14,7 @@ from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.drivers.base import Identity, Setup
 from pendpipe.acquire.line import Line
-from pendpipe.acquire.raw import RawWriter, read_raw
+from pendpipe.acquire.raw import RawWriter, is_being_recorded, lock, read_raw
 from pendpipe.acquire.session import Progress, Session, Wish
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
@@ -55,7 +55,8 @@ def record(
     clock
         The recorder's clock; real time by default, a simulated device's ``clock`` for one.
     raw_path
-        Where the bytes off the wire are kept; in memory only when not given.
+        The file, a new one, in which the bytes off the wire are kept; in memory only when
+        not given.
     volts_per_radian
         The sensor's constant, for the metadata.
     source
@@ -80,8 +81,8 @@ def record(
     ------
     InputError
         If the port can't be opened, the device is silent or another one, the setting is
-        impossible, nothing was received, or the raw file can't be written: what it holds by
-        then is good.
+        impossible, nothing was received, the raw file exists, or it can't be written: what it
+        holds by then is good.
     """
     wish = Wish(
         tuple(channels), rate_hz, duration_s, range_volts, until_noise, max(0.0, reconnect_s)
@@ -107,31 +108,36 @@ def record(
 
 
 def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
-    """Open the raw file, which is appended to in its place so that a crash leaves it."""
+    """Open a new raw file, which is appended to in its place so that a crash leaves it."""
     if raw_path is None:
         return nullcontext(BytesIO())
     path = Path(raw_path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.is_file() and _is_unfinished(path):
-            raise InputError(
-                path,
-                "it holds a recording that was cut short",
-                f"save it with pendpipe acquire --recover {path} --out FILE.csv, then remove it",
-            )
-        # Without a buffer of our own: what was written is the system's at once.
-        return cast("IO[bytes]", path.open("wb", buffering=0))
+        # Unbuffered: what was written is the system's at once. What exists stays as it is,
+        # but for devices (a null device may be written to) and attempts without data.
+        free = (path.exists() and not path.is_file()) or _is_without_data(path)
+        stream = cast("IO[bytes]", path.open("wb" if free else "xb", buffering=0))
+    except FileExistsError:
+        raise InputError(
+            path,
+            "there is such a file already, and no raw recording is overwritten",
+            f"name another one (pendpipe acquire --recover {path} --out FILE.csv decodes it)",
+        ) from None
     except OSError as fault:
         raise _cannot_write(raw_path, fault) from None
+    lock(stream)
+    return stream
 
 
-def _is_unfinished(path: Path) -> bool:
-    """Whether a file is a raw recording that nobody ended, with data in it."""
+def _is_without_data(path: Path) -> bool:
+    """Whether a file is an attempt that ended before the first byte of the stream."""
+    if not path.is_file() or is_being_recorded(path):
+        return False
     try:
-        raw = read_raw(path)
+        return not read_raw(path).data
     except InputError:
         return False
-    return bool(raw.data) and not raw.event("stopped")
 
 
 def _cannot_write(place: str | Path, fault: OSError) -> InputError:

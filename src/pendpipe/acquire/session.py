@@ -11,7 +11,7 @@ from pendpipe.acquire.clock import Clock
 from pendpipe.acquire.drivers.base import Decoder, Driver, Identity, Setup
 from pendpipe.acquire.line import Line, LineLostError
 from pendpipe.acquire.noise import NoiseWatch
-from pendpipe.acquire.raw import RawWriter
+from pendpipe.acquire.raw import COMPLETE, RawWriter
 from pendpipe.errors import InputError
 
 _POLLS: Final = 256
@@ -25,7 +25,6 @@ _PATIENCE_S: Final = 5.0
 """Seconds of the host, beyond a tenth more than asked, that a slow device is waited for."""
 _RETRY_S: Final = 0.2
 """Seconds of the host between two attempts to find the device again."""
-_DONE: Final = ("scans", "time", "noise")
 
 
 class Progress(Protocol):
@@ -123,7 +122,7 @@ class Session:
         try:
             self._instrument.start()
             reason = self._listen(writer)
-            while reason not in _DONE and self._resume(reason, writer):
+            while reason not in COMPLETE and self._resume(reason, writer):
                 reason = self._listen(writer)
             self._instrument.stop()
         except LineLostError as fault:

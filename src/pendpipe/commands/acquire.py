@@ -4,14 +4,23 @@ pendpipe acquire --list
 pendpipe acquire --port /dev/ttyUSB0 --model di154rs --rate 60 --duration 300 --out decay.csv
 pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --out decay.csv
 pendpipe acquire --recover decay.raw --out decay.csv
+pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
+pendpipe acquire --serve di2108 --signal config/model.toml
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from pendpipe.commands._campaign import add_campaign, add_record
@@ -20,7 +29,6 @@ from pendpipe.errors import InputError
 if TYPE_CHECKING:
     from pendpipe.acquire.devices.simulated import Signal
     from pendpipe.acquire.progress import ProgressLine
-    from pendpipe.recording import Recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--port", help="serial port of a real instrument: /dev/ttyUSB0, COM3")
     what.add_argument("--device", metavar="simulated:MODEL", help="a simulated instrument")
     what.add_argument("--recover", metavar="RAW", help="decode kept bytes, of a crash for one")
+    what.add_argument(
+        "--serve", metavar="MODEL", help="be a simulated instrument for other programs: di2108, ..."
+    )
     parser.add_argument("--list", action="store_true", help="list ports; with --port, ask it")
     parser.add_argument("--model", help="the instrument on --port: di154rs, di2108, ...")
     parser.add_argument("--channel", type=int, help="as printed on the box (1)")
@@ -51,12 +62,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how long a device that was unplugged is waited for (30)",
     )
     parser.add_argument("--out", metavar="FILE", help="the recording; FILE.wdh for WinDaq")
-    parser.add_argument("--raw", metavar="FILE", help="where the bytes off the wire go (FILE.raw)")
+    parser.add_argument(
+        "--raw",
+        metavar="FILE",
+        help="a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
+    )
+    parser.add_argument(
+        "--anew",
+        action="store_true",
+        help="record even if there is a recording: of a campaign's record, or not yet written",
+    )
     parser.add_argument("--volts-per-radian", type=float, help="sensor constant, for the metadata")
     parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (0)")
     parser.add_argument(
-        "--clock-scale", type=float, default=1.0, help="simulated seconds in one of the wall's (1)"
+        "--clock-scale", type=float, default=1.0, help="simulated seconds in a real one (1)"
     )
+    parser.add_argument(
+        "--signal", metavar="TOML", help="with --serve: what it reads, as for pendpipe simulate"
+    )
+    parser.add_argument("--link", choices=("pty", "socket"), help="with --serve: on which line")
     workflow = parser.add_argument_group("as a stage of a campaign")
     add_campaign(workflow)
     add_record(workflow)
@@ -66,61 +90,120 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """List ports, or record."""
+    """List ports, serve a device, or record."""
     if arguments.list:
         return _list(arguments.port)
-    if not arguments.out:
-        raise InputError("--out", "no file is named", "give --out FILE.csv")
-    if arguments.campaign:
-        return _stage(arguments)
-    from pendpipe.acquire.progress import ProgressLine
+    with _signals_end_like_ctrl_c():
+        if arguments.serve:
+            return _serve(arguments)
+        if arguments.campaign:
+            return _stage(arguments)
+        if not arguments.out:
+            raise InputError("--out", "no file is named", "give --out FILE.csv")
+        return _record(arguments)
+
+
+@contextmanager
+def _signals_end_like_ctrl_c() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end a recording as Ctrl-C does: what was recorded is written.
+
+    The first of them counts, since a closing terminal may send several. One that is ignored
+    (nohup) stays so; Windows has no SIGHUP.
+    """
+    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []
+    before = {number: signal.getsignal(number) for number in numbers if number is not None}
+    before = {number: old for number, old in before.items() if old is not signal.SIG_IGN}
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for number in before:
+        signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def _record(arguments: argparse.Namespace) -> int:
+    """Record, or write what an earlier call has recorded and could not write."""
+    from pendpipe.acquire import attempts
     from pendpipe.formats.writing import check_name, write
 
-    check_name(arguments.out)
-    _complete(arguments)
-    progress = ProgressLine(sys.stderr, arguments.duration)
+    out = Path(arguments.out)
+    check_name(out)
+    _check_place(out)
+    _check_length(arguments)
+    earlier: list[attempts.Attempt] = []
+    if not (arguments.recover or arguments.anew):
+        kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
+        earlier = attempts.read_attempts(kept)
     if arguments.recover:
-        from pendpipe.acquire.decode import decode_recording
-
-        recording = decode_recording(Path(arguments.recover), arguments.channel)
-    elif arguments.device:
-        recording = _simulated(arguments, progress)
-    elif arguments.port:
-        recording = _real(arguments, progress)
-    else:
-        raise InputError(
-            "acquire", "no instrument is named", "give --port PORT or --device simulated:di2108"
+        raw = Path(arguments.recover)
+    elif earlier and not earlier[-1].is_saved:
+        raw = earlier[-1].path
+        print(
+            f"pendpipe: {out}: made from {raw}, recorded {earlier[-1].recorded_at} and not yet "
+            "written; nothing was recorded now (call again, or give --anew)",
+            file=sys.stderr,
         )
-    for note in (*recording.notes, *write(arguments.out, recording)):
-        print(f"pendpipe: {arguments.out}: {note}", file=sys.stderr)
+    else:
+        raw = Path(arguments.raw) if arguments.raw else attempts.new_path_beside(out)
+        _from_device(arguments, raw)
+    recording = attempts.decode_attempt(raw, out.parent, arguments.channel)
+    with attempts.kept_in(raw, out):
+        lost = write(out, recording)
+    if not arguments.recover:
+        attempts.mark_saved(raw, out)
+    for note in (*recording.notes, *lost):
+        print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
-    print(f"{arguments.out}: {len(recording)} samples at {float(rate):.6g} Hz")
+    print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
     return 0
 
 
-def _complete(arguments: argparse.Namespace) -> None:
-    """Put in what follows from other arguments."""
+def _check_place(out: Path) -> None:
+    """Refuse, before anything is recorded, a place where no recording can be written."""
+    from pendpipe.files import make_folder
+
+    if out.is_dir():
+        raise InputError(out, "this is a folder", "name a file in it")
+    make_folder(out.parent)
+    try:
+        with tempfile.TemporaryFile(dir=out.parent):
+            return
+    except OSError as fault:
+        problem = f"it can't be written ({fault.strerror or fault})"
+        raise InputError(out, problem, "name another folder") from None
+
+
+def _check_length(arguments: argparse.Namespace) -> None:
+    """Let ``--samples`` give the length, where it is there."""
     if arguments.samples is not None:
         if arguments.samples < 1:
             raise InputError("--samples", "it must be positive", "give a whole number above 0")
         if arguments.rate > 0:
             arguments.duration = arguments.samples / arguments.rate
-    if not arguments.raw and not arguments.recover:
-        # Always: what a crash leaves is there.
-        arguments.raw = str(Path(arguments.out).with_suffix(".raw"))
 
 
 def _stage(arguments: argparse.Namespace) -> int:
     """Acquire one record of a campaign, or its caliper run."""
     from pendpipe.commands._campaign import load
 
-    campaign, out = load(arguments.campaign), Path(arguments.out)
+    campaign = load(arguments.campaign)
     if arguments.caliper:
         from pendpipe.configuration.jobs import caliper_source
         from pendpipe.manifest import job
         from pendpipe.stages.caliper import run_caliper
 
-        source = caliper_source(campaign)
+        if not arguments.out:
+            raise InputError("--out", "no file is named", "give --out FILE.csv")
+        out, source = Path(arguments.out), caliper_source(campaign)
         with job(out.parent, "caliper", sources=[source] if source else []) as running:
             run_caliper(campaign, out)
             running.outputs.append(out)
@@ -128,29 +211,78 @@ def _stage(arguments: argparse.Namespace) -> int:
     from pendpipe.stages.acquire import acquire_record
     from pendpipe.stages.refusal import run_stage
 
-    source = campaign.record(arguments.record).file
+    record = campaign.record(arguments.record)
+    folder = Path(campaign.configuration.results, record.record)
+    out = Path(arguments.out) if arguments.out else folder / "recording.csv"
+    refused = arguments.refused
+    if record.source.startswith("dataq:"):
+        # What fails here is the line, not the record: the job fails, and the next run tries
+        # again. Whatever refused an earlier recording has to judge this one anew.
+        out.with_name("refused.json").unlink(missing_ok=True)
+        refused = None
+    elif arguments.anew:
+        raise InputError(
+            f"record {record.record}", "it comes from no instrument", "leave out --anew"
+        )
     return run_stage(
         "acquire",
-        arguments.record,
-        lambda: acquire_record(campaign, arguments.record, out),
+        record.record,
+        lambda: acquire_record(
+            campaign, record.record, out, anew=arguments.anew, place=arguments.campaign
+        ),
         outputs=[out],
-        refused=arguments.refused,
-        sources=[source] if source else [],
+        refused=refused,
+        sources=[record.file] if record.file else [],
     )
 
 
-def _real(arguments: argparse.Namespace, progress: ProgressLine) -> Recording:
+def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
+    """Record into a raw file."""
+    from pendpipe.acquire.progress import ProgressLine
+
+    progress = ProgressLine(sys.stderr, arguments.duration)
+    if arguments.device:
+        _simulated(arguments, raw, progress)
+    elif arguments.port:
+        _real(arguments, raw, progress)
+    else:
+        raise InputError(
+            "acquire", "no instrument is named", "give --port PORT or --device simulated:di2108"
+        )
+
+
+def _serve(arguments: argparse.Namespace) -> int:
+    """Be a simulated instrument for other programs until the end."""
+    from pendpipe.acquire.devices.simulated import SimulatedDevice
+
+    signal_volts = _default_signal(arguments.seed, arguments.volts_per_radian or 3.85)
+    if arguments.signal:
+        from pendpipe.simulation.model import read_model, simulated_volts
+
+        signal_volts = simulated_volts(read_model(arguments.signal), arguments.signal)
+    kind = arguments.serve.removeprefix("simulated:")
+    with SimulatedDevice(
+        kind, signal_volts, clock_scale=_clock_scale(arguments), link=arguments.link
+    ) as device:
+        print(device.port, flush=True)
+        with suppress(KeyboardInterrupt):
+            while device.failure is None:
+                time.sleep(0.05)
+    return 0
+
+
+def _real(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
     """Record from the instrument on a port."""
     from pendpipe.acquire.ports import identify
     from pendpipe.acquire.recorder import record
 
-    return record(
+    record(
         arguments.port,
         arguments.model or identify(arguments.port).model,
         channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
-        raw_path=arguments.raw,
+        raw_path=raw,
         volts_per_radian=arguments.volts_per_radian,
         progress=progress,
         range_volts=arguments.range_volts,
@@ -159,7 +291,7 @@ def _real(arguments: argparse.Namespace, progress: ProgressLine) -> Recording:
     )
 
 
-def _simulated(arguments: argparse.Namespace, progress: ProgressLine) -> Recording:
+def _simulated(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
     """Record from a simulated instrument."""
     from pendpipe.acquire.simulated import acquire_simulated
 
@@ -170,22 +302,27 @@ def _simulated(arguments: argparse.Namespace, progress: ProgressLine) -> Recordi
             "only simulated devices go here",
             "give simulated:di2108",
         )
-    if not (math.isfinite(arguments.clock_scale) and arguments.clock_scale > 0):
-        raise InputError("--clock-scale", "it must be positive", "give 1 for real time")
-    return acquire_simulated(
+    acquire_simulated(
         kind,
         _default_signal(arguments.seed, arguments.volts_per_radian or 3.85),
         channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
-        clock_scale=arguments.clock_scale,
-        raw_path=arguments.raw,
+        clock_scale=_clock_scale(arguments),
+        raw_path=raw,
         volts_per_radian=arguments.volts_per_radian or 3.85,
         progress=progress,
         range_volts=arguments.range_volts,
         until_noise=arguments.until_noise,
         reconnect_s=arguments.reconnect,
     )
+
+
+def _clock_scale(arguments: argparse.Namespace) -> float:
+    scale = float(arguments.clock_scale)
+    if not (math.isfinite(scale) and scale > 0):
+        raise InputError("--clock-scale", "it must be positive", "give 1 for real time")
+    return scale
 
 
 def _default_signal(seed: int, volts_per_radian: float) -> Signal:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -144,6 +145,28 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
     volts = quantised(clipped(volts, converter.range_volts, step), step)
     volts = step * instrument.given_codes(np.round(volts / step))
     return Recording(time, volts, "volts", metadata=metadata, resolution=step)
+
+
+def simulated_volts(model: Model, place: str = "the model") -> Callable[[FloatArray], FloatArray]:
+    """What an instrument reads of a model: volts at any time, before its own converter.
+
+    Between the samples of `simulate` it goes straight; give a `sample_rate_hz` at which that is
+    no matter. After their end the pendulum hangs at rest.
+
+    Raises
+    ------
+    InputError
+        If the model has no sensor.
+    """
+    if model.sensor is None:
+        raise InputError(f"{place}, sensor", "an instrument reads volts", "add a sensor")
+    recording = simulate(model.model_copy(update={"converter": None}), place=place)
+    rest_volts = model.sensor.offset_volts
+
+    def volts(time_s: FloatArray) -> FloatArray:
+        return np.interp(time_s, recording.time_s, recording.values, right=rest_volts)
+
+    return volts
 
 
 def _angles(

@@ -10,11 +10,25 @@ import numpy as np
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.errors import InputError
-from pendpipe.recording import Recording, write_plain
+from pendpipe.manifest import SET_ASIDE
+from pendpipe.recording import Recording, read_plain, write_plain
 
 
-def acquire_record(campaign: Campaign, name: str, out: Path) -> None:
+def acquire_record(
+    campaign: Campaign, name: str, out: Path, *, anew: bool = False, place: Path | str = "CONFIG"
+) -> None:
     """Write the plain recording of one record.
+
+    Parameters
+    ----------
+    campaign, name
+        The record and its campaign.
+    out
+        The recording; an instrument's raw files are kept in the folder ``raw`` beside it.
+    anew
+        Record from an instrument even if a recording is kept.
+    place
+        The campaign's configuration, for the message that says how to record anew.
 
     Raises
     ------
@@ -25,7 +39,9 @@ def acquire_record(campaign: Campaign, name: str, out: Path) -> None:
     if record.source == "simulated":
         recording = _simulated(campaign, record)
     elif record.source.startswith("dataq:"):
-        recording = _instrument(record)
+        again = f"pendpipe acquire --campaign {place} --record {name} --anew records it anew"
+        _instrument(record, out, again, anew=anew)
+        return
     else:
         recording = _file(record)
     write_plain(out, recording)
@@ -51,21 +67,69 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
     return replace(recording, metadata={**recording.metadata, "source": "simulated"})
 
 
-def _instrument(record: Record) -> Recording:
-    """Record from the port that the source names, as long as the table says."""
-    from pendpipe.acquire import record_from_port
+def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
+    """Write the recording of a ``dataq:`` record from its raw file; record only if there is none.
 
-    port = record.source.removeprefix("dataq:")
-    if record.stop_s is None:
-        raise InputError(
-            f"record {record.record}", "how long to record is not said", "give stop_s in seconds"
-        )
+    Raises
+    ------
+    InputError
+        If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
+    """
+    from pendpipe.acquire import record_from_port
+    from pendpipe.acquire.attempts import choose, decode_attempt, kept_in, new_path, read_attempts
+
     if record.channel and not record.channel.isdecimal():
         raise InputError(
-            f"record {record.record}", f"channel '{record.channel}' is no number", "mend the cell"
+            f"record {record.record}", f"channel '{record.channel}' is no number", "fix the cell"
         )
     channel = int(record.channel) if record.channel else None
-    return record_from_port(port, channel=channel, duration_s=record.stop_s)
+    folder = out.parent / "raw"
+    attempts = read_attempts(folder.glob("*.raw"))
+    if not attempts and not anew and _is_recording(out):
+        print(f"{record.record}: {out.name} is kept as it is, without a raw file; {again}")
+        return
+    if anew or not attempts:
+        if record.stop_s is None:
+            raise InputError(
+                f"record {record.record}", "its length is unknown", "give stop_s in seconds"
+            )
+        port = record.source.removeprefix("dataq:")
+        path = new_path(f"{folder}/")
+        record_from_port(port, channel=channel, duration_s=record.stop_s, raw_path=path)
+        attempts = read_attempts(folder.glob("*.raw"))
+    used = choose(attempts)
+    recording = decode_attempt(used.path, out.parent, channel)
+    with kept_in(used.path, out):
+        write_plain(out, recording)
+    kept = f", {len(attempts) - 1} more kept beside it" if len(attempts) > 1 else ""
+    notes = "".join(f"; {note}" for note in recording.notes)
+    print(
+        f"{record.record}: {len(recording)} samples from {used.path.name}, "
+        f"recorded {used.recorded_at}{kept}{notes}" + ("" if used.is_complete else f"; {again}")
+    )
+
+
+def _is_recording(out: Path) -> bool:
+    """Whether a recording made without a raw file is there; a refused record's stub is none.
+
+    Raises
+    ------
+    InputError
+        If it is there, or was set aside, and is damaged: only the user may give it up.
+    """
+    for damaged in out.parent.glob(f"{out.name}{SET_ASIDE}*"):
+        raise InputError(
+            damaged,
+            "the recording was damaged and set aside, and no raw file of it is kept",
+            "put back a copy, or record anew with --anew",
+        )
+    if not out.exists():
+        return False
+    with out.open("rb") as stream:
+        if stream.read(9) in (b"", b"# refused"):
+            return False
+    read_plain(out)
+    return True
 
 
 def _file(record: Record) -> Recording:

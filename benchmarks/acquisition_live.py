@@ -1,0 +1,191 @@
+"""Live recordings in a campaign: what unplugging, code changes and kills leave of them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pendpipe.acquire.raw import read_raw
+from pendpipe.errors import InputError
+from pendpipe.recording import read_plain
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+SIGNAL: Final = """
+pendulum = {frequency_hz = 3.0, quality_factor_viscous = 60.0, release_angle_rad = 0.3}
+sensor = {volts_per_radian = 3.85, noise_volts = 0.001}
+sampling = {sample_rate_hz = 240.0, duration_s = 60.0}
+"""
+CONFIGURATION: Final = """
+title: Live
+records: {folder}/records.tsv
+results: {folder}/results
+apparatus: null
+calibration: null
+simulated: null
+typical_record: null
+diagnose: {{enabled: false}}
+"""
+
+
+@contextmanager
+def served_device(folder: Path, link: str) -> Iterator[str]:
+    """A simulated DI-2108 in a process of its own; yields its port."""
+    description = folder / "signal.toml"
+    description.write_text(SIGNAL, encoding="utf-8")
+    command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--serve", "di2108"]
+    command += ["--signal", str(description), "--link", link]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+class LiveCampaign:
+    """A campaign with one live record and one from a file, in a folder of its own.
+
+    Parameters
+    ----------
+    folder
+        Where it is made.
+    port, duration_s
+        What the live record is recorded from, and for how long.
+    target
+        Which result of both records is asked for.
+    """
+
+    def __init__(
+        self, folder: Path, port: str, duration_s: float, target: str = "recording.csv"
+    ) -> None:
+        self.folder = folder
+        self.target = target
+        self.results = folder / "results"
+        self.recording = self.results / "live/recording.csv"
+        time_s = np.arange(0.0, 10.0, 1 / 60)
+        angle = 0.3 * np.exp(-time_s / 5) * np.cos(6.0 * time_s)
+        rows = (f"{t!r},{y!r}\n" for t, y in zip(time_s.tolist(), angle.tolist(), strict=True))
+        (folder / "decay.csv").write_text("time_s,angle_rad\n" + "".join(rows))
+        configuration = CONFIGURATION.format(folder=folder.as_posix())
+        (folder / "config.yaml").write_text(configuration)
+        self.connect(port, duration_s)
+
+    def connect(self, port: str, duration_s: float) -> None:
+        """Write the table of records, with this port for the live one."""
+        (self.folder / "records.tsv").write_text(
+            "record\tsource\tstop_s\tvolts_per_radian\n"
+            f"live\tdataq:{port}\t{duration_s}\t3.85\n"
+            f"file\t{self.folder.as_posix()}/decay.csv\n"
+        )
+
+    @property
+    def raw_files(self) -> dict[str, bytes]:
+        """The raw files of the live record, by name."""
+        return {path.name: path.read_bytes() for path in self.results.glob("live/raw/*")}
+
+    def command(self, *arguments: str) -> list[str]:
+        """The call of Snakemake that makes the target of both records."""
+        return [
+            *(sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"),
+            *("--configfile", str(self.folder / "config.yaml"), *arguments, "--"),
+            *(f"{self.results}/{record}/{self.target}" for record in ("live", "file")),
+        ]
+
+    def run(self, *arguments: str, library: Path | None = None) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake to its end, with another copy of the library if one is given."""
+        environment = os.environ | ({"PYTHONPATH": str(library)} if library else {})
+        return subprocess.run(
+            self.command(*arguments),
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    def kill_at(self, recorded_s: float) -> None:
+        """Run Snakemake, and kill it with all its jobs when so much has been recorded."""
+        process = subprocess.Popen(
+            self.command(),
+            cwd=ROOT,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        while process.poll() is None and self.recorded_s() < recorded_s:
+            time.sleep(0.02)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+    def recorded_s(self) -> float:
+        """The last time stamp in the raw files."""
+        last_s = 0.0
+        for path in self.results.glob("live/raw/*.raw"):
+            with suppress(InputError):
+                last_s = max([last_s, *read_raw(path).arrival_s[-1:]])
+        return last_s
+
+
+def changed_library(folder: Path) -> Path:
+    """A copy of the library with a comment more in the decoder."""
+    library = folder / "src"
+    shutil.copytree(ROOT / "src", library, ignore=shutil.ignore_patterns("__pycache__"))
+    with (library / "pendpipe/acquire/decode.py").open("a") as source:
+        source.write("# changed\n")
+    return library
+
+
+def live_table(folder: Path, duration_s: float = 20.0) -> str:
+    """Record, unplug, change the library, run again; and kill at seven tenths, run again."""
+    lines = [
+        "| line | what happened | exit status | seconds recorded | raw files | recording |",
+        "|---|---|---|---|---|---|",
+    ]
+    for link in ("pty", "socket"):
+        place = folder / link
+        place.mkdir()
+        lines += [f"| {link} | {row} |" for row in _live_rows(place, link, duration_s)]
+    return "\n".join(lines)
+
+
+def _live_rows(folder: Path, link: str, duration_s: float) -> Iterator[str]:
+    """What happened on one line, a row each."""
+    with served_device(folder, link) as port:
+        campaign = LiveCampaign(folder, port, duration_s, "turning_points.csv")
+        status = campaign.run().returncode
+    before = campaign.recording.read_bytes(), campaign.raw_files
+    yield _row("recorded", status, campaign, "made")
+    library = changed_library(folder)
+    for what, arguments in {
+        "unplugged, library changed": (),
+        "unplugged, everything forced": ("--forceall",),
+    }.items():
+        status = campaign.run(*arguments, library=library).returncode
+        same = (campaign.recording.read_bytes(), campaign.raw_files) == before
+        yield _row(what, status, campaign, "the same bytes" if same else "**changed**")
+    shutil.rmtree(campaign.results)
+    killed_s = 0.7 * duration_s
+    with served_device(folder, link) as port:
+        campaign.connect(port, duration_s)
+        campaign.kill_at(killed_s)
+        raw = campaign.raw_files
+        status = campaign.run().returncode
+    verdict = "what was kept is used" if campaign.raw_files == raw else "**recorded anew**"
+    yield _row(f"killed at {killed_s:g} of {duration_s:g} s, run again", status, campaign, verdict)
+
+
+def _row(what: str, status: int, campaign: LiveCampaign, verdict: str) -> str:
+    length_s = read_plain(campaign.recording).time_s[-1]
+    return f"{what} | {status} | {length_s:.2f} | {len(campaign.raw_files)} | {verdict}"

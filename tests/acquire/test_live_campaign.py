@@ -1,0 +1,142 @@
+"""A live recording in a campaign survives unplugging, code changes, failures and kills."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from benchmarks.acquisition_live import LiveCampaign, changed_library, served_device
+
+from pendpipe.cli import main
+from pendpipe.recording import read_plain
+
+pytestmark = pytest.mark.slow
+LINKS = [
+    pytest.param(
+        "pty",
+        marks=pytest.mark.skipif(
+            not hasattr(os, "openpty"), reason="this system has no pseudo-terminals"
+        ),
+    ),
+    "socket",
+]
+DURATION_S = 4.0
+
+
+@pytest.fixture(params=LINKS)
+def link(request: pytest.FixtureRequest) -> str:
+    """Both kinds of line."""
+    return str(request.param)
+
+
+def test_neither_changed_code_nor_force_records_again(link: str, tmp_path: Path) -> None:
+    """With the device gone, everything is made from the raw file, byte for byte."""
+    with served_device(tmp_path, link) as port:
+        campaign = LiveCampaign(tmp_path, port, DURATION_S)
+        done = campaign.run()
+        assert done.returncode == 0, done.stderr
+    recording, raw = campaign.recording.read_bytes(), campaign.raw_files
+    assert len(read_plain(campaign.recording)) == 60 * DURATION_S
+    assert len(raw) == 1
+    library = changed_library(tmp_path)
+    done = campaign.run(library=library)
+    assert done.returncode == 0, done.stderr
+    assert "live: 240 samples" in done.stdout
+    assert campaign.recording.read_bytes() == recording
+    # Another length and another port in the table are no request to record either.
+    campaign.connect("no-such-port", 2 * DURATION_S)
+    assert campaign.run("--forceall").returncode == 0
+    assert campaign.recording.read_bytes() == recording
+    assert campaign.raw_files == raw
+    # Even a recording that has lost its raw file is never given up.
+    for path in campaign.results.glob("live/raw/*"):
+        path.unlink()
+    assert campaign.run("--forceall").returncode == 0
+    assert campaign.recording.read_bytes() == recording
+
+
+def test_a_killed_campaign_uses_what_was_recorded(link: str, tmp_path: Path) -> None:
+    with served_device(tmp_path, link) as port:
+        campaign = LiveCampaign(tmp_path, port, DURATION_S, "turning_points.csv")
+        campaign.kill_at(0.7 * DURATION_S)
+        raw = campaign.raw_files
+        done = campaign.run()
+    assert done.returncode == 0, done.stderr
+    assert campaign.raw_files == raw
+    recording = read_plain(campaign.recording)
+    assert 0.7 * DURATION_S - 0.1 < recording.time_s[-1] < DURATION_S - 0.3
+    assert "cut short" in recording.metadata["notes"]
+    lines = [line for line in done.stdout.splitlines() if line.startswith("live: ")]
+    assert len(lines) == 1
+    assert next(iter(raw)) in lines[0]
+    assert "--anew" in lines[0]
+    assert (campaign.results / "live/turning_points.csv").stat().st_size > 500
+
+
+def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(
+    link: str, tmp_path: Path
+) -> None:
+    with served_device(tmp_path, link) as port:
+        pass  # unplugged before the first scan
+    campaign = LiveCampaign(tmp_path, port, DURATION_S)
+    done = campaign.run()
+    assert done.returncode == 1
+    assert port in (campaign.results / "live/logs/acquire.log").read_text()
+    assert (campaign.results / "file/recording.csv").exists()
+    assert not campaign.recording.exists()
+    assert not (campaign.results / "live/refused.json").exists()
+    with served_device(tmp_path, link) as port:
+        campaign.connect(port, 1.0)
+        done = campaign.run()
+    assert done.returncode == 0, done.stderr
+    assert len(read_plain(campaign.recording)) == 60
+
+
+def test_only_an_explicit_request_records_anew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record"]
+    with served_device(tmp_path, "socket") as port:
+        campaign = LiveCampaign(tmp_path, port, 1.0)
+        assert main([*call, "live"]) == 0
+        first = campaign.raw_files
+        assert main([*call, "live"]) == 0
+        assert campaign.raw_files == first
+        assert main([*call, "live", "--anew"]) == 0
+        assert first.items() < campaign.raw_files.items()
+        assert len(campaign.raw_files) == 2
+    assert "1 more kept beside it" in capsys.readouterr().out
+    second = campaign.recording.read_bytes()
+    # A request that fails leaves the recording as it is.
+    assert main([*call, "live", "--anew"]) == 2
+    assert campaign.recording.read_bytes() == second
+    assert main([*call, "file", "--anew"]) == 2
+
+
+def test_two_jobs_never_record_from_one_port(link: str, tmp_path: Path) -> None:
+    with served_device(tmp_path, link) as port:
+        command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--port", port]
+        command += ["--model", "di2108", "--duration", "3", "--out"]
+        jobs = [
+            subprocess.Popen(
+                [*command, str(tmp_path / f"{name}.csv")], stderr=subprocess.PIPE, text=True
+            )
+            for name in "ab"
+        ]
+        errors = [job.communicate()[1] for job in jobs]
+    begun = []
+    for job, error, name in zip(jobs, errors, "ab", strict=True):
+        if job.returncode:
+            assert job.returncode == 2
+            assert error.count("\n") == 1
+            continue
+        recording = read_plain(tmp_path / f"{name}.csv")
+        assert len(recording) == 180
+        begun.append(datetime.fromisoformat(recording.metadata["recorded_at"]))
+    # On a socket the second may get its turn when the first has done.
+    assert begun
+    assert (max(begun) - min(begun)).total_seconds() >= 2 * (len(begun) - 1)
