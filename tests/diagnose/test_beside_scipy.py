@@ -11,7 +11,7 @@ from scipy.fft import dct, idct
 from scipy.optimize import lsq_linear
 
 from pendpipe.diagnose.numerics import bounded_least_squares, cosines, from_cosines
-from pendpipe.effects.complex_erfcx import erfcx
+from pendpipe.effects.catalogue.fluid import erfcx
 
 
 @given(st.integers(1, 300), st.integers(0, 2**32 - 1))

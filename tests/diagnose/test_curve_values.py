@@ -29,7 +29,7 @@ def fitted(kind: type[DampingCurve] | type[DriveCurve], quadratic: float) -> tup
     data = Data(TIME_S, values, 0.05, True, np.ones(len(TIME_S)))
     effect = kind(noise_free.span)
     if kind is DriveCurve:
-        effect = kind(noise_free.span, np.eye(effect.hats)[:, :3])
+        effect = kind(noise_free.span, np.eye(effect.basis_size)[:, :3])
     start = np.concatenate([truth, np.zeros(effect.sizes)])
     start[0] = 0.0
     fit = refine(model.adding(effect), data, white_noise(data, NOISE_RAD), start, held=(0, 1, 2, 3))

@@ -20,7 +20,7 @@ from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.diagnose.state import State
 from pendpipe.effects.catalogue import CATALOGUE
-from pendpipe.effects.cubic_stiffness import CubicStiffness
+from pendpipe.effects.catalogue.restoring import CubicStiffness
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 

@@ -19,7 +19,7 @@ from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.circular_error import CircularError
+from pendpipe.effects.catalogue.restoring import CircularError
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 

@@ -30,7 +30,7 @@ class Magnet(Effect):
     kind = "dynamics"
     equation = r"\ddot x \mathrel{-}= m x/(1 + (x/w)^2)^2"
     parameters = (Parameter("m", "1/s^2", -10.0, 10.0), Parameter("w", "rad", 1e-3, 1.0))
-    deciding = "take it away"
+    discriminating_test = "take it away"
 
     def acceleration(
         self,

@@ -13,7 +13,7 @@ from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.progressive_window import progressive_start
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.circular_error import CircularError
+from pendpipe.effects.catalogue.restoring import CircularError
 from pendpipe.effects.model import Model
 
 RATE_HZ, NOISE_RAD, LINEAR = 20.0, 1e-3, 0.012

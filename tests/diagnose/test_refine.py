@@ -13,8 +13,7 @@ from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Evaluated, Model
 
 from .records import (
     INTERVAL_S,

@@ -70,7 +70,7 @@ def test_an_effect_is_named(name: str) -> None:
     assert outcome.diagnosis.p_value < 0.01
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not by_identifier(name).switch])
+@pytest.mark.parametrize("name", [name for name in NAMES if not by_identifier(name).parameter_free])
 def test_its_parameters_are_those_that_were_put_in(name: str) -> None:
     """Even where another effect of its class leads."""
     rivals = diagnosed(name).search.steps[0].rivals

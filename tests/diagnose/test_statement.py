@@ -27,7 +27,7 @@ def named(identifier: str, **parameters: Estimate) -> FoundEffect:
         1e-9,
         0.9,
         (),
-        effect.deciding,
+        effect.discriminating_test,
         Location(summary="throughout the record"),
     )
 
@@ -52,8 +52,8 @@ def test_a_model_that_predicts_worse_is_said_to() -> None:
 def test_a_question_ends_as_one() -> None:
     """What decides may be asked: "what touched it?"."""
     rival = replace(named("amplitude-step"), indistinguishable=(("impulse", 0.2),))
-    assert rival.deciding.endswith("?")
-    assert f"impulse: {rival.deciding} With it" in said(rival)
+    assert rival.discriminating_test.endswith("?")
+    assert f"impulse: {rival.discriminating_test} With it" in said(rival)
 
 
 def test_a_pure_number_has_no_unit() -> None:

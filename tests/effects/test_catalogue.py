@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.effects.closer_curves import CLOSER_CURVES
-from pendpipe.effects.curve import Curve
-from pendpipe.effects.curves import CURVES
-from pendpipe.effects.derivatives import jacobian
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
+from pendpipe.effects.derivatives import jacobian, response
 from pendpipe.effects.manual import page
 from pendpipe.effects.model import Model
-from pendpipe.effects.responses import response
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
@@ -74,7 +71,7 @@ MEASUREMENT = [
 
 BASE = baseline(a=7.2e-3, b=7.8e-3, c=1.3e-4, share=0.4, offset=0.01)
 RECORD = times(60.0)
-WITH_TEMPLATE = [effect.identifier for effect in CATALOGUE if effect.template]
+WITH_TEMPLATE = [effect.identifier for effect in CATALOGUE if effect.has_signature]
 
 
 def test_the_catalogue_holds_every_identifier_once() -> None:
@@ -93,12 +90,13 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 def test_every_declaration_is_whole() -> None:
     for effect in CATALOGUE:
         assert effect.name
-        assert effect.deciding
+        assert effect.discriminating_test
         assert effect.equation.count("{") == effect.equation.count("}")
         names = [parameter.name for parameter in effect.parameters]
         assert len(names) == len(set(names))
         assert all(parameter.low < parameter.high for parameter in effect.parameters)
-        assert effect.switch or len(names) >= effect.sizes
+        assert effect.parameter_free or len(names) >= effect.sizes
+        assert len(effect.example) == (effect.count if effect.has_signature else 0)
 
 
 def test_the_page_is_the_catalogues() -> None:
@@ -118,7 +116,9 @@ def test_units_follow_the_displacements() -> None:
 
 def test_frictions_have_one_sign() -> None:
     """A size that can't be negative is looked for with its own sign only."""
-    one_sided = {effect.identifier for effect in CATALOGUE if effect.template and effect.one_sided}
+    one_sided = {
+        effect.identifier for effect in CATALOGUE if effect.has_signature and effect.one_sided
+    }
     assert one_sided == {
         "circular-error", "coulomb-friction", "quadratic-drag", "drag-form", "power-law-damping",
         "stribeck-friction", "presliding-friction", "backlash", "history-force",
@@ -177,7 +177,9 @@ def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
     value = np.append(BASE, VALUES[identifier])
     found = jacobian(model, value, model.evaluate(value))
     for index in range(len(BASE), model.size):
-        name = ["size", *(p.name for p in effect.parameters)][index - len(BASE) + 1 - effect.switch]
+        name = ["size", *(p.name for p in effect.parameters)][
+            index - len(BASE) + 1 - effect.parameter_free
+        ]
         step = 1e-2 * abs(value[index])
         if name == "time":
             step = 0.0625 * 2.0 * math.pi / float(BASE[OMEGA])
@@ -209,7 +211,7 @@ def test_derivatives_by_the_baselines_values(identifier: str) -> None:
         assert error < 0.025 * np.linalg.norm(expected), index
 
 
-@pytest.mark.parametrize("kind", [*CURVES, *CLOSER_CURVES], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", [*CURVES, *FOLLOW_UP_CURVES], ids=lambda kind: kind.__name__)
 def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
     """So that their derivatives are the same wherever they are asked on one motion."""
     model = Model(RECORD, 0.05)
@@ -240,7 +242,7 @@ def projected(effect: Effect, shape: tuple[float, ...], model: Model, basis: Flo
 SCANNED = [
     effect.identifier
     for effect in CATALOGUE
-    if effect.template and not effect.spectral and effect.sizes < len(effect.parameters)
+    if effect.has_signature and not effect.spectral and effect.sizes < len(effect.parameters)
 ]
 
 

@@ -8,8 +8,7 @@ import pytest
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import white_noise
 from pendpipe.diagnose.refine import refine
-from pendpipe.effects.baseline import SHARE, B, pendulum_of
-from pendpipe.effects.held_parts import HYSTERETIC, VISCOUS
+from pendpipe.effects.baseline import HYSTERETIC, SHARE, VISCOUS, B, pendulum_of
 from pendpipe.effects.model import Model
 
 TIME_S = np.arange(600) / 15.0

@@ -209,7 +209,7 @@ def test_the_memory_of_the_release_fades_though_dry_friction_stops_the_pendulum(
 
 
 def test_broadband_drive_has_no_template() -> None:
-    assert not by_identifier("broadband-drive").template
+    assert not by_identifier("broadband-drive").has_signature
 
 
 @pytest.mark.parametrize("name", ["clock-drift", "frequency-drift"])
@@ -218,12 +218,12 @@ def test_a_drift_is_the_less_likely_the_larger_beyond_a_thousandth(name: str) ->
     effect = by_identifier(name)
     span = evaluated(name, (0.0, STRAIGHT_S), baseline(b=0.01), TIME).span
     usual = np.array([1e-3 / span.duration_s, 1e7])
-    assert effect.improbable(0.9 * usual, span) == 0.0
-    double = effect.improbable(2.0 * usual, span) - effect.improbable(usual, span)
+    assert effect.prior_penalty(0.9 * usual, span) == 0.0
+    double = effect.prior_penalty(2.0 * usual, span) - effect.prior_penalty(usual, span)
     assert double == pytest.approx(2.0 * math.log(2.0), rel=1e-3)
     # One that has long relaxed has changed by rate tau, however long the record.
     relaxed = np.array([-1e-2, 1.0])
-    assert effect.improbable(relaxed, span) == pytest.approx(2.0 * math.log(10.0), rel=1e-3)
+    assert effect.prior_penalty(relaxed, span) == pytest.approx(2.0 * math.log(10.0), rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_samples_are_lost_whole(samples: float) -> None:
     span = evaluated("dropped-samples", (0.0, 30.0), baseline(b=0.01), TIME).span
 
     def cost(part: float) -> float:
-        return effect.improbable(np.array([part * samples * 0.04, 30.0]), span)
+        return effect.prior_penalty(np.array([part * samples * 0.04, 30.0]), span)
 
     assert cost(1.0) == 0.0
     assert cost(0.1 / abs(samples)) == pytest.approx(2.0 * math.log(10.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pendpipe.effects.catalogue.sensor import SoftClipping
 from pendpipe.effects.model import Model
-from pendpipe.effects.soft_clipping import SoftClipping
 
 from .pendulums import Floats, baseline, plain, times
 

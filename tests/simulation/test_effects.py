@@ -59,7 +59,7 @@ def named(identifier: str) -> dict[str, float]:
     if identifier in FORENSIC:
         return FORENSIC[identifier]
     effect = next(effect for effect in CATALOGUE if effect.identifier == identifier)
-    values = VALUES[identifier][1:] if effect.switch else VALUES[identifier]
+    values = VALUES[identifier][1:] if effect.parameter_free else VALUES[identifier]
     return dict(zip((p.name for p in effect.parameters), values, strict=True))
 
 

@@ -18,8 +18,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data, gather
 from pendpipe.diagnose.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
-from pendpipe.effects.held_parts import with_parts
+from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
 from pendpipe.effects.model import Model
 from pendpipe.physics.decay import time_at
 

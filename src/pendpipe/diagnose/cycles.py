@@ -10,7 +10,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.lock_in import lock_in
-from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Evaluated
 
 _WHOLE: Final = 0.85
 """Part of a cycle's readings that must be there."""

@@ -18,7 +18,7 @@ from pendpipe.diagnose.scores import Bank, build_bank, local_p_values
 from pendpipe.diagnose.spectrum import Band, ToneScan, ToneScans, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.tones import plane_band_hz
+from pendpipe.effects.catalogue.oscillations import plane_band_hz
 
 _DYING: Final = (0.06, 0.25)
 """Decay times of the dying tones that are looked for, over the record's duration."""

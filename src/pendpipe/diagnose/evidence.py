@@ -15,7 +15,7 @@ from pendpipe.diagnose.chance import Chance, Trials
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.refine import Fit
 from pendpipe.effects import Effect
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import Curve
 
 CLASS: Final = 6.0
 """Twice the logarithm of the likelihood within which effects are of one class."""
@@ -140,7 +140,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
         # under another noise (`Rival.reaching`) must not be credited with it.
         return gain
     effect = lead.effect
-    if effect.switch:
+    if effect.parameter_free:
         # Its size is predicted: a free one would have had to be found.
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(chi2_beyond(gain, sizes))
@@ -157,7 +157,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
 def _prior(effect: Effect, fit: Fit) -> float:
     place = next((place for other, place in fit.model.places() if other is effect), None)
     # A held parameter that is freed is no part of the model's effects.
-    unlikely = 0.0 if place is None else effect.improbable(fit.value[place], fit.at.span)
+    unlikely = 0.0 if place is None else effect.prior_penalty(fit.value[place], fit.at.span)
     return effect.prior - unlikely
 
 

@@ -14,11 +14,9 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.numerics import bounded_least_squares
 from pendpipe.diagnose.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, B
+from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
 from pendpipe.effects.derivatives import jacobian
-from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.held_parts import share_by_b
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Evaluated, Model
 
 SETTLED: Final = 0.02
 """Of chi^2: a step that promises less is the last."""
@@ -157,7 +155,7 @@ def _shapes(model: Model) -> list[int]:
     return [
         index
         for effect, place in model.places()
-        for index in range(place.start + (1 if effect.switch else effect.sizes), place.stop)
+        for index in range(place.start + (1 if effect.parameter_free else effect.sizes), place.stop)
     ]
 
 

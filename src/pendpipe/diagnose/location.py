@@ -14,7 +14,7 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.remainder import by_cycle
 from pendpipe.diagnose.result import Location
 from pendpipe.effects import Effect
-from pendpipe.effects.tones import PlaneCoupling
+from pendpipe.effects.catalogue.oscillations import PlaneCoupling
 
 _MOST: Final = 0.9
 """Part of what an effect explains that its interval holds."""

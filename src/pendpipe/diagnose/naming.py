@@ -132,7 +132,7 @@ def _from_afar(
     effect = lead.effect
     if isinstance(effect, ReleasedParameter) or effect.kind == "unnamed":
         return None
-    sizes = np.ones(1) if effect.switch else np.zeros(effect.sizes)
+    sizes = np.ones(1) if effect.parameter_free else np.zeros(effect.sizes)
     known = base.value[len(origin) :]
     start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
     model = base.model.adding(effect)

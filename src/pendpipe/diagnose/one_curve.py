@@ -21,9 +21,7 @@ from pendpipe.diagnose.review import stands_apart
 from pendpipe.diagnose.scores import build_bank
 from pendpipe.diagnose.state import State, Step
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.closer_curves import CLOSER_CURVES
-from pendpipe.effects.curve import Curve
-from pendpipe.effects.curves import CURVES
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
 BETTER: Final = 22.0
 """By how much (in chi^2, two a free value counted) two names must be better than one curve: each
@@ -146,7 +144,7 @@ def _bare(state: State, kept: Sequence[Step]) -> Fit | None:
 
 def _curves(bare: Fit, state: State) -> list[Curve]:
     """The mixtures that the recording can see; a curve in time follows anything, and is none."""
-    drawn = [curve(bare.at.span) for curve in (*CURVES, *CLOSER_CURVES) if not curve.in_time]
+    drawn = [curve(bare.at.span) for curve in (*CURVES, *FOLLOW_UP_CURVES) if not curve.in_time]
     seen = build_bank(bare, state.noise, drawn).candidates
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 

@@ -14,8 +14,7 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.gauss_newton import SETTLED, GaussNewton, Place
 from pendpipe.diagnose.noise import Noise
 from pendpipe.effects.baseline import C
-from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Evaluated, Model
 
 ROUNDS: Final = 14
 """How many steps a fit may take."""

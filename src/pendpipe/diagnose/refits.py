@@ -77,7 +77,7 @@ def believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     Two tones of nearly one frequency can take each other's place: a second that is as large
     as the first describes a change of phase, and no second mode.
     """
-    first = len(base.value) + effect.switch
+    first = len(base.value) + effect.parameter_free
     own = fit.value[first:]
     if not effect.believable(own):
         return False
@@ -116,7 +116,7 @@ def _begun(
 
 def _sizes(effect: Effect) -> FloatArray:
     """A switch that is on, or sizes of nothing."""
-    return np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
+    return np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
 
 
 def _ended(refit: Refining, of_use: float) -> Fit | None:

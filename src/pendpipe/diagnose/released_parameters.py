@@ -7,9 +7,19 @@ from typing import Final
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
-from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, A, B, C
+from pendpipe.effects.baseline import (
+    HYSTERETIC,
+    OFFSET,
+    OMEGA,
+    SHARE,
+    START,
+    VISCOUS,
+    A,
+    B,
+    C,
+    share_by_b,
+)
 from pendpipe.effects.effect import Effect
-from pendpipe.effects.held_parts import HYSTERETIC, VISCOUS, share_by_b
 
 _INDEX: Final[Mapping[str, int]] = {
     "a": A,
@@ -34,12 +44,12 @@ class ReleasedParameter(Effect):
     kind = "parameter"
     prior = 12.0
     parameters = ()
-    deciding = "measure that parameter by itself"
+    discriminating_test = "measure that parameter by itself"
 
     def __init__(self, fixed: str) -> None:
         self.fixed = fixed
         self.index = _INDEX.get(fixed)
-        self.releases = _PART.get(fixed)  # type: ignore[misc]
+        self.frees = _PART.get(fixed)  # type: ignore[misc]
         self.identifier = f"parameter-{fixed}"  # type: ignore[misc]
         self.name = f"another value of {fixed.replace('_', ' ')}"  # type: ignore[misc]
         self.equation = rf"\text{{{fixed.replace('_', ' ')}}} \ne \text{{given}}"  # type: ignore[misc]
@@ -58,12 +68,12 @@ class ReleasedParameter(Effect):
         if self.index is not None:
             return fit.jacobian[:, self.index]
         value, parts = fit.value, fit.model.held_parts()
-        others = [part for part in parts if part != self.releases]
-        if not others and value[B] > parts[str(self.releases)]:
+        others = [part for part in parts if part != self.frees]
+        if not others and value[B] > parts[str(self.frees)]:
             # b is fitted, along with the other part: only how it divides is new.
             return fit.jacobian[:, SHARE]
         share = float(value[SHARE])
-        by_part = (1.0 - share if self.releases == HYSTERETIC else -share) / float(value[B])
+        by_part = (1.0 - share if self.frees == HYSTERETIC else -share) / float(value[B])
         along = by_part - share_by_b(value, parts)
         return fit.jacobian[:, B] + along * fit.jacobian[:, SHARE]
 

@@ -21,7 +21,7 @@ from pendpipe.diagnose.state import State, Step, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import Curve
 
 _MOST: Final = 0.75
 """Part of the misfit that a name must explain where the model leaves more than noise."""

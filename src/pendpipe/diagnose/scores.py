@@ -21,15 +21,15 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, pulled
 from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.effects import Effect
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import Curve
+from pendpipe.effects.derivatives import responses
 from pendpipe.effects.effect import Span
-from pendpipe.effects.responses import responses
 
 _SEEN = 1e-4
 """Part of a sensitivity that must be left by the projection for it to be told at all."""
 
 _STANDS_OUT = 4.0
-"""Standard deviations by which a mixture of a curve's hats must be seen to be kept."""
+"""Standard deviations by which a curve's combination must be seen to be kept."""
 
 
 _AT_ONCE = 32
@@ -232,10 +232,10 @@ def _sizes(
 
 
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
-    """Keep the mixtures of a curve's hats that would stand out if they were of reasonable size."""
-    mixtures, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
-    mixing = mixtures[:, lengths > _STANDS_OUT]
-    return curve.reduced(mixing), mixing.T @ part
+    """Keep a curve's combinations that would stand out if they were of reasonable size."""
+    combinations, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
+    coefficients = combinations[:, lengths > _STANDS_OUT]
+    return curve.reduced(coefficients), coefficients.T @ part
 
 
 def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:

@@ -38,7 +38,7 @@ from pendpipe.diagnose.wrong_parameters import prefer_parameters, reconsider_cur
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
-from pendpipe.effects.closer_curves import CLOSER_CURVES
+from pendpipe.effects.curves import FOLLOW_UP_CURVES
 
 _MOST: Final = 6
 _NEEDED: Final = 9.0
@@ -219,7 +219,7 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
     if state.now.p_value > threshold or _drawn(state):
         return False
     progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
-    closer = more_leads(state.fit, state.noise, undrawn(CLOSER_CURVES, state.fit))
+    closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
         state.fit,

@@ -120,7 +120,7 @@ def _effect(effect: FoundEffect) -> str:
     text += f"{where} (Delta chi^2 = {effect.delta_chi2:.4g}, {_chance(effect.p_value)})"
     if effect.indistinguishable:
         others = ", ".join(name for name, _ in effect.indistinguishable)
-        text += f"; this recording cannot tell it from {others}: {effect.deciding}"
+        text += f"; this recording cannot tell it from {others}: {effect.discriminating_test}"
     return text if text.endswith("?") else text + "."
 
 

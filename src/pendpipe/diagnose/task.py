@@ -14,9 +14,8 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.state import State
 from pendpipe.effects import Effect
-from pendpipe.effects.curve import Curve
-from pendpipe.effects.curves import CURVES
-from pendpipe.effects.soft_clipping import SoftClipping
+from pendpipe.effects.catalogue.sensor import SoftClipping
+from pendpipe.effects.curves import CURVES, Curve
 
 
 def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
@@ -31,7 +30,7 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
     named = [
         copy(effect) if effect.identifier in used else effect
         for effect in catalogue
-        if effect.template
+        if effect.has_signature
         and baseline not in effect.inside
         and (unit == "rad" or not effect.angular)
         and all(present[name] for name in effect.needs)

@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.lock_in import lock_in
-from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Evaluated
 
 _SLIP: Final = 0.15
 """Phase in rad, and part of the amplitude, from which the plain difference is no longer used."""

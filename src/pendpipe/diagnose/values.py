@@ -15,10 +15,8 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
-from pendpipe.effects.curve import Curve
-from pendpipe.effects.curves import DampingCurve, DriveCurve
-from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.model import Model
+from pendpipe.effects.curves import Curve, DampingCurve, DriveCurve
+from pendpipe.effects.model import Evaluated, Model
 from pendpipe.estimate import Estimate
 
 _CYCLES: Final = 4.0
@@ -116,7 +114,7 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
         return {}
     covariance = fit.covariance()
     found = {}
-    first = place.start + effect.switch
+    first = place.start + effect.parameter_free
     for offset, parameter in enumerate(effect.parameters):
         index = first + offset
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))
@@ -182,7 +180,7 @@ def _parts(effect: Curve) -> dict[str, Any]:
 
     def part(first: int) -> Any:
         def drawn(values: FloatArray, at: FloatArray) -> FloatArray:
-            both = effect.mixing @ values
+            both = effect.coefficients @ values
             return np.asarray(np.interp(at, effect.knots, both[first : first + count]))
 
         return drawn

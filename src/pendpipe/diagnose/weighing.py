@@ -25,7 +25,7 @@ from pendpipe.diagnose.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import BASELINE
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import Curve
 from pendpipe.effects.model import Model
 
 _CLEAN: Final = 5.0
@@ -117,7 +117,7 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
             for mate, weight in zip(mates, weights[1:], strict=False)
             if weight > _LISTED or not mate.drawn
         ),
-        effect.deciding,
+        effect.discriminating_test,
         locate(without, found.improved, found.data, effect),
         curve_values(found.improved, effect, found.data.unit)
         if isinstance(effect, Curve)
@@ -177,7 +177,7 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
         fault.p_value,
         each,
         tuple((name, each) for name in finding.also),
-        effect.deciding,
+        effect.discriminating_test,
         replace(finding.location, summary=finding.summary),
     )
 

@@ -1,8 +1,12 @@
-"""The baseline's values in the vector of parameters: their names, places and bounds."""
+"""The baseline's values in the vector of parameters: their names, places and bounds.
+
+Of b = b_h + b_v one part, or both, may be held: then the share, or b as well, is not free.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -40,3 +44,32 @@ def closed_form(value: FloatArray, clock: Clock) -> Motion:
     stop = 2.0 * math.pi * max(float(value[C]), 0.0) / omega
     kept = np.maximum(decayed, min(max(1e-3 * start, stop), start))
     return Motion(clock, omega, np.log(kept), time, math.copysign(1.0, value[START]))
+
+
+HYSTERETIC, VISCOUS = "hysteretic", "viscous"
+
+
+def held_indices(parts: Mapping[str, float]) -> list[int]:
+    """Indices of the values that held parts leave no freedom: with one, b moves the share."""
+    return ([], [SHARE], [B, SHARE])[len(parts)]
+
+
+def with_parts(value: FloatArray, parts: Mapping[str, float]) -> FloatArray:
+    """Values with the share (and, if both parts are held, the b) that held parts make."""
+    if not parts:
+        return value
+    value = value.copy()
+    least = sum(parts.values())
+    value[B] = least if len(parts) == 2 else max(float(value[B]), least)
+    if value[B] > 0.0 and HYSTERETIC in parts:
+        value[SHARE] = parts[HYSTERETIC] / value[B]
+    elif value[B] > 0.0:
+        value[SHARE] = 1.0 - parts[VISCOUS] / value[B]
+    return value
+
+
+def share_by_b(value: FloatArray, parts: Mapping[str, float]) -> float:
+    """Derivative of the share by b where one part of b is held; else b has it for itself."""
+    if len(parts) != 1 or value[B] <= 0.0:
+        return 0.0
+    return float(-value[SHARE] if HYSTERETIC in parts else 1.0 - value[SHARE]) / float(value[B])

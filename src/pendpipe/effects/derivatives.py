@@ -1,17 +1,75 @@
-"""Derivatives of a model's readings by all of its values, along the motion."""
+"""What changes of a model's values do to its readings, along the motion: responses, Jacobian."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion, rates
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
-from pendpipe.effects.curve import Curve
+from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Effect, Pendulum, Span
-from pendpipe.effects.evaluated import Evaluated
-from pendpipe.effects.model import Model
-from pendpipe.effects.responses import response, responses
+from pendpipe.effects.model import Evaluated, Model
+
+_AT_ONCE: Final = 4
+
+
+def response(
+    effect: Effect, low: FloatArray, high: FloatArray, at: Evaluated, pendulum: Pendulum
+) -> FloatArray:
+    """Change of the readings when the values of one effect go from `low` to `high`."""
+    return np.asarray(responses(effect, [(low, high)], at, pendulum)[0])
+
+
+def responses(
+    effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]], at: Evaluated,
+    pendulum: Pendulum,
+) -> FloatArray:  # fmt: skip
+    """Change of the readings for each pair of values, shape (changes, n)."""
+    sampled, tangent = at.sampled, at.tangent
+    total = np.zeros((len(changes), len(sampled.time_s)))
+    found = [_force_change(effect, tangent.motion, pendulum, *pair) for pair in changes]
+    forces = [force for force in found if force is not None]
+    # A few at a time stay in the processor's cache.
+    for first in range(0, len(forces), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        total[part] += sampled.change(*tangent.of_force(np.stack(forces[part])))
+    if effect.kick(changes[0][1]) is not None:
+        total += at.after_kicks([effect.kick(high) for _, high in changes])
+        total -= at.after_kicks([effect.kick(low) for low, _ in changes])
+    for row, (low, high) in enumerate(changes):
+        added = effect.reading(sampled, pendulum, high)
+        if added is not None:
+            total[row] += added
+            if not _absent(effect, low):
+                total[row] -= _some(effect.reading(sampled, pendulum, low))
+        late = effect.delay(sampled.time_s, high)
+        if late is not None:
+            if not _absent(effect, low):
+                late = late - _some(effect.delay(sampled.time_s, low))
+            total[row] += sampled.velocity * late
+    return total
+
+
+def _absent(effect: Effect, values: FloatArray) -> bool:
+    """Whether an effect changes nothing: all its sizes are zero."""
+    return not np.any(values[: effect.sizes])
+
+
+def _some(found: FloatArray | None) -> FloatArray | float:
+    return 0.0 if found is None else found
+
+
+def _force_change(
+    effect: Effect, motion: Motion, pendulum: Pendulum, low: FloatArray, high: FloatArray
+) -> FloatArray | None:
+    after = effect.acceleration(motion, pendulum, high)
+    if after is None or _absent(effect, low):
+        return after
+    return np.asarray(after - _some(effect.acceleration(motion, pendulum, low)))
 
 
 def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
@@ -29,15 +87,15 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     columns[:, OFFSET] = 1.0
     for effect, place in model.places():
         if isinstance(effect, Curve):
-            columns[:, place] = _by_mixtures(effect, at, pendulum).T
+            columns[:, place] = _by_coefficients(effect, at, pendulum).T
             continue
         for index in range(effect.count):
             columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
     return columns
 
 
-def _by_mixtures(curve: Curve, at: Evaluated, pendulum: Pendulum) -> FloatArray:
-    """Derivatives by a curve's mixtures, shape (mixtures, n): it is linear in them."""
+def _by_coefficients(curve: Curve, at: Evaluated, pendulum: Pendulum) -> FloatArray:
+    """Derivatives by a curve's values, shape (values, n): it is linear in them."""
     small = curve.small(at.span)
     none = np.zeros(curve.count)
     one_each = [(none, row) for row in small * np.eye(curve.count)]
@@ -80,7 +138,7 @@ def _derivative(
 def _step(effect: Effect, values: FloatArray, index: int, span: Span) -> float:
     if index < effect.sizes:
         return max(effect.small(span), 1e-4 * abs(float(values[index])))
-    if effect.parameters[index - effect.switch].name == "time":
+    if effect.parameters[index - effect.parameter_free].name == "time":
         # Over several readings, or the one that is crossed decides.
         return min(2.0 * span.interval_s, 0.0625 * span.period_s)
     return max(1e-4 * abs(float(values[index])), 1e-9)

@@ -144,10 +144,13 @@ class Effect:
     equation: ClassVar[str]
     """LaTeX."""
     parameters: ClassVar[tuple[Parameter, ...]]
-    deciding: ClassVar[str]
+    example: ClassVar[tuple[float, ...]] = ()
+    """Values at which it is plain to see for a pendulum of about 1 Hz released at 0.15 rad; in the
+    manual, and what the tests of every effect take."""
+    discriminating_test: ClassVar[str]
     """The one further measurement that would tell it from its rivals."""
     sizes: ClassVar[int] = 1
-    switch: ClassVar[bool] = False
+    parameter_free: ClassVar[bool] = False
     """True where the effect has no free size: it is there, or it is not (size 1 or 0)."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
@@ -162,9 +165,9 @@ class Effect:
     """Whether every pendulum has some of it, so that it is to be doubted last."""
     prior: ClassVar[float] = 0.0
     """Twice the logarithm of how much likelier it is beforehand than others."""
-    template: ClassVar[bool] = True
+    has_signature: ClassVar[bool] = True
     """False where it has no template in the readings, and is found by a test of its own."""
-    releases: ClassVar[str | None] = None
+    frees: ClassVar[str | None] = None
     """The held part of b ("hysteretic" or "viscous") that is free with it."""
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
@@ -180,18 +183,18 @@ class Effect:
     @property
     def one_sided(self) -> bool:
         """Whether it has one size, which is never negative."""
-        positive = self.switch or (bool(self.parameters) and self.parameters[0].low >= 0.0)
+        positive = self.parameter_free or (bool(self.parameters) and self.parameters[0].low >= 0.0)
         return self.sizes == 1 and positive
 
     @property
     def count(self) -> int:
         """How many values describe it, a switch's size included."""
-        return len(self.parameters) + (1 if self.switch else 0)
+        return len(self.parameters) + (1 if self.parameter_free else 0)
 
     def bounds(self, duration_s: float = math.inf) -> list[tuple[float, float]]:
         """Return lowest and highest values in a record of some length, a pair each."""
         limits = [(parameter.low, parameter.high) for parameter in self.parameters]
-        return [(0.0, 1.0), *limits] if self.switch else limits
+        return [(0.0, 1.0), *limits] if self.parameter_free else limits
 
     def acceleration(
         self, motion: Motion, pendulum: Pendulum, values: FloatArray
@@ -208,7 +211,7 @@ class Effect:
         sizes = zip(self.parameters[: self.sizes], values, strict=False)
         return math.hypot(*(float(value) for size, value in sizes if size.unit == "rad"))
 
-    def improbable(self, values: FloatArray, span: Span) -> float:
+    def prior_penalty(self, values: FloatArray, span: Span) -> float:
         """Return twice the logarithm by which so large values are less likely beforehand."""
         return 0.0
 

@@ -10,18 +10,18 @@ from pendpipe.effects.effect import Effect, Parameter
 
 _OPENING = """# What may have been left out
 
-Made by `pendpipe effects`; each entry is one class in `src/pendpipe/effects/`, from which the
-simulation (`[[effects]]` in a model file), the diagnosis and this page are all taken.
+Made by `pendpipe effects`; each entry is one class in `src/pendpipe/effects/catalogue/`, from
+which the simulation (`[[effects]]` in a model file), the diagnosis and this page are all taken.
 
 `x` is the angle from the equilibrium, `r` its amplitude, `psi` the phase (x = r cos psi), `y`
 the reading or an amplitude, `omega` that of Eq. 8. Times are in s from the turning point the
 motion starts from (dynamics) or from the first reading (measurement); instants called `time`
 are those of the record. The symbol of an acceleration that is added is +=.
 
-**Adding one**: write a class like `cubic_stiffness.py` (declaration, and the acceleration,
-kick, reading or delay it makes), put an instance into `CATALOGUE` in `catalogue.py`, add its
-values to `VALUES` in `tests/effects/pendulums.py` and a test of its signature beside the others,
-and run `pendpipe effects > docs/effects.md`.
+**Adding one**: write a class like `CubicStiffness` (declaration, and the acceleration,
+kick, reading or delay it makes, and an `example`) into a module of that package, or into a new
+one: it is found there. The tests of every effect then run on its example; add one of its own
+signature to `tests/effects/`, and run `pendpipe effects > docs/effects.md`.
 """
 
 _HEADINGS = {
@@ -41,11 +41,12 @@ def page() -> str:
 
 
 def _entry(effect: Effect) -> str:
+    test = effect.discriminating_test
     text = inspect.cleandoc(type(effect).__doc__ or "")
     lines = [
         f"### {effect.identifier}", "", f"*{effect.name[0].upper()}{effect.name[1:]}.* {text}", "",
         f"$${effect.equation}$$", "", *_table(effect), *_remarks(effect), "",
-        f"What decides: {effect.deciding}{'' if effect.deciding.endswith('?') else '.'}",
+        f"What decides: {test}{'' if test.endswith('?') else '.'}",
     ]  # fmt: skip
     return "\n".join(lines)
 
@@ -53,16 +54,19 @@ def _entry(effect: Effect) -> str:
 def _table(effect: Effect) -> list[str]:
     if not effect.parameters:
         return ["No free parameter: it is there, or it is not."]
-    rows = [_row(parameter) for parameter in effect.parameters]
-    return ["| parameter | unit | from | to |", "|---|---|---|---|", *rows]
+    example = effect.example[effect.parameter_free :] or (None,) * len(effect.parameters)
+    rows = [_row(*pair) for pair in zip(effect.parameters, example, strict=True)]
+    return ["| parameter | unit | from | to | example |", "|---|---|---|---|---|", *rows]
 
 
-def _row(parameter: Parameter) -> str:
+def _row(parameter: Parameter, example: float | None) -> str:
     name = f"`{parameter.name}`"
     if parameter.default is not None and math.isfinite(parameter.default):
         name += f" ({parameter.default:g} unless given)"
     unit = parameter.unit_in("rad") or "none"
-    return f"| {name} | {unit} | {_bound(parameter.low)} | {_bound(parameter.high)} |"
+    shown = "" if example is None else f"{example:g}"
+    bounds = f"{_bound(parameter.low)} | {_bound(parameter.high)}"
+    return f"| {name} | {unit} | {bounds} | {shown} |"
 
 
 def _bound(value: float) -> str:
@@ -76,7 +80,7 @@ def _remarks(effect: Effect) -> list[str]:
     if effect.needs:
         names = ", ".join(f"`{name}`" for name in effect.needs)
         remarks.append(f"Nothing without the baseline's {names}.")
-    if not effect.template:
+    if not effect.has_signature:
         remarks.append("Found by a test of its own, as it leaves no set trace in the readings.")
     if effect.angular:
         remarks.append("For angles only.")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -23,11 +24,78 @@ from pendpipe.effects.baseline import (
     TIME,
     B,
     closed_form,
+    held_indices,
     pendulum_of,
+    with_parts,
 )
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
-from pendpipe.effects.evaluated import Evaluated, kick_sizes
-from pendpipe.effects.held_parts import held_indices, with_parts
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A model at given values."""
+
+    reading: FloatArray
+    sampled: Sampled
+    tangent: Tangent
+    span: Span
+
+    @cached_property
+    def _start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Change of ln r and of t by ln r at the start: at the nodes, and at the readings."""
+        by_log, by_time = self.tangent.of_start()
+        at_readings = self.sampled.at_nodes(np.stack([by_log, by_time]))
+        return by_log, by_time, at_readings[0], at_readings[1]
+
+    def by_start(self) -> FloatArray:
+        """Change of the readings by ln r at the start."""
+        _, _, by_log, by_time = self._start
+        return np.asarray(self.sampled.angle * by_log - self.sampled.velocity * by_time)
+
+    def after_kicks(self, kicks: Sequence[Kick | None]) -> FloatArray:
+        """Change of the readings by each of several small kicks, shape (kicks, n)."""
+        change = np.zeros((len(kicks), len(self.reading)))
+        rows = [row for row, kick in enumerate(kicks) if kick is not None and kick.acts]
+        acting = [kick for kick in kicks if kick is not None and kick.acts]
+        if not acting:
+            return change
+        instants = np.array([kick.time_s for kick in acting])
+        there = sample_motion(self.tangent.motion, instants)
+        log, late = kick_sizes(there, acting, there)
+        node_log, node_time, by_log, by_time = self._start
+        then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
+        scale = log / then_log
+        sampled = self.sampled
+        first = np.searchsorted(sampled.time_s, instants, side="right")
+        angle, velocity = sampled.angle, sampled.velocity
+        grown, slowed = angle * by_log, velocity * by_time
+        for row, start, size, moved, rest in zip(
+            rows, first, scale, late, then_time * scale, strict=True
+        ):
+            # Nothing before the instant.
+            change[row, start:] = size * (grown[start:] - slowed[start:])
+            change[row, start:] -= (moved - rest) * velocity[start:]
+        return change
+
+
+def kick_sizes(
+    before: Sampled, kicks: Sequence[Kick], now: Sampled
+) -> tuple[FloatArray, FloatArray]:
+    """What a motion still lacks, in ln r and in t at fixed phase, to be the kicked one.
+
+    `before` is the unkicked motion at each kick's instant, `now` the motion as it is.
+    """
+    omega = now.motion.angular_frequency
+    angle, velocity, grown = np.array(
+        [(kick.angle, kick.velocity, kick.log_amplitude) for kick in kicks]
+    ).T
+    x, v = now.angle, now.velocity / omega
+    new_x, new_v = before.angle + angle, (before.velocity + velocity) / omega
+    by_log = grown + 0.5 * np.log((new_x**2 + new_v**2) / (x**2 + v**2))
+    turned = np.arctan2(-new_v, new_x) - np.arctan2(-v, x)
+    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+    return by_log, -turned / omega
+
 
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
@@ -118,12 +186,12 @@ class Model:
 
     def held(self) -> list[int]:
         """Indices that are never fitted: sizes of switches, and what held parts of b settle."""
-        switches = [place.start for effect, place in self.places() if effect.switch]
+        switches = [place.start for effect, place in self.places() if effect.parameter_free]
         return [*switches, *held_indices(self.held_parts())]
 
     def held_parts(self) -> dict[str, float]:
         """The parts of b that are held, without those that an effect sets free."""
-        free = {effect.releases for effect in self.effects}
+        free = {effect.frees for effect in self.effects}
         return {part: rate for part, rate in self.parts.items() if part not in free}
 
     def settled(self, value: FloatArray) -> FloatArray:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from pendpipe.effects.effect import Parameter
+from pendpipe.effects.effect import Effect, Parameter
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -22,29 +22,6 @@ def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:
     return [tuple(float(value) for value in row) for row in itertools.product(*axes)]
 
 
-def instants(span: Span, count: int) -> list[tuple[float]]:
-    """Return rows with one instant each."""
-    return [(float(time),) for time in span.times(count)]
-
-
-def instants_at_phases(span: Span, count: int, turn: float, phases: int = 4) -> list[tuple[float]]:
-    """Return instants, each repeated at phases of the cycle that lie `turn` rad apart.
-
-    A kick's effect depends on the phase at which it comes.
-    """
-    later = turn / span.pendulum.angular_frequency
-    return [(float(time + phase * later),) for time in span.times(count) for phase in range(phases)]
-
-
-def finer_instants(span: Span, count: int, instant_s: float) -> list[tuple[float]]:
-    """Return instants about one of a scan's, as far as its neighbours, an eighth cycle apart."""
-    rough = span.times(count)
-    place = int(np.argmin(np.abs(rough - instant_s)))
-    low, high = rough[max(place - 1, 0)], rough[min(place + 1, count - 1)] + 0.5 * span.period_s
-    number = min(int((high - low) / (0.125 * span.period_s)) + 2, 300)
-    return [(float(time),) for time in np.linspace(low, high, number)]
-
-
 STRAIGHT_S: Final = 1e7
 """A relaxation time that no record can tell from infinity."""
 RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S)
@@ -55,12 +32,15 @@ def relaxed(time_s: FloatArray, tau: float) -> FloatArray:
     return np.asarray(-tau * np.expm1(-time_s / tau))
 
 
-def relaxation_times(span: Span) -> list[tuple[float]]:
-    """Return rows for a scan: straight, and over two fifths and a sixth of the record.
+class Relaxing(Effect):
+    """A change that relaxes with tau, and is straight where tau is long; tau is the shape."""
 
-    The time that is fitted afterwards starts from the best of them.
-    """
-    return [(STRAIGHT_S,), (0.4 * span.duration_s,), (span.duration_s / 6.0,)]
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Straight, and over two fifths and a sixth of the record.
+
+        The time that is fitted afterwards starts from the best of them.
+        """
+        return [(STRAIGHT_S,), (0.4 * span.duration_s,), (span.duration_s / 6.0,)]
 
 
 USUAL_DRIFT: Final = 1e-3
@@ -117,3 +97,32 @@ def reading_step(time_s: FloatArray, instant_s: float) -> FloatArray:
     """Return a step from 0 to 1 at an instant, at the readings; it lasts one interval."""
     interval = (time_s[-1] - time_s[0]) / max(len(time_s) - 1, 1)
     return np.asarray(np.clip((time_s - instant_s) / interval + 0.5, 0.0, 1.0))
+
+
+class Sudden(Effect):
+    """What happens at an instant; the instant is the shape."""
+
+    local = True
+    tried: ClassVar[int]
+    """Instants of the scan."""
+    turn: ClassVar[float] = 0.0
+    """Phase in rad between the four instants that are tried about each; 0 where one is enough."""
+    refined: ClassVar[bool] = True
+    """Whether a fit would get stuck between the scan's instants, so that it needs finer ones."""
+
+    def shapes(self, span: Span) -> list[tuple[float]]:
+        """Instants; where the effect depends on the phase at which it comes, at several phases."""
+        later = self.turn / span.pendulum.angular_frequency
+        phases = range(4 if self.turn else 1)
+        return [(float(time + k * later),) for time in span.times(self.tried) for k in phases]
+
+    def finer(self, span: Span, shape: Sequence[float]) -> list[tuple[float]]:
+        """Instants from one of the scan's neighbours to the other, an eighth cycle apart."""
+        if not self.refined:
+            return []
+        rough = span.times(self.tried)
+        place = int(np.argmin(np.abs(rough - shape[0])))
+        low = rough[max(place - 1, 0)]
+        high = rough[min(place + 1, self.tried - 1)] + 0.5 * span.period_s
+        number = min(int((high - low) / (0.125 * span.period_s)) + 2, 300)
+        return [(float(time),) for time in np.linspace(low, high, number)]

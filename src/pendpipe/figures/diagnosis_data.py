@@ -15,7 +15,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Diagnosis
 from pendpipe.diagnose.run import Outcome
-from pendpipe.effects.evaluated import Evaluated
+from pendpipe.effects.model import Evaluated
 from pendpipe.figures.data import NothingToDrawError
 
 NAMES = {"eq8": "Eq. 8", "viscous": "Eq. 3"}

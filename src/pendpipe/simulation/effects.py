@@ -23,7 +23,7 @@ class Given(NamedTuple):
 
     def named(self) -> dict[str, float]:
         """The values by their parameters' names."""
-        first = 1 if self.effect.switch else 0
+        first = 1 if self.effect.parameter_free else 0
         names = [parameter.name for parameter in self.effect.parameters]
         return dict(zip(names, self.values[first:].tolist(), strict=True))
 
@@ -51,7 +51,7 @@ def _read(place: str, table: dict[str, Any]) -> Given:
         if name not in known:
             raise InputError(place, f"unknown parameter '{name}'", nearest(name, known))
     values = [_value(place, parameter, table) for parameter in effect.parameters]
-    return Given(effect, np.array([1.0] * effect.switch + values))
+    return Given(effect, np.array([1.0] * effect.parameter_free + values))
 
 
 def _value(place: str, parameter: Parameter, table: Mapping[str, Any]) -> float:

@@ -25,7 +25,7 @@ def refuse_in_vain(model: Model, given: Sequence[Given], place: str) -> None:
     for number, one in enumerate(given, start=1):
         name = one.effect.identifier
         where = f"{place}, effects {number} ({name})"
-        if not one.effect.template and name in seen:
+        if not one.effect.has_signature and name in seen:
             raise InputError(where, "it is given before", "write one table of it")
         seen.add(name)
         lacking = _lacking(model, one)

@@ -176,7 +176,7 @@ def _angles(
     equation = model.pendulum.equation()
     release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
     taken = instrument.times(time)
-    templates = [one for one in given if one.effect.template]
+    templates = [one for one in given if one.effect.has_signature]
     if templates:
         from pendpipe.simulation.motion import angles
 

@@ -1,4 +1,4 @@
-"""Tones: a second mode, a second plane, a drive, and what the wiring picks up."""
+"""Other oscillations: a second mode, a second plane, a drive, what the wiring picks up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
-from pendpipe.effects.scan import rows, since_release
+from pendpipe.effects.scan import (
+    rows,
+    since_release,
+)
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -16,7 +19,8 @@ if TYPE_CHECKING:
     from pendpipe.dynamics.sampling import Sampled
 
 
-def _tone(values: FloatArray, phase: FloatArray) -> FloatArray:
+def tone_at(values: FloatArray, phase: FloatArray) -> FloatArray:
+    """Return q_c cos(phase) + q_s sin(phase), the sizes being the first two values."""
     total = np.zeros_like(phase)
     # A scan asks for one quadrature at a time.
     if values[0] != 0.0:
@@ -26,7 +30,8 @@ def _tone(values: FloatArray, phase: FloatArray) -> FloatArray:
     return total
 
 
-def _frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
+def tried_frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
+    """Return frequencies in Hz for a scan, in equal ratios up to near half the sampling rate."""
     return np.geomspace(low, 0.45 / span.interval_s, count)
 
 
@@ -57,13 +62,16 @@ class SecondMode(Effect):
     )
     sizes = 2
     spectral = True
-    deciding = "a second sensor on the stand, or another point of the rod; another release"
+    example = (1e-3, 2e-3, 4.3, 3.0)
+    discriminating_test = (
+        "a second sensor on the stand, or another point of the rod; another release"
+    )
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the decaying tone."""
         time = sampled.time_s - sampled.time_s[0]
         return np.asarray(
-            _tone(values, 2.0 * math.pi * values[2] * time) * np.exp(-time / values[3])
+            tone_at(values, 2.0 * math.pi * values[2] * time) * np.exp(-time / values[3])
         )
 
     def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float, float] | None:
@@ -73,7 +81,7 @@ class SecondMode(Effect):
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """A rough grid of frequencies above the pendulum's, and three times of decay."""
         lasts = span.duration_s * np.array([0.02, 0.1, 0.5])
-        return rows(_frequencies(span, 1.5 / span.period_s), lasts)
+        return rows(tried_frequencies(span, 1.5 / span.period_s), lasts)
 
 
 class PlaneCoupling(Effect):
@@ -96,14 +104,15 @@ class PlaneCoupling(Effect):
         Parameter("detuning", "Hz", -1e3, 1e3),
     )
     sizes = 2
-    deciding = "a second sensor across the first, or a longer record: beats must repeat"
+    example = (1e-3, 5e-4, 0.02)
+    discriminating_test = "a second sensor across the first, or a longer record: beats must repeat"
 
     def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the tone near the pendulum's own frequency."""
         time = sampled.time_s - sampled.time_s[0]
         envelope = sampled.amplitude / sampled.amplitude[0]
         return np.asarray(
-            envelope * _tone(values, sampled.phase + 2.0 * math.pi * values[2] * time)
+            envelope * tone_at(values, sampled.phase + 2.0 * math.pi * values[2] * time)
         )
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
@@ -136,11 +145,14 @@ class PeriodicDrive(SteadyTone):
         Parameter("d_sine", "rad/s^2", -100.0, 100.0, 0.0),
         Parameter("f_d", "Hz", 0.0, 1e6),
     )
-    deciding = "record the pendulum at rest: the tone must stay, and fall off above resonance"
+    example = (5e-4, 3e-4, 1.2)
+    discriminating_test = (
+        "record the pendulum at rest: the tone must stay, and fall off above resonance"
+    )
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return the drive, its time counted from the release."""
-        return _tone(values, 2.0 * math.pi * values[2] * since_release(motion, pendulum))
+        return tone_at(values, 2.0 * math.pi * values[2] * since_release(motion, pendulum))
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """A rough grid of frequencies about the pendulum's."""
@@ -148,24 +160,13 @@ class PeriodicDrive(SteadyTone):
         return rows([*np.linspace(0.3, 0.97, 8) * own, *np.geomspace(1.03, 4.0, 8) * own])
 
 
-class TonePickup(SteadyTone):
-    """A steady tone in the reading, the alias of the mains for instance."""
+class BroadbandDrive(Effect):
+    """Random torque (seismic, air): amplitude and phase walk, and never come to rest."""
 
-    identifier = "tone-pickup"
-    name = "tone in the reading"
-    kind = "measurement"
-    equation = r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t"
-    parameters = (
-        Parameter("a_cosine", "rad", -10.0, 10.0),
-        Parameter("a_sine", "rad", -10.0, 10.0, 0.0),
-        Parameter("f_a", "Hz", 0.0, 1e6),
-    )
-    deciding = "record with the pendulum held, and at another sampling rate: an alias moves"
-
-    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return the tone, its time counted from the first reading."""
-        return _tone(values, 2.0 * math.pi * values[2] * (sampled.time_s - sampled.time_s[0]))
-
-    def shapes(self, span: Span) -> list[tuple[float, ...]]:
-        """A rough grid of frequencies."""
-        return rows(_frequencies(span, 0.2 / span.period_s))
+    identifier = "broadband-drive"
+    name = "broadband drive"
+    kind = "dynamics"
+    equation = r"\ddot x \mathrel{+}= \xi(t), \quad S_\xi(f) = S_a"
+    parameters = (Parameter("acceleration_density", "(rad/s^2)^2/Hz", 0.0, 1e6),)
+    has_signature = False
+    discriminating_test = "record it at rest, and two pendulums at once: the walk does not repeat"

@@ -1,0 +1,73 @@
+"""The catalogue: every effect that is known, each declared once in a module of this package.
+
+A new effect is a class in one of these modules, or in a module of its own: whatever is defined
+here with an `identifier` is found.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from pendpipe.effects.effect import Effect
+from pendpipe.errors import InputError
+
+_FIRST: Final = (
+    "restoring", "damping", "contact", "fluid", "oscillations", "changes", "sensor", "time_base",
+    "noise",
+)  # fmt: skip
+"""The order of the manual: dynamics, then measurement. Other modules follow by name."""
+
+
+def _found() -> Iterator[Effect]:
+    """Yield an instance of every effect, module by module, as they are defined."""
+    names = [module.name for module in pkgutil.iter_modules(__path__)]
+    for name in sorted(names, key=lambda name: (*_FIRST, name).index(name)):
+        module = importlib.import_module(f"{__name__}.{name}")
+        for kind in vars(module).values():
+            if (
+                isinstance(kind, type)
+                and issubclass(kind, Effect)
+                and kind.__module__ == module.__name__
+                and hasattr(kind, "identifier")
+            ):
+                effect = kind()
+                # A variant of an entry, which only the diagnosis uses, has a key of its own.
+                if effect.key == effect.identifier:
+                    yield effect
+
+
+CATALOGUE: Final[tuple[Effect, ...]] = tuple(_found())
+"""In the order of the manual: dynamics, then measurement."""
+
+_BY_IDENTIFIER: Final = {effect.identifier: effect for effect in CATALOGUE}
+
+
+def by_identifier(name: str, place: str | Path = "effect") -> Effect:
+    """Return the effect of an identifier.
+
+    Parameters
+    ----------
+    name
+        Its identifier.
+    place
+        Where the name stands, for the message.
+
+    Raises
+    ------
+    InputError
+        If there is none; the nearest name is said.
+    """
+    found = _BY_IDENTIFIER.get(name)
+    if found is None:
+        close = difflib.get_close_matches(name, _BY_IDENTIFIER, n=1, cutoff=0.5)
+        nearest = f"did you mean '{close[0]}'?" if close else "see docs/effects.md for all names"
+        raise InputError(place, f"there is no effect '{name}'", nearest)
+    return found
+
+
+__all__ = ["CATALOGUE", "by_identifier"]
