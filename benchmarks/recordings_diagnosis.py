@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.recordings_known import KNOWN, KNOWN_VISCOUS, Known, cell
-from pendpipe.figures.units import compact, with_error
 from pendpipe.files import read_json
+from pendpipe.quantities import compact, with_error
 
 SHOWN = (
     ("adip", "frequency", "Frequency against amplitude"),

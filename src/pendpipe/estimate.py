@@ -23,6 +23,12 @@ class Estimate:
         ``value -+ 1.96 sd`` where none is given.
     at_bound
         Whether the estimate lies on the edge of what is possible (a, b, c = 0).
+
+    Examples
+    --------
+    >>> period = Estimate(2.006, 0.002, "s")
+    >>> period.bounds95
+    (2.00208007203..., 2.00991992796...)
     """
 
     value: float
@@ -31,12 +37,17 @@ class Estimate:
     interval95: tuple[float, float] | None = None
     at_bound: bool = False
 
+    @property
+    def bounds95(self) -> tuple[float, float]:
+        """The ends of the 95 % interval: `interval95`, else value -+ 1.96 sd."""
+        half = 1.959963984540054 * self.sd
+        return self.interval95 or (self.value - half, self.value + half)
+
     def as_json(self, *, full: bool = True) -> dict[str, Any]:
         """Return the form of fit.json; with ``full=False`` that of campaign.json."""
         if not full:
             return {"value": self.value, "sd": self.sd, "unit": self.unit}
-        half = 1.959963984540054 * self.sd
-        low, high = self.interval95 or (self.value - half, self.value + half)
+        low, high = self.bounds95
         return {
             "value": self.value,
             "sd": self.sd,

@@ -16,7 +16,7 @@ from pendpipe.figures import fig03, fig09
 from pendpipe.figures.campaign import draw_all
 from pendpipe.figures.data import read_decay
 from pendpipe.figures.style import save
-from pendpipe.figures.units import prefixed, with_error
+from pendpipe.quantities import prefixed, with_error
 
 PAPER = [f"fig{number:02d}" for number in range(3, 11)]
 

@@ -19,7 +19,7 @@ from pendpipe.figures.style import (
     plain_text,
     styled,
 )
-from pendpipe.figures.units import axis_unit, compact
+from pendpipe.quantities import axis_unit, compact
 
 MANY = 150
 """From this many points on they are drawn as pixels inside the SVG, to keep it small."""

@@ -12,7 +12,7 @@ from pendpipe.diagnose.result import FoundEffect
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREEN, INK, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import prefixed, pretty_unit
+from pendpipe.quantities import prefixed, pretty_unit
 
 
 @styled

@@ -13,7 +13,7 @@ from pendpipe.diagnose.cycles import Spans
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import axis_unit
+from pendpipe.quantities import axis_unit
 
 
 @styled

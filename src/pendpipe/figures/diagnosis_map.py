@@ -16,7 +16,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, VERMILION, WIDTH_IN, styled
-from pendpipe.figures.units import compact
+from pendpipe.quantities import compact
 
 PHASES: Final = 24
 _COLUMNS: Final = 90

@@ -15,7 +15,7 @@ from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import axis_unit
+from pendpipe.quantities import axis_unit
 
 _BANDS: Final = 500
 _HARMONICS: Final = 8

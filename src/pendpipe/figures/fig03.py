@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pendpipe.figures.data import NothingToDrawError, error, number
 from pendpipe.figures.style import BLUE, INK, figure_with_residuals, key_above, styled
-from pendpipe.figures.units import axis_unit, with_error
+from pendpipe.quantities import axis_unit, with_error
 
 
 @styled

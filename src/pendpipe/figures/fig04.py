@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pendpipe.figures.data import NothingToDrawError, error, number, series, used
 from pendpipe.figures.style import BLUE, GREY, INK, figure_with_residuals, styled
-from pendpipe.figures.units import with_error
+from pendpipe.quantities import with_error
 
 PERIODS_S = (15, 6, 4, 3, 2.5, 2, 1.5, 1)
 

@@ -16,7 +16,7 @@ from pendpipe.figures.style import (
     plain_text,
     styled,
 )
-from pendpipe.figures.units import axis_unit
+from pendpipe.quantities import axis_unit
 from pendpipe.recording import Recording
 
 

@@ -20,7 +20,7 @@ from pendpipe.figures.data import (
     used,
 )
 from pendpipe.figures.style import GREY, INK, branch, figure_with_residuals, key_above, styled
-from pendpipe.figures.units import with_error
+from pendpipe.quantities import with_error
 
 
 @styled

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pendpipe.arrays import FloatArray
 from pendpipe.figures.data import NothingToDrawError, error, number
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import axis_unit, prefixed
+from pendpipe.quantities import axis_unit, prefixed
 
 _UNITS: Final = {"a": "rad⁻¹ s⁻¹", "b": "s⁻¹", "c": "rad/s"}
 

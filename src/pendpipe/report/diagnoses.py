@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple
 from markupsafe import Markup
 
 from pendpipe.figures.data import number
-from pendpipe.figures.units import compact
 from pendpipe.files import read_json
+from pendpipe.quantities import compact
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.report.health import Health
 from pendpipe.report.records import without_folders

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pendpipe.figures.data import error, number
-from pendpipe.figures.units import with_error
+from pendpipe.quantities import with_error
 
 Comparison = Mapping[str, Any]
 

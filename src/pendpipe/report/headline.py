@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from pendpipe import physics
 from pendpipe.figures.data import Entry, error, number, used
-from pendpipe.figures.units import with_error
+from pendpipe.quantities import with_error
 from pendpipe.report.paper import NUMBERS, TYPICAL_FREQUENCY_HZ, Printed
 
 Comparison = Mapping[str, Any]

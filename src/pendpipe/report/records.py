@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 from pendpipe.figures.data import Entry, error, number
-from pendpipe.figures.units import compact, pretty_unit, with_error
+from pendpipe.quantities import compact, pretty_unit, with_error
 from pendpipe.report.health import Health, health
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pendpipe.figures.data import Entry, error, number, used
-from pendpipe.figures.units import with_error
+from pendpipe.quantities import with_error
 from pendpipe.report.health import STATES
 
 Comparison = Mapping[str, Any]

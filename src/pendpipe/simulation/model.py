@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -90,19 +90,30 @@ class Model(Section):
         return self
 
 
-def read_model(path: str | Path) -> Model:
-    """Read a model; a fault is one line with the nearest known name."""
-    place = Path(path)
-    try:
-        content = tomllib.loads(place.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(place, "there is no such file", "check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-        raise InputError(place, f"this is no TOML ({fault})", "mend it") from None
+def read_model(source: str | Path | Mapping[str, Any]) -> Model:
+    """Read a model from a TOML file, or check a mapping of the same form.
+
+    Raises
+    ------
+    InputError
+        For what the model can't have: the key and the nearest known name.
+    """
+    place = "model" if isinstance(source, Mapping) else Path(source)
+    content = source if isinstance(source, Mapping) else _toml(Path(source))
     try:
         return Model.model_validate(content)
     except ValidationError as fault:
         raise as_input_error(place, fault, Model) from None
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(path, "there is no such file", "check the path") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise InputError(path, f"this is no TOML ({problem})", "correct it") from None
 
 
 def simulate(model: Model, source: str = "simulated", place: str = "the model") -> Recording:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
@@ -15,6 +15,14 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+    from pendpipe.analysis.turning_points import TurningPoints
+    from pendpipe.dynamics import Eq8
+    from pendpipe.recording import Recording
 
 Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
@@ -35,7 +43,7 @@ def units(unit: str) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FitResult:
     """What one recording says of a, b, c and the rest.
 
@@ -70,6 +78,9 @@ class FitResult:
         The law's loss beside that of the turning points, the large amplitude first.
     light, light_reason
         How far the numbers may be believed (`decrement.light_of`), and why.
+    points, decay
+        The turning points and the readings of the fitted decay; None where the fit was read
+        from a file.
     """
 
     method: Method
@@ -93,6 +104,89 @@ class FitResult:
     decrement_check: tuple[Decrement, ...] = ()
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
+    points: TurningPoints | None = field(default=None, repr=False, compare=False)
+    decay: Recording | None = field(default=None, repr=False, compare=False)
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return one parameter: ``fit["b"].value``, ``fit["b"].sd``."""
+        return self.parameters[name]
+
+    def __str__(self) -> str:
+        """Return the light, what can be quoted, and how to quote it."""
+        from pendpipe.analysis.fit.summary import lines
+
+        return "\n".join(lines(self))
+
+    def __repr__(self) -> str:
+        """Return the numbers in one line."""
+        numbers = ", ".join(
+            f"{name}={entry.value:.6g}+-{entry.sd:.2g}" for name, entry in self.parameters.items()
+        )
+        return f"FitResult({self.light}: {numbers})"
+
+    def _repr_html_(self) -> str:
+        """Return the summary for a notebook."""
+        from html import escape
+
+        return f"<pre>{escape(str(self))}</pre>"
+
+    @property
+    def law(self) -> Eq8:
+        """Eq. 8 with the fitted numbers; b is halved where its parts are not known."""
+        from pendpipe.dynamics import Eq8
+
+        b, held = self.value("b"), self.quality_factor_hysteretic
+        share = 0.5 * b if held is None else math.pi * self.value("frequency") / held.value
+        hysteretic = min(max(share, 0.0), b)
+        return Eq8(
+            2.0 * math.pi * self.value("frequency"),
+            self.value("a"),
+            hysteretic,
+            b - hysteretic,
+            self.value("c"),
+            restoring=self.restoring,
+        )
+
+    def plot(self) -> Figure:
+        """Draw the decay with its fit, what the fit leaves, and Q against amplitude."""
+        from pendpipe.figures.fit import draw_fit
+
+        if self.points is None or self.decay is None:
+            raise InputError("plot", "the readings are not with this fit", "fit the recording anew")
+        return draw_fit(self, self.points, self.decay)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``fit.json``."""
+        return self.as_json()
+
+    def to_frame(self) -> DataFrame:
+        """Return a table with a row a parameter: value, sd, low95, high95, unit."""
+        from pandas import DataFrame
+
+        rows = [
+            (name, entry.value, entry.sd, *entry.bounds95, entry.unit)
+            for name, entry in self.parameters.items()
+        ]
+        columns = ["parameter", "value", "sd", "low95", "high95", "unit"]
+        return DataFrame(rows, columns=columns).set_index("parameter")
+
+    def save(self, folder: str | Path) -> Path:
+        """Write ``fit.json`` and, with the readings, ``turning_points.csv`` and ``fit.svg``.
+
+        Returns the folder, which is made where it does not exist.
+        """
+        from pendpipe.analysis.turning_points import write_turning_points
+        from pendpipe.files import make_folder, write_json
+
+        target = Path(folder)
+        make_folder(target)
+        write_json(target / "fit.json", self.as_json())
+        if self.points is not None and self.decay is not None:
+            from pendpipe.figures.style import save
+
+            write_turning_points(target / "turning_points.csv", self.points)
+            save(self.plot(), target / "fit")
+        return target
 
     def value(self, name: str) -> float:
         """Value of one parameter."""

@@ -1,4 +1,4 @@
-"""The SI prefix that keeps an axis free of powers of ten."""
+"""How a number is printed: with its unit, an SI prefix, and its error."""
 
 from __future__ import annotations
 

@@ -1,0 +1,183 @@
+"""What a fit answers: Q, the period and the dominant loss at the amplitudes of the decay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.decrement import loss_of
+from pendpipe.dynamics import Release, turning_points
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact, with_error
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+LOSSES: Final = {
+    "quadratic": "drag that grows with the square of the speed (a)",
+    "linear": "viscous and hysteretic loss (b)",
+    "coulomb": "dry friction (c)",
+}
+
+
+class Quality(NamedTuple):
+    """The quality factor at one amplitude, with what loses most there."""
+
+    amplitude_rad: float
+    quality_factor: Estimate
+    """pi/(T loss): T the period and loss the relative loss of amplitude at this amplitude."""
+    period_s: float
+    dominant: str
+    """A key of `LOSSES`."""
+    share: float
+    """The dominant loss over all losses."""
+
+
+def qualities(result: FitResult) -> list[Quality]:
+    """Evaluate the fitted law at a large, a middle and a small amplitude of the decay."""
+    first = result.parameters["amplitude"].value
+    seen = [check.amplitude_rad for check in result.decrement_check] or [first]
+    return [_quality(result, amplitude) for amplitude in seen]
+
+
+def _quality(result: FitResult, amplitude: float) -> Quality:
+    law = result.law
+    parts = {
+        "quadratic": replace(law, hysteretic=0.0, viscous=0.0, coulomb=0.0),
+        "linear": replace(law, quadratic=0.0, coulomb=0.0),
+        "coulomb": replace(law, quadratic=0.0, hysteretic=0.0, viscous=0.0),
+    }
+    losses = {name: loss_of(part, amplitude) for name, part in parts.items()}
+    loss = loss_of(law, amplitude)
+    dominant = max(losses, key=lambda name: losses[name])
+    period = period_of(result, amplitude)
+    value = math.pi / (period * loss) if loss > 0.0 else math.inf
+    error = Estimate(value, value * _relative_sd(result, amplitude), "")
+    return Quality(amplitude, error, period, dominant, losses[dominant] / sum(losses.values()))
+
+
+def _relative_sd(result: FitResult, amplitude: float) -> float:
+    """Relative standard deviation of a y + b + c/y, from the covariance of the three."""
+    place = [result.covariance_order.index(name) for name in "abc"]
+    slope = np.array([amplitude, 1.0, 1.0 / amplitude])
+    variance = float(slope @ result.covariance[np.ix_(place, place)] @ slope)
+    loss = float(slope @ [result.value(name) for name in "abc"])
+    return math.sqrt(max(variance, 0.0)) / loss if loss > 0.0 else math.inf
+
+
+def period_of(result: FitResult, amplitude: float) -> float:
+    """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
+    law = replace(result.law, quadratic=0.0, hysteretic=0.0, viscous=0.0, coulomb=0.0)
+    try:
+        cycle = turning_points(law, Release(0.0, amplitude), count=3)
+    except ValueError:
+        return 1.0 / result.value("frequency")
+    return float(cycle.time_s[2])
+
+
+def small_period(result: FitResult) -> Estimate:
+    """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes."""
+    frequency = result.parameters["frequency"]
+    return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
+
+
+def gravity_or_length(
+    result: FitResult, *, length_m: Estimate | None = None, gravity: Estimate | None = None
+) -> tuple[str, Estimate, float]:
+    """Find g from the length of a simple pendulum, or its length from g: omega^2 = g/l.
+
+    Parameters
+    ----------
+    result
+        A fit of angles.
+    length_m, gravity
+        The one that is known, m or m/s^2.
+
+    Returns
+    -------
+    name, estimate, correction
+        ``"g"`` or ``"length"``, its value, and the relative correction for the finite amplitude
+        that was applied: omega_0/omega = 2 K(sin(y/2))/pi at the root-mean-square amplitude. It is
+        0 where the fit has the torque of sin x, whose omega is that of small amplitudes.
+    """
+    omega = 2.0 * math.pi * result.value("frequency")
+    relative = result.parameters["frequency"].sd / result.value("frequency")
+    correction = 0.0
+    if result.restoring == "linear":
+        squares = [quality.amplitude_rad**2 for quality in qualities(result)]
+        amplitude = math.sqrt(sum(squares) / len(squares))
+        correction = 1.0 / _mean_of_arithmetic_and_geometric(math.cos(0.5 * amplitude)) - 1.0
+    omega *= 1.0 + correction
+    if length_m is not None:
+        value = omega**2 * length_m.value
+        sd = value * math.hypot(2.0 * relative, length_m.sd / length_m.value)
+        return "g", Estimate(value, sd, "m/s^2"), correction
+    assert gravity is not None
+    value = gravity.value / omega**2
+    sd = value * math.hypot(2.0 * relative, gravity.sd / gravity.value)
+    return "length", Estimate(value, sd, "m"), correction
+
+
+def _mean_of_arithmetic_and_geometric(one: float, other: float = 1.0) -> float:
+    """AGM(1, cos(y/2)) = pi/(2 K(sin(y/2))): the frequency at amplitude y over the small one."""
+    while abs(one - other) > 1e-15:
+        one, other = 0.5 * (one + other), math.sqrt(one * other)
+    return one
+
+
+def lines(result: FitResult) -> list[str]:
+    """Print a fit: the light first, then what can be quoted, each with its error."""
+    found = [f"{result.light}: {result.light_reason}"]
+    unit = result.parameters["amplitude"].unit
+    torque = " with the torque of sin x" if result.restoring == "sine" else ""
+    equation = "Eq. 14" if result.method == "turning-points" else f"Eq. 8{torque}"
+    found.append(
+        f"  {equation} fitted to {result.turning_points} turning points"
+        if result.method == "turning-points"
+        else f"  {equation} fitted to {result.samples} readings"
+    )
+    if result.light == "red":
+        found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
+        return [*found, "  " + quotable(result)]
+    period = small_period(result)
+    name = "period, small amplitude" if result.restoring == "sine" else "period"
+    found.append(_line(name, with_error(period.value, period.sd, "s", short=True)))
+    for letter in "abc":
+        found.append(_line(letter, _rate(result.parameters[letter])))
+    for each in qualities(result):
+        q = with_error(each.quality_factor.value, each.quality_factor.sd, short=True)
+        found.append(
+            _line(
+                f"Q at {compact(each.amplitude_rad, unit)}",
+                f"{q}, {100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
+            )
+        )
+    return [*found, "  " + quotable(result)]
+
+
+def _line(name: str, value: str) -> str:
+    return f"  {name:<26}{value}"
+
+
+def _rate(rate: Estimate) -> str:
+    """A rate with its error, or its upper limit where it lies at zero."""
+    if rate.at_bound and rate.interval95 is not None:
+        return f"below {compact(rate.interval95[1], rate.unit)} (95 %)"
+    return with_error(rate.value, rate.sd, rate.unit, short=True)
+
+
+def quotable(result: FitResult) -> str:
+    """Advise which of the numbers to quote."""
+    if result.light == "green":
+        return "Quote these numbers with their errors."
+    if result.light == "red":
+        return "Quote none of a, b, c: run pendpipe diagnose to learn what the law lacks."
+    if result.chi2_per_dof > 2.0:
+        return (
+            "Quote Q at these amplitudes. Physics is missing from the law, so quote a, b and c only"
+            " after pendpipe diagnose has been asked what it is."
+        )
+    return "Quote Q at these amplitudes. a, b and c can replace each other: quote all three."

@@ -1,0 +1,267 @@
+"""The front door: from arrays or a file to a fit and a diagnosis.
+
+`import pendpipe as pp` offers everything here; the commands call the same functions. Heavy
+packages are imported by the function that needs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pendpipe.recording import Recording
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import Baseline, FitResult, Method
+    from pendpipe.analysis.free_decay import FreeDecay
+    from pendpipe.analysis.turning_points import TurningPoints
+    from pendpipe.formats import Inspection
+
+Source = Recording | str | Path
+
+
+def read(
+    path: str | Path,
+    *,
+    channel: str | int | None = None,
+    column: str | int | None = None,
+    unit: str | None = None,
+    sample_rate: float | None = None,
+    decimal: str | None = None,
+    delimiter: str | None = None,
+    volts_per_radian: float | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+) -> Recording:
+    """Read a recording from a file in any supported format.
+
+    The layout is guessed, and each guess stands in the recording's `notes`. The options
+    replace a wrong guess; they are those of the commands (``pendpipe inspect --help``).
+
+    Parameters
+    ----------
+    path
+        CSV in most dialects, WinDaq, MATLAB, Excel, ...
+    channel, column
+        What to read, by name or by number from 1; ``"time:reading"`` names both columns,
+        ``"x,y"`` a position seen from the pivot.
+    unit
+        Unit of the readings (``"deg"``, ``"mV"``), or of both columns (``"ms:deg"``).
+    sample_rate
+        Samples a second, in Hz, instead of the time column.
+    decimal, delimiter
+        The decimal sign; what separates the columns.
+    volts_per_radian
+        The sensor's constant, V/rad.
+    start, stop
+        The part to read, in s on the file's clock.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read: the file and line, what is wrong, what to do.
+
+    Examples
+    --------
+    >>> recording = read("examples/string-pendulum.csv")
+    >>> recording
+    Recording(3600 samples of angle_rad, 0 to 119.967 s)
+    >>> read("examples/string-pendulum.csv", unit="rad", stop=60).values.max().round(1)
+    30.7
+    """
+    from pendpipe.formats import read as read_file
+
+    return read_file(
+        path,
+        _options(
+            channel=channel,
+            column=column,
+            unit=unit,
+            sample_rate=sample_rate,
+            decimal=decimal,
+            delimiter=delimiter,
+            volts_per_radian=volts_per_radian,
+            start_s=start,
+            stop_s=stop,
+        ),
+    )
+
+
+def inspect(path: str | Path, **options: Any) -> Inspection:
+    """Describe a file: format, channels, rate, gaps, clipping, and what was guessed.
+
+    Parameters
+    ----------
+    path
+        As for `read`.
+    **options
+        As for `read`.
+
+    Examples
+    --------
+    >>> found = inspect("examples/string-pendulum.csv")
+    >>> round(found.sample_rate_hz, 3), found.unit
+    (30.0, 'rad')
+    """
+    from pendpipe.formats import inspect as inspect_file
+
+    names = {"start": "start_s", "stop": "stop_s"}
+    return inspect_file(
+        path, _options(**{names.get(name, name): value for name, value in options.items()})
+    )
+
+
+def find_free_decay(recording: Source) -> FreeDecay:
+    """Find the part of a recording in which the pendulum swings by itself.
+
+    Returns
+    -------
+    FreeDecay
+        ``start_s``, ``stop_s``, and the ``cuts`` with their reasons.
+
+    Raises
+    ------
+    NotAnalysableError
+        If there is none: rest, a drive, or fewer than three half cycles.
+
+    Examples
+    --------
+    >>> decay = find_free_decay("examples/rod-pendulum.csv")
+    >>> decay.half_cycles
+    105
+    """
+    from pendpipe.analysis.free_decay import find_free_decay as find
+
+    return find(_motion(recording), _place(recording))
+
+
+def turning_points(recording: Source) -> TurningPoints:
+    """Find the free decay of a recording and measure its turning points.
+
+    Each turning point uses all the samples of its half cycle and has a standard deviation.
+
+    Examples
+    --------
+    >>> points = turning_points("examples/rod-pendulum.csv")
+    >>> len(points), points.amplitude_rad[0].round(4)
+    (105, 0.0862)
+    """
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+
+    return measure_recording(_motion(recording), _place(recording))[0]
+
+
+def fit(
+    recording: Source,
+    *,
+    method: Method | None = None,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    volts_per_radian: float | None = None,
+    points: TurningPoints | None = None,
+) -> FitResult:
+    """Fit a, b, c, frequency and amplitude to the free decay of a recording.
+
+    Eq. 8 is fitted to all readings of the decay. Where its law contradicts the decrement of the
+    turning points, Eq. 14 is fitted to these instead. ``fit.light`` is green, amber or red, and
+    ``fit.light_reason`` explains it (docs/fit.md).
+
+    Parameters
+    ----------
+    recording
+        A recording, or the path of its file.
+    method
+        ``"waveform"`` or ``"turning-points"`` to have only that one.
+    baseline
+        ``"eq8"``, or ``"viscous"`` for Eq. 3 (a = c = 0).
+    fixed
+        Parameters to hold, by name: ``{"a": 0.0}``.
+    volts_per_radian
+        The sensor's constant, where the readings are volts and do not carry it.
+    points
+        Turning points measured before (`turning_points`): they name the decay.
+
+    Returns
+    -------
+    FitResult
+        ``fit["b"].value`` and ``.sd`` in SI units and radians; prints as a short table;
+        ``.plot()``, ``.to_dict()``, ``.to_frame()``, ``.save(folder)``.
+
+    Raises
+    ------
+    InputError
+        If there is no free decay, or the search did not settle.
+
+    Examples
+    --------
+    >>> result = fit("examples/rod-pendulum.csv")
+    >>> print(result)
+    """
+    from dataclasses import replace
+
+    from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+
+    place, motion = _place(recording), _motion(recording, volts_per_radian)
+    if points is None:
+        points, decay = measure_recording(motion, place)
+    else:
+        decay = motion.between(points.start_s, points.stop_s)
+    result = fit_recording(
+        decay, points=points, method=method, baseline=baseline, fixed=fixed, place=place
+    )
+    cuts = tuple(cut._asdict() for cut in points.cuts)
+    return replace(result, cuts=cuts, points=points, decay=decay)
+
+
+def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) -> Recording:
+    """Simulate a recording from a described pendulum and measurement chain.
+
+    Parameters
+    ----------
+    model
+        A TOML file like ``config/model.toml``, or its content as a mapping.
+    seed
+        Seed of the noise, instead of the model's.
+
+    Examples
+    --------
+    >>> recording = simulate(
+    ...     {
+    ...         "pendulum": {"frequency_hz": 0.5, "c": 1e-3, "release_angle_rad": 0.1},
+    ...         "sampling": {"sample_rate_hz": 50.0, "duration_s": 20.0},
+    ...     }
+    ... )
+    >>> recording
+    Recording(1000 samples of angle_rad, 0 to 19.98 s)
+    """
+    from pendpipe.simulation.model import read_model
+    from pendpipe.simulation.model import simulate as simulate_model
+
+    described = read_model(model)
+    if seed is not None:
+        described = described.model_copy(update={"seed": seed})
+    name = "model" if isinstance(model, Mapping) else Path(model).name
+    return simulate_model(described, f"simulated: {name}", place=name)
+
+
+def _options(**given: Any) -> Any:
+    """Turn the overrides into the readers' options; numbers of columns are words there."""
+    from pendpipe.formats import ReadOptions
+
+    for name in ("channel", "column"):
+        if isinstance(given.get(name), int):
+            given[name] = str(given[name])
+    return ReadOptions(**given)
+
+
+def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:
+    """Return the recording in radians (or metres), read from its file where it is one."""
+    read_in = recording if isinstance(recording, Recording) else read(recording)
+    return read_in.as_motion(volts_per_radian, _place(recording))
+
+
+def _place(recording: Source) -> str:
+    """Name the recording in messages."""
+    return "recording" if isinstance(recording, Recording) else str(recording)
