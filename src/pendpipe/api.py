@@ -160,6 +160,7 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     volts_per_radian: float | None = None,
     points: TurningPoints | None = None,
+    name: str | None = None,
 ) -> FitResult:
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
@@ -181,6 +182,8 @@ def fit(
         The sensor's constant, where the readings are volts and do not carry it.
     points
         Turning points measured before (`turning_points`): they name the decay.
+    name
+        What to call the recording in messages; by default its path.
 
     Returns
     -------
@@ -203,7 +206,7 @@ def fit(
     from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
-    place, motion = _place(recording), _motion(recording, volts_per_radian)
+    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     if points is None:
         points, decay = measure_recording(motion, place)
     else:

@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from pendpipe.recording import Recording
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare FILE and the overrides of a reader's guesses."""
-    parser.add_argument(
-        "file", metavar="FILE", help="a recording in any supported format; - is standard input"
-    )
+def add_arguments(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """Declare FILE (or `several`, as ``files``) and the overrides of a reader's guesses."""
+    about = "a recording in any supported format; - is standard input"
+    if several:
+        parser.add_argument("files", metavar="FILE", nargs="+", help=about)
+    else:
+        parser.add_argument("file", metavar="FILE", help=about)
     group = parser.add_argument_group("where a guess is wrong")
     group.add_argument("--channel", metavar="CHANNEL", help="number (from 1) or name, see inspect")
     group.add_argument(

@@ -1,9 +1,8 @@
-"""Fit a, b, c, frequency, amplitude, phase and offset of one free decay.
+"""Fit a, b, c, Q and the period of free decays.
 
---method turning-points fits Eq. 14 to the turning points (the paper's way); --method
-waveform fits Eq. 8 to all readings, starting from there. --method auto, the default, takes the
-waveform, and the turning points where the waveform's law contradicts the decay. --fix holds a
-parameter, so that a prediction is compared with the recording.
+One FILE prints its fit; several print a table, a line a recording. --method waveform fits Eq. 8
+to all readings, --method turning-points fits Eq. 14 to the turning points (the paper's way), and
+auto, the default, takes the turning points only where the waveform's law contradicts the decay.
 
 The light compares the fitted law's loss with the decrement of the turning points at three
 amplitudes. green: they agree, and noise explains the rest. amber: they agree, but the readings
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendpipe.commands import _reading
 from pendpipe.commands._campaign import add_record
+from pendpipe.errors import InputError
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit import FitResult
@@ -27,24 +27,30 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe fit``."""
-    _reading.add_arguments(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="JSON", help="the result")
+    _reading.add_arguments(parser, several=True)
+    parser.add_argument("--out", metavar="JSON", help="the result; - is standard output")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the summary")
     parser.add_argument(
-        "--method",
-        choices=("auto", "waveform", "turning-points"),
-        default="auto",
-        help="%(default)s",
+        "--figure",
+        type=Path,
+        metavar="FILE",
+        help="draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
     )
     parser.add_argument(
-        "--accept",
-        action="store_true",
-        help="print a law that contradicts the decay, and end with 0",
+        "--length", type=float, metavar="M", help="length of a simple pendulum, m: prints g"
+    )
+    parser.add_argument(
+        "--gravity", type=float, metavar="G", help="g in m/s^2: prints the equivalent length"
+    )
+    parser.add_argument("--method", choices=("auto", "waveform", "turning-points"), default="auto")
+    parser.add_argument(
+        "--accept", action="store_true", help="print a law that contradicts the decay, status 0"
     )
     parser.add_argument(
         "--baseline",
         choices=("eq8", "viscous"),
         default="eq8",
-        help="eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
+        help="eq8: Eq. 8 (default); viscous: Eq. 3, a = c = 0",
     )
     parser.add_argument(
         "--fix",
@@ -60,104 +66,155 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="noted; the fit draws no numbers")
+    parser.add_argument("--seed", type=int, metavar="N", help="recorded only")
     add_record(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fit and write."""
+    """Fit and print; write what is asked for."""
+    if len(arguments.files) > 1:
+        return _table(arguments)
+    arguments.file = arguments.files[0]
+    if arguments.record is not None or arguments.refused is not None:
+        return _stage(arguments)
+    _check_figure(arguments.figure)
+    result = _fit(arguments)
+    if result.light == "red":
+        remedy = "see pendpipe diagnose; --accept prints the law all the same"
+        print(f"pendpipe: {arguments.file}: {result.light_reason}; {remedy}", file=sys.stderr)
+    if arguments.out and arguments.out != "-":
+        _write(arguments, result)
+    if arguments.figure:
+        _draw(arguments.figure, result)
+    if arguments.json or arguments.out == "-":
+        _print_json(result.to_dict())
+    else:
+        _print(arguments, result)
+    return _status(arguments, result)
+
+
+def _stage(arguments: argparse.Namespace) -> int:
+    """Fit one record of a campaign; a red light stands in the result and stops nothing."""
     from pendpipe.stages.refusal import run_stage
 
-    lights: list[str] = []
-    status = run_stage(
+    if not arguments.out:
+        raise InputError("--out", "a record's fit needs a file", "give --out fit.json")
+    return run_stage(
         "fit",
         arguments.record,
-        lambda: lights.append(_fit(arguments)),
-        outputs=[arguments.out],
+        lambda: _write(arguments, _fit(arguments)),
+        outputs=[Path(arguments.out)],
         refused=arguments.refused,
         inputs=[Path(arguments.file), arguments.calibration, arguments.turning_points],
     )
-    # In a campaign the light stands in the result, and the other records go on.
-    contradicted = "red" in lights and not arguments.accept and arguments.refused is None
-    return 2 if contradicted else status
 
 
-def _fit(arguments: argparse.Namespace) -> str:
+def _fit(arguments: argparse.Namespace) -> FitResult:
     from dataclasses import replace
 
-    from pendpipe.analysis.fit import fit_recording
+    from pendpipe import api
     from pendpipe.analysis.fit.fixed import parse_fixed
     from pendpipe.analysis.turning_points import read_turning_points
     from pendpipe.commands._motion import read_motion
-    from pendpipe.files import write_json
 
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments)
-    if arguments.turning_points is not None:
-        points = read_turning_points(arguments.turning_points)
-        part = recording.between(points.start_s, points.stop_s)
-    else:
-        from pendpipe.analysis.turning_points.recorded import measure_recording
-
-        points, part = measure_recording(recording, arguments.file)
-    result = fit_recording(
-        part,
+    points = arguments.turning_points and read_turning_points(arguments.turning_points)
+    result = api.fit(
+        recording,
         points=points,
         method=None if arguments.method == "auto" else arguments.method,
         baseline=arguments.baseline,
         fixed=fixed,
-        place=arguments.file,
+        name=arguments.file,
     )
-    result = replace(
+    return replace(
         result,
-        cuts=tuple(cut._asdict() for cut in points.cuts),
-        provenance=_provenance(arguments, provenance),
+        provenance={
+            "input_sha256": provenance["input_sha256"],
+            "version": provenance["version"],
+            "seed": arguments.seed,
+            "volts_per_radian": provenance["volts_per_radian"],
+            "fixed": list(arguments.fix),
+        },
     )
-    write_json(arguments.out, result.as_json())
-    if result.light == "red":
-        remedy = "see pendpipe diagnose; --accept prints the law all the same"
-        print(f"pendpipe: {arguments.file}: {result.light_reason}; {remedy}", file=sys.stderr)
+
+
+def _write(arguments: argparse.Namespace, result: FitResult) -> None:
+    from pendpipe.files import write_json
+
+    write_json(Path(arguments.out), result.to_dict())
     for warning in result.warnings:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
-    print(_statement(arguments.out, result, law=result.light != "red" or arguments.accept))
-    return result.light
 
 
-def _provenance(arguments: argparse.Namespace, provenance: dict[str, Any]) -> dict[str, Any]:
-    """What the result must say of its making."""
-    return {
-        "input_sha256": provenance["input_sha256"],
-        "version": provenance["version"],
-        "seed": arguments.seed,
-        "volts_per_radian": provenance["volts_per_radian"],
-        "fixed": list(arguments.fix),
-    }
+def _check_figure(path: Path | None) -> None:
+    """Refuse a form that nobody can draw before the file is written."""
+    if path is not None and path.suffix not in (".svg", ".png"):
+        raise InputError(f"--figure {path}", "its form is unknown", "end its name in .svg or .png")
 
 
-def _statement(out: Path, result: FitResult, *, law: bool) -> str:
-    """The light with its reason, the numbers a line each (with `law`), and the check."""
-    lines = [
-        f"{result.light}: {result.light_reason}",
-        f"{out}: {result.method}, {result.restoring} restoring torque,"
-        f" {result.turning_points} turning points",
-    ]
-    if law:
-        lines += _numbers(result)
-    unit = result.parameters["amplitude"].unit
-    for check in result.decrement_check:
-        lines.append(f"  {'decrement_check':<22}{check.sentence(unit)}")
-    return "\n".join(lines)
+def _draw(path: Path, result: FitResult) -> None:
+    from pendpipe.figures.style import save
+
+    save(result.plot(), path.with_suffix(""), forms=[path.suffix[1:]])
 
 
-def _numbers(result: FitResult) -> list[str]:
-    lines = []
-    for name, estimate in result.parameters.items():
-        bound = " (at its bound)" if estimate.at_bound else ""
-        lines.append(
-            f"  {name:<22}{estimate.value:.8g} +- {estimate.sd:.2g} {estimate.unit}{bound}"
-        )
-    limit = result.quality_factor_limit
-    if limit is not None:
-        lines.append(f"  {'quality_factor_limit':<22}{limit.value:.6g} +- {limit.sd:.2g}")
-    lines.append(f"  {'chi2_per_dof':<22}{result.chi2_per_dof:.4g}")
-    return lines
+def _print(arguments: argparse.Namespace, result: FitResult) -> None:
+    """Print the summary."""
+    from pendpipe.analysis.fit.summary import lines
+
+    printed = lines(result, law=result.light != "red" or arguments.accept)
+    if arguments.length or arguments.gravity:
+        printed.insert(-1, _gravity_or_length(arguments, result))
+    print("\n".join(printed))
+
+
+def _gravity_or_length(arguments: argparse.Namespace, result: FitResult) -> str:
+    from pendpipe.analysis.fit.summary import gravity_line
+
+    for option, value in (("--length", arguments.length), ("--gravity", arguments.gravity)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError(option, f"{value} is no length or acceleration", "give one above 0")
+    return gravity_line(result, length_m=arguments.length, gravity=arguments.gravity)
+
+
+def _status(arguments: argparse.Namespace, result: FitResult) -> int:
+    return 2 if result.light == "red" and not arguments.accept else 0
+
+
+def _table(arguments: argparse.Namespace) -> int:
+    """Fit several recordings; what can't be fitted gets its reason, and the others go on."""
+    from pendpipe.analysis.fit.summary import row, table
+
+    for option in ("out", "figure", "turning_points", "record"):
+        if getattr(arguments, option):
+            name = option.replace("_", "-")
+            raise InputError(f"--{name}", "it belongs to one FILE", "fit that file alone")
+    status, found, rows = 0, [], []
+    for file in arguments.files:
+        arguments.file = file
+        try:
+            result = _fit(arguments)
+        except InputError as problem:
+            print(f"pendpipe: {problem}", file=sys.stderr)
+            found.append({"file": file, "error": str(problem)})
+            rows.append(row(file, None))
+            status = 2
+            continue
+        found.append({"file": file, **result.to_dict()})
+        rows.append(row(file, result))
+        status = max(status, _status(arguments, result))
+    if arguments.json:
+        _print_json({"schema_version": 1, "fits": found})
+    else:
+        print(table(rows))
+    return status
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    import json
+
+    from pendpipe.files import finite
+
+    print(json.dumps(finite(content), indent=1, ensure_ascii=False))

@@ -84,10 +84,10 @@ def small_period(result: FitResult) -> Estimate:
     return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
 
 
-def gravity_or_length(
-    result: FitResult, *, length_m: Estimate | None = None, gravity: Estimate | None = None
-) -> tuple[str, Estimate, float]:
-    """Find g from the length of a simple pendulum, or its length from g: omega^2 = g/l.
+def gravity_line(
+    result: FitResult, *, length_m: float | None = None, gravity: float | None = None
+) -> str:
+    """Print g from the length of a simple pendulum, or its length from g: omega_0^2 = g/l.
 
     Parameters
     ----------
@@ -96,40 +96,46 @@ def gravity_or_length(
     length_m, gravity
         The one that is known, m or m/s^2.
 
-    Returns
-    -------
-    name, estimate, correction
-        ``"g"`` or ``"length"``, its value, and the relative correction for the finite amplitude
-        that was applied: omega_0/omega = 2 K(sin(y/2))/pi at the root-mean-square amplitude. It is
-        0 where the fit has the torque of sin x, whose omega is that of small amplitudes.
+    Notes
+    -----
+    With the torque of sin x the fitted omega is omega_0, that of small amplitudes. Otherwise
+    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square amplitude y, and the line names this
+    correction.
     """
     omega = 2.0 * math.pi * result.value("frequency")
-    relative = result.parameters["frequency"].sd / result.value("frequency")
-    correction = 0.0
+    relative = 2.0 * result["frequency"].sd / result.value("frequency")
+    corrected = ""
     if result.restoring == "linear":
         squares = [quality.amplitude_rad**2 for quality in qualities(result)]
         amplitude = math.sqrt(sum(squares) / len(squares))
-        correction = 1.0 / _mean_of_arithmetic_and_geometric(math.cos(0.5 * amplitude)) - 1.0
-    omega *= 1.0 + correction
+        factor = 1.0 / _arithmetic_geometric_mean(math.cos(0.5 * amplitude))
+        omega *= factor
+        corrected = f", finite-amplitude correction {100.0 * (factor**2 - 1.0):+.2g} % included"
     if length_m is not None:
-        value = omega**2 * length_m.value
-        sd = value * math.hypot(2.0 * relative, length_m.sd / length_m.value)
-        return "g", Estimate(value, sd, "m/s^2"), correction
-    assert gravity is not None
-    value = gravity.value / omega**2
-    sd = value * math.hypot(2.0 * relative, gravity.sd / gravity.value)
-    return "length", Estimate(value, sd, "m"), correction
+        value, name, unit = omega**2 * length_m, "g", "m/s^2"
+    else:
+        assert gravity is not None
+        value, name, unit = gravity / omega**2, "length", "m"
+    return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
 
 
-def _mean_of_arithmetic_and_geometric(one: float, other: float = 1.0) -> float:
+def _arithmetic_geometric_mean(one: float, other: float = 1.0) -> float:
     """AGM(1, cos(y/2)) = pi/(2 K(sin(y/2))): the frequency at amplitude y over the small one."""
     while abs(one - other) > 1e-15:
         one, other = 0.5 * (one + other), math.sqrt(one * other)
     return one
 
 
-def lines(result: FitResult) -> list[str]:
-    """Print a fit: the light first, then what can be quoted, each with its error."""
+def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
+    """Print a fit: the light first, then what can be quoted, each with its error.
+
+    Parameters
+    ----------
+    result
+        The fit.
+    law
+        Whether to print a, b, c; by default unless the light is red.
+    """
     found = [f"{result.light}: {result.light_reason}"]
     unit = result.parameters["amplitude"].unit
     torque = " with the torque of sin x" if result.restoring == "sine" else ""
@@ -139,7 +145,7 @@ def lines(result: FitResult) -> list[str]:
         if result.method == "turning-points"
         else f"  {equation} fitted to {result.samples} readings"
     )
-    if result.light == "red":
+    if not (result.light != "red" if law is None else law):
         found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
         return [*found, "  " + quotable(result)]
     period = small_period(result)
@@ -181,3 +187,35 @@ def quotable(result: FitResult) -> str:
             " after pendpipe diagnose has been asked what it is."
         )
     return "Quote Q at these amplitudes. a, b and c can replace each other: quote all three."
+
+
+HEAD: Final = ("file", "light", "period (s)", "a (1/rad s)", "b (1/s)", "c (rad/s)", "Q", "at")
+
+
+def row(file: str, result: FitResult | None) -> tuple[str, ...]:
+    """Make a line of `table`; a recording that was refused has its name only."""
+    if result is None:
+        return (file, "refused", *[""] * (len(HEAD) - 2))
+    period, large = small_period(result), qualities(result)[0]
+    rates = [
+        with_error(result[name].value, result[name].sd, short=True) if result.light != "red" else ""
+        for name in "abc"
+    ]
+    return (
+        file,
+        result.light,
+        with_error(period.value, period.sd, short=True),
+        *rates,
+        with_error(large.quality_factor.value, large.quality_factor.sd, short=True),
+        compact(large.amplitude_rad, result["amplitude"].unit),
+    )
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    """Lay rows out below their head, in columns as wide as they need."""
+    full = [HEAD, *rows]
+    width = [max(map(len, column)) for column in zip(*full, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(size) for cell, size in zip(line, width, strict=True)).rstrip()
+        for line in full
+    )

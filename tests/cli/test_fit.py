@@ -1,0 +1,120 @@
+"""`pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pendpipe.api as pp
+from pendpipe import cli
+from pendpipe.recording import write_plain
+
+ROOT = Path(__file__).parents[2]
+ROD, STRING = (str(ROOT / f"examples/{name}-pendulum.csv") for name in ("rod", "string"))
+
+
+def test_the_summary_holds_the_truth_within_its_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fit", ROD]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].startswith("green: ")
+    assert "Coulomb" in out or "dry friction" in out
+    fit = pp.fit(ROD)
+    # examples/rod-pendulum.toml: Q_v = 240 at 0.873 Hz is b = pi f/Q; c = 4e-4 rad/s; a = 0.
+    truth = {"a": 0.0, "b": np.pi * 0.873 / 240.0, "c": 4.0e-4, "frequency": 0.873}
+    for name, value in truth.items():
+        assert abs(fit[name].value - value) < 4.0 * fit[name].sd
+
+
+def test_the_command_and_the_library_give_the_same_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "fit.json"
+    assert cli.main(["fit", ROD, "--out", str(out)]) == 0
+    written = json.loads(out.read_text(encoding="utf-8"))
+    assert written["parameters"] == pp.fit(ROD).to_dict()["parameters"]
+    capsys.readouterr()
+
+
+def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time_s,angle_rad\n0,0\n1,0\n", encoding="utf-8")
+    assert cli.main(["fit", ROD, str(bad), STRING]) == 2
+    captured = capsys.readouterr()
+    rows = captured.out.splitlines()
+    assert len(rows) == 4
+    assert [row.split()[1] for row in rows[1:3]] == ["green", "refused"]
+    assert str(bad) in captured.err
+
+
+def test_json_goes_to_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fit", ROD, "--json"]) == 0
+    alone = json.loads(capsys.readouterr().out)
+    assert cli.main(["fit", ROD, ROD, "--json"]) == 0
+    both = json.loads(capsys.readouterr().out)["fits"]
+    assert [entry["parameters"] for entry in both] == [alone["parameters"]] * 2
+
+
+def test_standard_input_is_a_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(Path(ROD).read_bytes()))
+    monkeypatch.setattr(sys, "stdin", stream)
+    assert cli.main(["fit", "-", "--json"]) == 0
+    piped = json.loads(capsys.readouterr().out)
+    assert piped["parameters"] == pp.fit(ROD).to_dict()["parameters"]
+
+
+def test_g_and_the_length_of_a_simple_pendulum_are_inverse(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert cli.main(["fit", STRING, "--length", "1.0"]) == 0
+    line = next(row for row in capsys.readouterr().out.splitlines() if row.startswith("  g "))
+    # omega_0 = 2 pi 0.4985 Hz of the example's model: g = omega_0^2 l.
+    assert float(line.split()[1].split("(")[0]) == pytest.approx(9.8105, rel=2e-3)
+
+
+def test_a_figure_is_drawn_where_it_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figure = tmp_path / "rod.svg"
+    assert cli.main(["fit", ROD, "--figure", str(figure)]) == 0
+    text = figure.read_text(encoding="utf-8")
+    assert "Amplitude" in text
+    assert ">Q<" in text
+    assert cli.main(["fit", ROD, "--figure", str(tmp_path / "rod.bmp")]) == 2
+    assert "form is unknown" in capsys.readouterr().err
+
+
+def test_an_option_for_one_file_is_refused_with_several(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["fit", ROD, STRING, "--out", str(tmp_path / "fit.json")]) == 2
+    assert "--out" in capsys.readouterr().err
+
+
+def test_a_law_at_its_bound_is_printed_as_an_upper_limit(tmp_path: Path) -> None:
+    model = {
+        "seed": 4,
+        "pendulum": {
+            "frequency_hz": 0.7,
+            "quality_factor_viscous": 100.0,
+            "release_angle_rad": 0.1,
+        },
+        "noise_rad": 1e-4,
+        "sampling": {"sample_rate_hz": 50.0, "duration_s": 60.0},
+    }
+    path = tmp_path / "viscous.csv"
+    fits = []
+    for seed in range(6):
+        write_plain(path, pp.simulate(model, seed=seed))
+        fits.append(pp.fit(path))
+    at_bound = [fit for fit in fits if fit["a"].at_bound or fit["c"].at_bound]
+    assert at_bound, "no fit of a purely viscous pendulum lies at the bound"
+    assert all("below" in str(fit) for fit in at_bound)
