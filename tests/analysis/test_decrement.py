@@ -191,14 +191,14 @@ def test_a_law_that_contradicts_the_decay_is_not_printed(
     assert cli.main(asked) == 2
     printed = capsys.readouterr()
     assert printed.out.splitlines()[0].startswith("red: the fitted law contradicts the decay: at ")
-    assert "frequency" not in printed.out
+    assert "period" not in printed.out
     assert printed.err.splitlines()[0].startswith(f"pendpipe: {tmp_path / 'decay.csv'}: ")
     content = json.loads((tmp_path / "fit.json").read_text())
     assert content["light"] == "red"
     assert content["light_reason"] in printed.out
     # Accepted, or in a campaign, it is printed, and still called red.
     assert cli.main([*asked, "--accept"]) == 0
-    assert "frequency" in capsys.readouterr().out
+    assert "period" in capsys.readouterr().out
     assert cli.main([*asked, "--refused", str(tmp_path / "refused.json")]) == 0
     assert not (tmp_path / "refused.json").exists()
 
