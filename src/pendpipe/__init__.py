@@ -1,9 +1,63 @@
 """How pendulums lose energy, from the instrument's bytes to the physics that was left out.
 
-The package imports nothing on its own: a job's cost is its imports, so every part is
-imported by name where it is used (``from pendpipe.physics import amplitude``).
+>>> import pendpipe as pp
+>>> recording = pp.read("examples/rod-pendulum.csv")
+>>> fit = pp.fit(recording)
+>>> round(fit["b"].value, 4), fit.light
+(0.0107, 'green')
+
+Nothing is imported before it is used: a job's cost is its imports.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from pendpipe.version import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from pendpipe import effects, physics
+    from pendpipe.api import find_free_decay, fit, inspect, read, simulate, turning_points
+    from pendpipe.dynamics import Eq8
+    from pendpipe.errors import InputError
+    from pendpipe.estimate import Estimate
+    from pendpipe.recording import Recording
+
+__all__ = [
+    "Eq8",
+    "Estimate",
+    "InputError",
+    "Recording",
+    "__version__",
+    "effects",
+    "find_free_decay",
+    "fit",
+    "inspect",
+    "physics",
+    "read",
+    "simulate",
+    "turning_points",
+]
+
+_HOMES = {
+    "Eq8": "dynamics",
+    "Estimate": "estimate",
+    "InputError": "errors",
+    "Recording": "recording",
+}
+"""Modules of the public names that are not in `api`."""
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    if name not in __all__:
+        raise AttributeError(f"module 'pendpipe' has no attribute {name!r}")
+    if name in ("effects", "physics"):
+        return import_module(f"pendpipe.{name}")
+    return getattr(import_module(f"pendpipe.{_HOMES.get(name, 'api')}"), name)
+
+
+def __dir__() -> list[str]:
+    """List the public names, imported or not."""
+    return sorted({*__all__, *globals()})

@@ -67,8 +67,8 @@ def read(
     >>> recording = read("examples/string-pendulum.csv")
     >>> recording
     Recording(3600 samples of angle_rad, 0 to 119.967 s)
-    >>> read("examples/string-pendulum.csv", unit="rad", stop=60).values.max().round(1)
-    30.7
+    >>> len(read("examples/string-pendulum.csv", start=10, stop=60))
+    1501
     """
     from pendpipe.formats import read as read_file
 
@@ -129,7 +129,7 @@ def find_free_decay(recording: Source) -> FreeDecay:
     --------
     >>> decay = find_free_decay("examples/rod-pendulum.csv")
     >>> decay.half_cycles
-    105
+    103
     """
     from pendpipe.analysis.free_decay import find_free_decay as find
 
@@ -144,8 +144,8 @@ def turning_points(recording: Source) -> TurningPoints:
     Examples
     --------
     >>> points = turning_points("examples/rod-pendulum.csv")
-    >>> len(points), points.amplitude_rad[0].round(4)
-    (105, 0.0862)
+    >>> len(points), round(float(points.amplitude_rad[0]), 4)
+    (105, 0.0863)
     """
     from pendpipe.analysis.turning_points.recorded import measure_recording
 
@@ -200,6 +200,16 @@ def fit(
     --------
     >>> result = fit("examples/rod-pendulum.csv")
     >>> print(result)
+    green: the law loses what the decay loses, and noise explains the rest
+      Eq. 8 fitted to 3000 readings
+      period                    1.1454713(25) s
+      a                         0.0069(49) rad⁻¹ s⁻¹
+      b                         0.01066(53) s⁻¹
+      c                         4.21(14) × 10⁻⁴ rad/s
+      Q at 73.5 mrad            162.40(20), 63 % viscous and hysteretic loss (b)
+      Q at 47.7 mrad            138.43(12), 54 % viscous and hysteretic loss (b)
+      Q at 32.4 mrad            114.98(26), 54 % dry friction (c)
+      Quote these numbers with their errors.
     """
     from dataclasses import replace
 

@@ -329,7 +329,7 @@ def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
 
     Examples
     --------
-    >>> whole_lines("time_s,volts\\n0.0,1.5\\n0.1,1.")
+    >>> whole_lines("time_s,volts\n0.0,1.5\n0.1,1.")
     (['time_s,volts', '0.0,1.5'], ('the last row has no line end and may be cut: not used',))
     """
     lines = text.splitlines()

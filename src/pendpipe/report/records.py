@@ -213,6 +213,6 @@ def without_folders(text: str) -> str:
     """Keep the names of files and drop the folders: they are the user's own business.
 
     >>> without_folders("/home/rdp/data/run 7.csv, line 3: no number")
-    '7.csv, line 3: no number'
+    'run 7.csv, line 3: no number'
     """
     return _PATH.sub(lambda found: PurePath(found.group().replace("\\", "/")).name, text)

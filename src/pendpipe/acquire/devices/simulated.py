@@ -46,6 +46,7 @@ class SimulatedDevice:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from pendpipe.acquire.recorder import record
     >>> with SimulatedDevice("di2108", np.cos, clock_scale=1000) as device:
     ...     recording = record(
