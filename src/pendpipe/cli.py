@@ -33,6 +33,7 @@ COMMANDS: Final = {
     "turning-points": "the turning points of one recording",
     "fit": "a, b, c and the rest of one recording",
     "diagnose": "what physics was left out: located, named, modelled",
+    "page": "one HTML page about one recording",
     "diagnose-campaign": "the same over a campaign's records (not available yet)",
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",

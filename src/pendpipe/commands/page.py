@@ -1,0 +1,50 @@
+"""Write one page about one recording: its fit, its figures, and what physics is missing.
+
+The page is a single HTML file that needs no network.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from pendpipe.commands import _reading
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe page``."""
+    _reading.add_arguments(parser)
+    parser.add_argument("--out", metavar="HTML", help="the page (FILE.html); - is standard output")
+    parser.add_argument("--no-diagnosis", action="store_true", help="the fit alone, in a second")
+    parser.add_argument(
+        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit, diagnose, and write the page."""
+    from dataclasses import replace
+
+    from pendpipe import api
+    from pendpipe.commands._motion import read_motion
+    from pendpipe.files import replaced
+    from pendpipe.report.recording import render_recording
+
+    recording, provenance = read_motion(arguments)
+    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
+    result = replace(api.fit(recording, name=arguments.file), provenance=provenance)
+    statement = None
+    if not arguments.no_diagnosis:
+        from pendpipe.diagnose import diagnose_recording
+
+        statement = diagnose_recording(recording, place=arguments.file).diagnosis.statement
+    page = render_recording(name, recording, result, statement)
+    if arguments.out == "-":
+        print(page)
+        return 0
+    out = Path(arguments.out) if arguments.out else Path(name).with_suffix(".html")
+    with replaced(out) as stream:
+        stream.write(page)
+    print(f"{out}: written", file=sys.stderr)
+    return 0

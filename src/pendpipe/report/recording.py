@@ -1,0 +1,106 @@
+"""One recording on one page: its fit, its figure and, where asked, its diagnosis."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from pendpipe.analysis.fit.summary import LOSSES, qualities, quotable, small_period
+from pendpipe.quantities import compact, with_error
+from pendpipe.report.page import TEMPLATES
+from pendpipe.report.vector import inline_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pendpipe.analysis.fit.result import FitResult
+    from pendpipe.recording import Recording
+
+LIGHTS = {"green": ("good", "✓"), "amber": ("look", "!"), "red": ("bad", "✗")}
+"""Colour class and symbol of a light: colour never carries a meaning alone."""
+
+
+def render_recording(
+    name: str,
+    recording: Recording,
+    result: FitResult,
+    statement: str | None = None,
+    figures: tuple[tuple[str, Figure], ...] = (),
+) -> str:
+    """Make the page of one recording.
+
+    Parameters
+    ----------
+    name
+        What to call the recording: the name of its file.
+    recording
+        The whole of it, with its notes.
+    result
+        The fit, with its readings.
+    statement
+        The diagnosis in a paragraph; None where none was asked for.
+    figures
+        Further figures, each with its title.
+
+    Returns
+    -------
+    str
+        One HTML document that refers to nothing outside itself.
+    """
+    unit = result["amplitude"].unit
+    period = small_period(result)
+    numbers = [("Period", with_error(period.value, period.sd, "s"))]
+    if result.light != "red":
+        titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"}
+        numbers += [(f"{letter} ({titles[letter]})", _rate(result, letter)) for letter in titles]
+    rows = [
+        (
+            compact(each.amplitude_rad, unit),
+            with_error(each.quality_factor.value, each.quality_factor.sd),
+            f"{100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
+        )
+        for each in (qualities(result) if result.light != "red" else [])
+    ]
+    drawn = [("The decay with its fit", result.plot()), *figures]
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("recording.html").render(
+        name=name,
+        style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
+        light=(result.light, *LIGHTS[result.light]),
+        reason=result.light_reason,
+        numbers=numbers,
+        qualities=rows,
+        advice=quotable(result),
+        checks=[check.sentence(unit) for check in result.decrement_check],
+        figures=[
+            (title, inline_svg(_svg(figure), f"figure{number}", title, title))
+            for number, (title, figure) in enumerate(drawn)
+        ],
+        statement=statement,
+        cuts=result.cuts,
+        guesses=(*recording.weak_guesses, *recording.notes),
+        warnings=result.warnings,
+        provenance=result.provenance,
+    )
+
+
+def _rate(result: FitResult, letter: str) -> str:
+    rate = result[letter]
+    if rate.at_bound:
+        return f"below {compact(rate.bounds95[1], rate.unit)} (95 %)"
+    return with_error(rate.value, rate.sd, rate.unit)
+
+
+def _svg(figure: Figure) -> str:
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
+    return stream.getvalue()
