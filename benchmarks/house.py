@@ -56,7 +56,7 @@ def files_of(tree: Path) -> dict[str, list[Path]]:
     }
 
 
-def is_text(node: ast.AST) -> bool:
+def is_text(node: object) -> bool:
     """Whether a node is a string that stands alone."""
     value = node.value if isinstance(node, ast.Expr) else None
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
