@@ -10,8 +10,14 @@ from pathlib import Path
 def main() -> None:
     """Run those named, or all that there are: modules of this package with a ``main``."""
     here = Path(__file__).parent
-    known = ("engine", "estimators", "long_record", "workflow", "acquisition_speed",
-             "diagnosis_cost")  # fmt: skip
+    known = (
+        "engine",
+        "estimators",
+        "long_record",
+        "workflow",
+        "acquisition_speed",
+        "diagnosis_cost",
+    )
     there = [name for name in known if (here / f"{name}.py").exists()]
     for name in sys.argv[1:] or there:
         print(f"\n## {name}\n", flush=True)

@@ -101,9 +101,13 @@ def _bind() -> None:
 def _run_sustained(folder: Path) -> str:
     begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
     recording = acquire_simulated(
-        "di2108", np.sin, rate_hz=160e3, duration_s=SUSTAINED_S, clock_scale=1.0,
+        "di2108",
+        np.sin,
+        rate_hz=160e3,
+        duration_s=SUSTAINED_S,
+        clock_scale=1.0,
         raw_path=folder / "fast",
-    )  # fmt: skip
+    )
     took_s = time.perf_counter() - begin_s
     share = (time.process_time() - begin_cpu_s) / took_s
     off = np.abs(recording.values - np.sin(recording.time_s)).max() / (recording.resolution or 1.0)

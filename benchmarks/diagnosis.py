@@ -13,38 +13,112 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import math
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import as_completed
 from functools import cache
+from itertools import permutations
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 import pendpipe_challenge
-from benchmarks.diagnosis_pairs import over_one
 from benchmarks.diagnosis_table import BESIDE, table
 from pendpipe.provenance import code_version
 from pendpipe_challenge.sets import process_pool
+
+if TYPE_CHECKING:
+    from pendpipe.diagnose.refine import Fit
+    from pendpipe.diagnose.run import Outcome
+
+
+def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
+    """By how much chi^2 (two a free value counted) two effects are better than the best single.
+
+    Singles are the baseline alone, each true effect, all that the search refitted first, and
+    its answer where that is one effect; pairs are the true ones, each found behind the other,
+    and the answer where it holds two. Infinite where the true pair can't be fitted: it counts
+    as needed then.
+    """
+    from pendpipe.diagnose.one_curve import cost
+    from pendpipe.diagnose.weighing import refitted
+
+    found, held = outcome.search, outcome.beginning.held
+    singles, pairs = [found.baseline, *_answer(outcome, 1)], _answer(outcome, 2)
+    for first, second in permutations(truths, 2):
+        alone = _added(outcome, found.baseline, first)
+        singles += alone
+        pairs += [both for one in alone for both in _added(outcome, one, second)]
+    rivals = found.steps[0].rivals if found.steps else ()
+    fits = [refitted(found.baseline, found, held, rival) for rival in rivals]
+    singles += [fit for fit in fits if fit is not None]
+    return min(map(cost, singles)) - min(map(cost, pairs), default=-math.inf)
+
+
+def _answer(outcome: Outcome, effects: int) -> list[Fit]:
+    found = outcome.search
+    return [found.improved] if len(found.steps) == effects else []
+
+
+def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
+    """The fit with one more effect of a given name, at the shape its scan finds, if it moves."""
+    from pendpipe.diagnose.detect import detect, prepare
+    from pendpipe.diagnose.naming import refit_leads
+    from pendpipe.diagnose.state import is_gross
+    from pendpipe.effects.catalogue import by_identifier
+
+    found = outcome.search
+    scanner = prepare(base, found.data, found.noise, [by_identifier(name)])
+    lead = detect(scanner, base, seed=0, known=found.detection)
+    rivals = refit_leads(
+        base,
+        found.data,
+        found.noise,
+        lead,
+        held=outcome.beginning.held,
+        gross=is_gross(base, found.data),
+        origin=outcome.beginning.value,
+    )
+    return [rival.fit for rival in rivals]
+
 
 JOURNAL: Final = Path(".evidence/diagnosis.jsonl")
 PAGE: Final = Path("docs/diagnosis.md")
 MARK: Final = "These tables are made by `make evidence`."
 EFFECTS: Final = (
-    "circular-error", "cubic-stiffness", "quadratic-stiffness", "power-law-damping",
-    "stribeck-friction", "presliding-friction", "second-mode", "plane-coupling",
-    "periodic-drive", "frequency-drift", "damping-drift", "equilibrium-creep",
-    "equilibrium-step", "impulse", "sensor-quadratic", "sensor-cubic", "offset-drift",
-    "tone-pickup", "jitter", "glitches",
-)  # fmt: skip
+    "circular-error",
+    "cubic-stiffness",
+    "quadratic-stiffness",
+    "power-law-damping",
+    "stribeck-friction",
+    "presliding-friction",
+    "second-mode",
+    "plane-coupling",
+    "periodic-drive",
+    "frequency-drift",
+    "damping-drift",
+    "equilibrium-creep",
+    "equilibrium-step",
+    "impulse",
+    "sensor-quadratic",
+    "sensor-cubic",
+    "offset-drift",
+    "tone-pickup",
+    "jitter",
+    "glitches",
+)
 SIZES: Final = (9.0, 16.0, 25.0, 50.0, 100.0)
 PAIRS: Final = (
-    ("cubic-stiffness", "tone-pickup"), ("cubic-stiffness", "frequency-drift"),
-    ("quadratic-stiffness", "offset-drift"), ("sensor-cubic", "circular-error"),
-    ("equilibrium-step", "second-mode"), ("sensor-quadratic", "impulse"),
-)  # fmt: skip
+    ("cubic-stiffness", "tone-pickup"),
+    ("cubic-stiffness", "frequency-drift"),
+    ("quadratic-stiffness", "offset-drift"),
+    ("sensor-cubic", "circular-error"),
+    ("equilibrium-step", "second-mode"),
+    ("sensor-quadratic", "impulse"),
+)
 
 
 class Case(NamedTuple):
@@ -115,8 +189,12 @@ def diagnosed(case: Case) -> dict[str, Any]:
     from pendpipe_challenge.recordings import write_recording
 
     keep_memory()  # as the command does
-    entry: dict[str, Any] = {"key": case.key, "family": case.family, "names": case.names,
-                             "size": case.size}  # fmt: skip
+    entry: dict[str, Any] = {
+        "key": case.key,
+        "family": case.family,
+        "names": case.names,
+        "size": case.size,
+    }
     try:
         item = made(case)
     except ValueError as fault:

@@ -116,8 +116,11 @@ def rows(found: list[Cost]) -> Iterator[Row]:
             slowest = part[int(own.argmax())].hidden
             yield at_most(
                 f"{samples} readings, {len(part)} {words}: median, nine tenths, largest"
-                f"{f' ({slowest})' if slowest else ''}", levels, asked, " s",
-            )  # fmt: skip
+                f"{f' ({slowest})' if slowest else ''}",
+                levels,
+                asked,
+                " s",
+            )
             peer = [each.pysindy_s for each in part if each.pysindy_s is not None]
             if peer:
                 ratio = float(np.median(own) / np.median(peer))

@@ -5,22 +5,154 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import permutations
+from typing import Any
 
-from benchmarks.diagnosis_detection import detection
-from benchmarks.diagnosis_outcome import (
-    Outcome,
-    classes,
-    first,
-    found,
-    in_a_class,
-    in_class,
-    of,
-    oracle_first,
-    oracle_found,
-    oracle_in_class,
-    oracle_tells_apart,
-    share,
-)
+import numpy as np
+
+Outcome = dict[str, Any]
+
+
+def share(hits: int, count: int) -> str:
+    """A rate with its 95 % interval (Clopper and Pearson)."""
+    if count == 0:
+        return "-"
+    from scipy.stats import binomtest
+
+    low, high = binomtest(hits, count).proportion_ci(0.95, "exact")
+    return f"{hits}/{count} = {100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def of(done: Sequence[Outcome], family: str) -> list[Outcome]:
+    """The recordings of a family."""
+    return [entry for entry in done if entry["family"] == family]
+
+
+def classes(entry: Outcome) -> list[list[str]]:
+    """The class of each effect that was reported, the leader first."""
+    return [[name, *rest] for name, _, rest in entry["effects"]]
+
+
+def found(entry: Outcome) -> bool:
+    """Whether anything was detected."""
+    return bool(entry["effects"])
+
+
+def oracle_found(entry: Outcome) -> bool:
+    """The same of the oracle."""
+    return bool(entry["oracle"]["detected"])
+
+
+def in_class(entry: Outcome) -> bool:
+    """Whether the first effect's class holds the truth."""
+    right = set(entry["right"][0])
+    return any(right & set(names) for names in classes(entry)[:1])
+
+
+def in_a_class(entry: Outcome) -> bool:
+    """Whether the class of any effect that was reported holds the truth."""
+    right = set(entry["right"][0])
+    return any(right & set(names) for names in classes(entry))
+
+
+def first(entry: Outcome) -> bool:
+    """Whether the first name is the truth."""
+    return bool(entry["effects"]) and entry["effects"][0][0] in entry["right"][0]
+
+
+def oracle_in_class(entry: Outcome) -> bool:
+    """Whether the oracle's class holds the truth."""
+    right = set(entry["right"][0])
+    return oracle_found(entry) and bool(right & set(entry["oracle"]["class"] or []))
+
+
+def oracle_first(entry: Outcome) -> bool:
+    """Whether the oracle's first name is the truth."""
+    return oracle_found(entry) and entry["oracle"]["named"] in entry["right"][0]
+
+
+def oracle_tells_apart(entry: Outcome) -> bool:
+    """Whether nothing but the truth is in the oracle's class."""
+    return oracle_first(entry) and len(entry["oracle"]["class"]) == 1
+
+
+def detection(done: Sequence[Outcome]) -> str:
+    """How many single effects are found and named at each size, and the sizes of each effect."""
+    singles = of(done, "single")
+    if not singles:
+        return ""
+    return "\n\n".join(
+        ["**Single effects**", _by_size(singles), _reached(singles), _by_effect(singles)]
+    )
+
+
+def _by_size(singles: Sequence[Outcome]) -> str:
+    rows = [
+        "| Delta chi^2 | detected | oracle | class right | oracle | first | oracle |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for size in sorted({entry["size"] for entry in singles}):
+        part = [entry for entry in singles if entry["size"] == size]
+        tests = (
+            found,
+            oracle_found,
+            in_class,
+            oracle_in_class,
+            first,
+            oracle_first,
+        )
+        counts = [sum(test(entry) for entry in part) for test in tests]
+        cells = " | ".join(f"{100 * count / len(part):.0f} %" for count in counts)
+        rows.append(f"| {size:g} ({len(part)}) | {cells} |")
+    return "\n".join(rows)
+
+
+def _power(singles: Sequence[Outcome]) -> dict[str, Any]:
+    from pendpipe_challenge.intervals import power_ratio
+
+    sizes = np.array([entry["size"] for entry in singles])
+    ours, best = (
+        np.array([float(test(entry)) for entry in singles]) for test in (found, oracle_found)
+    )
+    return power_ratio(sizes, ours, best)
+
+
+def _reached(singles: Sequence[Outcome]) -> str:
+    """Delta chi^2 at which half and nine tenths of the effects are detected, and the oracle's."""
+    power = _power(singles)
+    if "half" not in power:
+        return "Too few to say where half and nine tenths are detected."
+    said = []
+    for key, words in (("half", "Half"), ("nine_tenths", "Nine tenths")):
+        one = power[key]
+        said.append(
+            f"{words} are detected at {one['found']:.3g}, by the oracle at {one['oracle']:.3g}:"
+            f" {_ratio(one)}."
+        )
+    return " ".join(said)
+
+
+def _by_effect(singles: Sequence[Outcome]) -> str:
+    """The same for each effect."""
+    rows = [
+        "| effect | half at | oracle | times | nine tenths at | oracle | times |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name in sorted({entry["names"][0] for entry in singles}):
+        power = _power([entry for entry in singles if entry["names"][0] == name])
+        if "half" not in power:
+            continue
+        cells = (
+            f"{one['found']:.3g} | {one['oracle']:.3g} | {_ratio(one)}"
+            for one in (power["half"], power["nine_tenths"])
+        )
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _ratio(one: dict[str, Any]) -> str:
+    low, high = one["interval95"]
+    return f"{one['ratio']:.2f} ({low:.2f} to {high:.2f})"
+
 
 NEEDED = 50.0
 """Delta chi^2 by which two effects are better than any one, above which two are needed."""
@@ -65,14 +197,17 @@ def _naming(done: Sequence[Outcome]) -> str:
     singles = [entry for entry in of(done, "single") if entry["size"] == 100.0]
     if not singles:
         return ""
-    rows = ["| effect | detected | class right | first | class size | oracle's | named instead |",
-            "|---|---|---|---|---|---|---|"]  # fmt: skip
+    rows = [
+        "| effect | detected | class right | first | class size | oracle's | named instead |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for name in sorted({entry["names"][0] for entry in singles}):
         part = [entry for entry in singles if entry["names"][0] == name]
         sizes = [len(classes(entry)[0]) for entry in part if entry["effects"]]
         oracle = [len(entry["oracle"]["class"] or []) for entry in part if oracle_found(entry)]
-        wrong = sorted({entry["effects"][0][0] for entry in part
-                        if entry["effects"] and not in_class(entry)})  # fmt: skip
+        wrong = sorted(
+            {entry["effects"][0][0] for entry in part if entry["effects"] and not in_class(entry)}
+        )
         rows.append(
             f"| {name} | {sum(map(found, part))}/{len(part)} | {sum(map(in_class, part))}"
             f" | {sum(map(first, part))} | {_mean(sizes)} | {_mean(oracle)} | {', '.join(wrong)} |"
@@ -106,8 +241,9 @@ def _nameable(singles: Sequence[Outcome]) -> str:
 
 
 def _coverage(asked: Sequence[Outcome], singles: Sequence[Outcome]) -> str:
-    at_100, of_all = ([each for entry in part for each in entry["inside"]]
-                      for part in (asked, singles))  # fmt: skip
+    at_100, of_all = (
+        [each for entry in part for each in entry["inside"]] for part in (asked, singles)
+    )
     return (
         "95 % intervals of the named effect's parameters, where it acts by the catalogue's own"
         f" law, hold the truth in {share(sum(at_100), len(at_100))}; over all sizes, those"
@@ -130,8 +266,9 @@ def _peers(done: Sequence[Outcome]) -> str:
     head = [*kinds, "named right first", "wrong name outside"]
     rows = [f"| | {' | '.join(head)} |", "|---" * (len(head) + 1) + "|"]
     for who in ("pendpipe", *judged[0]["peers"]):
-        cells = [share(sum(_says(entry, who) for entry in part), len(part))
-                 for part in kinds.values()]  # fmt: skip
+        cells = [
+            share(sum(_says(entry, who) for entry in part), len(part)) for part in kinds.values()
+        ]
         right = sum(_name(entry, who) in entry["right"][0] for entry in named)
         wrong = sum(not (_name(entry, who) or "unnamed").startswith("unnamed") for entry in outside)
         cells += [share(right, len(named)), share(wrong, len(outside))]
@@ -220,11 +357,16 @@ def _outside(done: Sequence[Outcome]) -> str:
     outside = of(done, "outside")
     if not outside:
         return ""
-    unnamed = [entry for entry in outside
-               if any(name.startswith("unnamed") for name, _, _ in entry["effects"])]  # fmt: skip
-    wrong = [entry for entry in outside
-             if any(p > 0.8 and not name.startswith("unnamed") for name, p, _ in entry["effects"])
-             ]  # fmt: skip
+    unnamed = [
+        entry
+        for entry in outside
+        if any(name.startswith("unnamed") for name, _, _ in entry["effects"])
+    ]
+    wrong = [
+        entry
+        for entry in outside
+        if any(p > 0.8 and not name.startswith("unnamed") for name, p, _ in entry["effects"])
+    ]
     rows = ["| what | unnamed | confident name | names |", "|---|---|---|---|"]
     for name in sorted({entry["names"][0] for entry in outside}):
         part = [entry for entry in outside if entry["names"][0] == name]

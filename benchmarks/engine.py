@@ -18,18 +18,142 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks import peers_engine as peers
 from benchmarks.table import Row, at_least, at_most, cpu_seconds, write
-from pendpipe.dynamics import (
-    Eq8,
-    Release,
-    sample,
-    sample_with_jacobian,
-    turning_points,
-)
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics import Eq8
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def forces(model: Eq8) -> tuple[float, float, float, float]:
+    """Return f_c, f_h, f_q and 2 b_v of Eq. 8."""
+    omega = model.angular_frequency
+    return (
+        0.5 * math.pi * omega * model.coulomb,
+        0.5 * math.pi * model.hysteretic,
+        0.5 * math.pi * model.quadratic / omega,
+        2.0 * model.viscous,
+    )
+
+
+def solve_ivp_turning_points(
+    model: Eq8, angle_rad: float, count: int
+) -> Callable[[], tuple[FloatArray, FloatArray]]:
+    """Return scipy's DOP853 at rtol 1e-12 with a terminal event a half cycle."""
+    from scipy.integrate import solve_ivp
+
+    f_c, f_h, f_q, damping = forces(model)
+    omega2 = model.angular_frequency**2
+    longest = 2.0 * math.pi / model.angular_frequency
+
+    def turn(_t: float, state: FloatArray, _sign: float) -> float:
+        return float(state[1])
+
+    turn.terminal = True  # type: ignore[attr-defined]
+
+    def rates(_t: float, state: FloatArray, sign: float) -> tuple[float, float]:
+        x, v = state
+        square = omega2 * x * x + v * v
+        friction = f_c + f_h * math.sqrt(square) + f_q * square
+        return v, -omega2 * x - friction * sign - damping * v
+
+    def run() -> tuple[FloatArray, FloatArray]:
+        times, angles = [0.0], [angle_rad]
+        sign = -math.copysign(1.0, angle_rad)
+        while len(times) < count:
+            turn.direction = -sign  # type: ignore[attr-defined]
+            solution = solve_ivp(
+                rates,
+                (times[-1], times[-1] + longest),
+                (angles[-1], 0.0),
+                method="DOP853",
+                rtol=1e-12,
+                atol=1e-18,
+                events=turn,
+                args=(sign,),
+            )
+            times.append(solution.t_events[0][0])
+            angles.append(solution.y_events[0][0][0])
+            sign = -sign
+        return np.array(times), np.array(angles)
+
+    return run
+
+
+def heyoka_integrators(model: Eq8, angle_rad: float, tolerance: float) -> Any:
+    """Return heyoka's Taylor integrator with a terminal event where the velocity vanishes.
+
+    The sign of the friction is the parameter 0, turned over by the event's callback.
+    """
+    import heyoka as hy
+
+    f_c, f_h, f_q, damping = forces(model)
+    omega2 = model.angular_frequency**2
+    x, v = hy.make_vars("x", "v")
+    square = omega2 * x**2 + v**2
+    friction = f_c + f_h * hy.sqrt(square) + f_q * square
+    system = [(x, v), (v, -omega2 * x - friction * hy.par[0] - damping * v)]
+    log: list[tuple[float, float]] = []
+
+    def turn(integrator: Any, slope: int) -> bool:
+        log.append((integrator.time, integrator.state[0]))
+        integrator.pars[0] = slope
+        return True
+
+    event = hy.t_event(v, callback=turn)
+    integrator = hy.taylor_adaptive(
+        system,
+        [angle_rad, 0.0],
+        pars=[-math.copysign(1.0, angle_rad)],
+        tol=tolerance,
+        t_events=[event],
+    )
+    return integrator, log
+
+
+def heyoka_turning_points(
+    model: Eq8, angle_rad: float, until_s: float, tolerance: float = 1e-13
+) -> Callable[[], tuple[FloatArray, FloatArray]]:
+    """Return a run of heyoka to a time, noting its turning points; built once, outside the run."""
+    integrator, log = heyoka_integrators(model, angle_rad, tolerance)
+
+    def run() -> tuple[FloatArray, FloatArray]:
+        log.clear()
+        _reset(integrator, angle_rad)
+        integrator.propagate_until(until_s)
+        # The release itself may count as a turning point, or not.
+        turned = np.array([(0.0, angle_rad), *(entry for entry in log if entry[0] > 0.0)])
+        return turned[:, 0], turned[:, 1]
+
+    return run
+
+
+def heyoka_samples(
+    model: Eq8, angle_rad: float, time_s: FloatArray, tolerance: float = 1e-13
+) -> Callable[[], FloatArray]:
+    """Return heyoka's propagate_grid at the given times."""
+    integrator, log = heyoka_integrators(model, angle_rad, tolerance)
+
+    def run() -> FloatArray:
+        log.clear()
+        _reset(integrator, angle_rad)
+        return np.asarray(integrator.propagate_grid(time_s)[-1])[:, 0]
+
+    return run
+
+
+def _reset(integrator: Any, angle_rad: float) -> None:
+    """Put the pendulum back to its release."""
+    integrator.time = 0.0
+    integrator.state[:] = [angle_rad, 0.0]
+    integrator.pars[0] = -math.copysign(1.0, angle_rad)
+    integrator.reset_cooldowns()
+
 
 ROOT = Path(__file__).parents[1]
 OMEGA = 2.0 * math.pi * 0.516
@@ -60,9 +184,10 @@ def _speeds(rounds: int) -> list[Row]:
         "clock": (lambda: turning_points(MODEL, START, until_s=END_S, method="clock"), 20),
         "samples": (lambda: sample(MODEL, START, SAMPLES), 20),
         "jacobian": (
-            lambda: sample_with_jacobian(MODEL, START, SAMPLES, hysteretic_share=0.5), 20,
+            lambda: sample_with_jacobian(MODEL, START, SAMPLES, hysteretic_share=0.5),
+            20,
         ),
-    }  # fmt: skip
+    }
     for y in RELEASES_RAD:
         from_y = (SINE, Release(0.0, y), SAMPLES)
         ours[f"sine samples {y}"] = (partial(sample, *from_y), 10)
@@ -70,10 +195,10 @@ def _speeds(rounds: int) -> list[Row]:
         ours[f"sine {y}"] = (jacobian, 10)
     contenders = dict(ours)
     if importlib.util.find_spec("heyoka"):
-        contenders["heyoka"] = (peers.heyoka_turning_points(MODEL, START.angle_rad, END_S), 4)
-        contenders["heyoka grid"] = (peers.heyoka_samples(MODEL, START.angle_rad, SAMPLES), 2)
+        contenders["heyoka"] = (heyoka_turning_points(MODEL, START.angle_rad, END_S), 4)
+        contenders["heyoka grid"] = (heyoka_samples(MODEL, START.angle_rad, SAMPLES), 2)
     t = cpu_seconds(contenders, rounds)
-    slow = peers.solve_ivp_turning_points(MODEL, START.angle_rad, count)
+    slow = solve_ivp_turning_points(MODEL, START.angle_rad, count)
     t["solve_ivp"] = cpu_seconds({"solve_ivp": (slow, 1)}, 3)["solve_ivp"]
     found = [
         Row(
@@ -183,8 +308,9 @@ def _first_call(rounds: int) -> Row:
 
     calls = {"numpy": (process("import numpy"), 1), "call": (process(FIRST_CALL), 1)}
     t = cpu_seconds(calls, rounds, clock=children_s)
-    return at_most("first call in a fresh process, beyond `import numpy`", t["call"] - t["numpy"],
-                   0.5, " s")  # fmt: skip
+    return at_most(
+        "first call in a fresh process, beyond `import numpy`", t["call"] - t["numpy"], 0.5, " s"
+    )
 
 
 def main() -> None:

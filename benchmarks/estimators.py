@@ -15,17 +15,126 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from benchmarks import peers_estimators
 from benchmarks.table import Row, at_least, at_most, cpu_seconds, within, write
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
+    from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics import Eq8
+if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pendpipe.analysis.fit.result import Method
     from pendpipe.arrays import FloatArray
+
+
+def eq_14(t: FloatArray, y0: float, a: float, b: float, c: float) -> FloatArray:
+    """The paper's Eq. 14 as printed, complex root included."""
+    r = np.sqrt(complex(b * b - 4.0 * a * c))
+    p = (2.0 * a * y0 + b - r) / (2.0 * a * y0 + b + r) * np.exp(-r * t)
+    return np.real((b * (p - 1.0) + r * (p + 1.0)) / (2.0 * a * (1.0 - p)))
+
+
+def law_through(
+    time_s: FloatArray, amplitude: FloatArray, sd: float
+) -> tuple[FloatArray, FloatArray]:
+    """y0, a, b, c of Eq. 14 and their standard deviations, from good starting values."""
+    from scipy.optimize import curve_fit
+
+    start, sigma = [amplitude[0], 0.4, 0.01, 1e-6], np.full(len(amplitude), sd)
+    value, covariance = curve_fit(
+        eq_14, time_s - time_s[0], amplitude, start, sigma=sigma, absolute_sigma=True
+    )
+    return np.asarray(value), np.sqrt(np.diag(covariance))
+
+
+def prominent_peaks(
+    time_s: FloatArray, values: FloatArray, noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """find_peaks told of the noise (a prominence of five of it), and curve_fit."""
+    from scipy.signal import find_peaks
+
+    size = np.abs(values - np.median(values))
+    index, _ = find_peaks(size, prominence=5.0 * noise)
+    return law_through(time_s[index], size[index], noise)
+
+
+def spaced_peaks(
+    time_s: FloatArray, values: FloatArray, noise: float, half_period: float, *, quartic: bool
+) -> tuple[FloatArray, FloatArray]:
+    """find_peaks told of the half period (in readings) and the noise, and curve_fit.
+
+    With `quartic` the amplitude is that of a quartic through each peak.
+    """
+    from scipy.signal import find_peaks
+
+    size = np.abs(values - np.median(values))
+    index, _ = find_peaks(size, distance=int(0.8 * half_period))
+    if not quartic:
+        return law_through(time_s[index], size[index], noise)
+    reach = int(0.25 * half_period)
+    u = np.arange(-reach, reach + 1) / reach
+    polynomial = np.linalg.pinv(np.vander(u, 5, increasing=True))
+    index = index[(index > reach) & (index < len(size) - reach)]
+    fitted = size[index[:, None] + np.arange(-reach, reach + 1)] @ polynomial.T
+    amplitude = fitted[:, 0] - fitted[:, 1] ** 2 / (4.0 * fitted[:, 2])
+    return law_through(time_s[index], amplitude, noise * float(np.linalg.norm(polynomial[0])))
+
+
+def lmfit_waveform(
+    model: Eq8, angle_rad: float, start_s: float, time_s: FloatArray, values: FloatArray
+) -> FloatArray:
+    """a, b, c by lmfit over solve_ivp (DOP853, rtol 1e-8), finite differences with tuned steps."""
+    import lmfit
+    from scipy.integrate import solve_ivp
+
+    scale = np.array([1e-2, 1e-4, 1e-6, 1e-4, 1e-3, 1e-2, 1e-3])
+    guess = np.array(
+        [
+            model.quadratic,
+            model.hysteretic + model.viscous,
+            model.coulomb,
+            model.angular_frequency,
+            angle_rad,
+            start_s,
+            0.0,
+        ]
+    )
+
+    def curve(values_of: FloatArray) -> FloatArray:
+        a, b, c, omega, angle, begin, offset = values_of
+
+        def rates(_t: float, z: FloatArray) -> tuple[float, float]:
+            square = omega**2 * z[0] ** 2 + z[1] ** 2
+            friction = (
+                0.5 * math.pi * (omega * c + 0.5 * b * math.sqrt(square) + a / omega * square)
+            )
+            return z[1], -friction * np.sign(z[1]) - b * z[1] - omega**2 * z[0]
+
+        run = solve_ivp(
+            rates,
+            (begin, time_s[-1] + 1e-9),
+            (angle, -1e-12),
+            method="DOP853",
+            t_eval=time_s,
+            rtol=1e-8,
+            atol=1e-12,
+        )
+        return np.asarray(run.y[0] + offset)
+
+    def residual(parameters: lmfit.Parameters) -> FloatArray:
+        steps = np.array([parameters[f"p{k}"].value for k in range(7)])
+        return values - curve(guess + (steps - 1.0) * scale)
+
+    parameters = lmfit.Parameters()
+    for k in range(7):
+        # From 1, so that lmfit's relative steps of 1e-3 are steps of 1e-3 of the scale.
+        parameters.add(f"p{k}", value=1.0)
+    fitted = lmfit.minimize(residual, parameters, epsfcn=1e-6)
+    return np.array([guess[k] + scale[k] * (fitted.params[f"p{k}"].value - 1.0) for k in range(3)])
+
 
 OMEGA = 2.0 * math.pi * 0.516
 REFERENCE = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
@@ -112,15 +221,11 @@ def speed(rounds: int = 100) -> list[Row]:
         return lambda: fit(next(turn)), 1
 
     def spaced(one: Recording, *, quartic: bool) -> object:
-        return peers_estimators.spaced_peaks(
-            TIME_S, one.values, NOISE, half_period, quartic=quartic
-        )
+        return spaced_peaks(TIME_S, one.values, NOISE, half_period, quartic=quartic)
 
     t = cpu_seconds(
         {
-            "prominent": by_turns(
-                lambda one: peers_estimators.prominent_peaks(TIME_S, one.values, NOISE)
-            ),
+            "prominent": by_turns(lambda one: prominent_peaks(TIME_S, one.values, NOISE)),
             "spaced": by_turns(lambda one: spaced(one, quartic=False)),
             "quartic": by_turns(lambda one: spaced(one, quartic=True)),
             "points": by_turns(lambda one: fit_recording(one, method="turning-points")),
@@ -132,15 +237,26 @@ def speed(rounds: int = 100) -> list[Row]:
     shown = ", ".join(f"{1e3 * t[name]:.2f} ms" for name in t)
     ours = t["waveform"]
     found = [
-        Row("time from array to a, b, c with errors: `find_peaks` by prominence; by distance;"
-            " by distance, with quartics; turning-point route; waveform fit", shown),
-        at_most("waveform fit over `find_peaks(prominence)`, `curve_fit`",
-                ours / t["prominent"], 1.0),
-        at_most("waveform fit over `find_peaks(distance)`, quartics, `curve_fit` (told the period)",
-                ours / t["quartic"], 1.0),
-        at_most("waveform fit over `find_peaks(distance)`, `curve_fit` (told the period; c biased"
-                " by -180 %)", ours / t["spaced"], 1.0),
-    ]  # fmt: skip
+        Row(
+            "time from array to a, b, c with errors: `find_peaks` by prominence; by distance;"
+            " by distance, with quartics; turning-point route; waveform fit",
+            shown,
+        ),
+        at_most(
+            "waveform fit over `find_peaks(prominence)`, `curve_fit`", ours / t["prominent"], 1.0
+        ),
+        at_most(
+            "waveform fit over `find_peaks(distance)`, quartics, `curve_fit` (told the period)",
+            ours / t["quartic"],
+            1.0,
+        ),
+        at_most(
+            "waveform fit over `find_peaks(distance)`, `curve_fit` (told the period; c biased"
+            " by -180 %)",
+            ours / t["spaced"],
+            1.0,
+        ),
+    ]
     if importlib.util.find_spec("lmfit"):
         found += against_lmfit(t["waveform"])
     return found
@@ -150,7 +266,7 @@ def against_lmfit(ours: float) -> list[Row]:
     """One run of lmfit over solve_ivp (half a minute and more)."""
     one = recording(0)
     began = time.process_time()
-    found = peers_estimators.lmfit_waveform(REFERENCE, 0.068, -0.3, TIME_S, one.values)
+    found = lmfit_waveform(REFERENCE, 0.068, -0.3, TIME_S, one.values)
     spent = time.process_time() - began
     result = fit_recording(one)
     apart = [

@@ -8,28 +8,553 @@ An input is right when it ends in one clean line or in a valid recording, in les
 seconds of the processor, and with a peak of memory (one input in forty is traced) below
 `MOST_TIMES` its size and `SPARE_BYTES`. What is wrong is kept in ``.evidence/fuzz/``.
 """
+# ruff: noqa: ARG002 - a line without a clock has no use for time limits
 
 from __future__ import annotations
 
 import argparse
+import atexit
+import json
 import os
 import resource
+import shutil
 import signal
+import struct
 import sys
+import tempfile
 import time
 import traceback
 import tracemalloc
 import warnings
 from collections import Counter
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any
 
+import numpy as np
+
+from benchmarks import fuzz_seeds as seeds
 from benchmarks import journal
-from benchmarks.fuzz_checks import Case, InvalidError
-from benchmarks.fuzz_targets import targets
+from pendpipe.acquire.clock import ScaledClock
+from pendpipe.acquire.decode import decode_recording
+from pendpipe.acquire.devices.dialect import Dialect
+from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.drivers import DRIVERS, find_driver
+from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
+from pendpipe.acquire.line import Line
+from pendpipe.errors import InputError
+from pendpipe.formats import inspect, read
+from pendpipe.formats.writing import windaq_hires
+from pendpipe.recording import Recording, check
+
+Mutation = Callable[[bytearray, Random], None]
+
+WORDS = [
+    b"nan",
+    b"-inf",
+    b"1e999",
+    b"1e-320",
+    b"-",
+    b"+",
+    b".",
+    b",",
+    b";",
+    b"\t",
+    b'"',
+    b"'",
+    b"#",
+    b"%",
+    b"0x1f",
+    b"1_000",
+    b"12:34:56",
+    b"\r",
+    b"\n",
+    b"\r\n",
+    b"\n\n",
+    b"\0",
+    b"\xef\xbb\xbf",
+    b"\xff\xfe",
+    b"\xb0",
+    b"\xc3",
+    b"\xf0\x9f\x98\x80",
+    b"time",
+    b"Time (s)",
+    b"angle",
+    b"deg",
+    b"x",
+    b"rad",
+    b"V",
+    b"Hz",
+    b"sample rate: ",
+    b"9" * 30,
+    b"1.7976931348623157e308",
+    b" " * 40,
+    b"stop 01",
+    b"sc ",
+    b"start",
+    b"Resume",
+    b"# volts_per_radian: 0\n",
+    b"# bits: 0\n",
+    b"# range_volts: nan\n",
+    b'r="1048576"',
+    b'r="XFD7"',
+    b"A1:XFD1048576",
+    b'count="99999999"',
+    b"&#x10ffff;",
+    b"<v>1e400</v>",
+    b"srate x0\n",
+    b"Relative Time,",
+]
+NUMBERS = [
+    0,
+    1,
+    2,
+    3,
+    4,
+    7,
+    8,
+    0x7F,
+    0x80,
+    0xFF,
+    0x7FFF,
+    0x8000,
+    0xFFFF,
+    0x10000,
+    0x7FFFFFFF,
+    0x80000000,
+    0xFFFFFFFF,
+    1 << 20,
+    1 << 28,
+]
+REALS = [0.0, -0.0, 1.0, -1.0, 1e-310, 1e-9, 1e300, -1e300, float("inf"), float("nan"), 1e30]
+
+
+def flip(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data))
+    data[at] ^= 1 << random.randrange(8)
+
+
+def overwrite(data: bytearray, random: Random) -> None:
+    data[random.randrange(len(data))] = random.randrange(256)
+
+
+def put_number(data: bytearray, random: Random) -> None:
+    width = random.choice((1, 2, 4, 4))
+    at = random.randrange(len(data)) & -width
+    data[at : at + width] = (random.choice(NUMBERS) & ((1 << 8 * width) - 1)).to_bytes(
+        width, random.choice(("little", "little", "big"))
+    )
+
+
+def put_real(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data)) & -2
+    data[at : at + 8] = struct.pack("<d", random.choice(REALS))
+
+
+def put_word(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data) + 1)
+    over = random.choice((0, 0, 1, 4))
+    data[at : at + over] = random.choice(WORDS)
+
+
+def cut_out(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data))
+    del data[at : at + random.choice((1, 1, 2, 3, 16, 200))]
+
+
+def repeat(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data))
+    part = data[at : at + random.choice((1, 2, 16, 200))]
+    data[at:at] = part * random.choice((1, 1, 2, 20))
+
+
+def truncate(data: bytearray, random: Random) -> None:
+    del data[random.randrange(len(data)) :]
+
+
+def zeroes(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data))
+    length = random.choice((4, 64, 512))
+    data[at : at + length] = bytes([random.choice((0, 0xFF))]) * length
+
+
+def swap(data: bytearray, random: Random) -> None:
+    one, two = random.randrange(len(data)), random.randrange(len(data))
+    data[one], data[two] = data[two], data[one]
+
+
+def digit(data: bytearray, random: Random) -> None:
+    at = random.randrange(len(data))
+    data[at : at + 1] = random.choice(b'0123456789-+.,;eE \t\n"').to_bytes(1, "little")
+
+
+def header(data: bytearray, random: Random) -> None:
+    """Damage among the first bytes, where sizes and counts stand."""
+    at = random.randrange(min(len(data), 160))
+    data[at] = random.choice((0, 1, 0x7F, 0x80, 0xFF, random.randrange(256)))
+
+
+BINARY: Sequence[Mutation] = (
+    flip,
+    flip,
+    overwrite,
+    put_number,
+    put_number,
+    put_real,
+    put_word,
+    cut_out,
+    repeat,
+    truncate,
+    zeroes,
+    swap,
+    header,
+    header,
+    header,
+)
+TEXT: Sequence[Mutation] = (
+    flip,
+    put_word,
+    put_word,
+    cut_out,
+    repeat,
+    truncate,
+    swap,
+    digit,
+    digit,
+    digit,
+    digit,
+    header,
+)
+HOW_MANY = (1, 1, 1, 2, 2, 3, 5, 8)
+
+
+def mutate(data: bytes, random: Random, others: Sequence[bytes] = ()) -> bytes:
+    """Return damaged bytes: some mutations, at times the end of another file."""
+    damaged = bytearray(data)
+    kinds = BINARY if b"\0" in data[:200] else TEXT
+    if others and random.random() < 0.05:
+        other = random.choice(others)
+        damaged[random.randrange(len(damaged) + 1) :] = other[random.randrange(len(other) + 1) :]
+    for _ in range(random.choice(HOW_MANY)):
+        if not damaged:
+            break
+        random.choice(kinds)(damaged, random)
+    return bytes(damaged)
+
+
+class InvalidError(Exception):
+    """Something came out that is neither a clean error nor a valid recording."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One input: its bytes, and under what name they go into a file."""
+
+    data: bytes
+    suffix: str = ""
+    detail: str = ""
+
+
+@cache
+def _folder() -> Path:
+    """A folder of this process, in memory where there is one."""
+    shm = Path("/dev/shm")
+    place = shm if shm.is_dir() and os.access(shm, os.W_OK) else None
+    folder = Path(tempfile.mkdtemp(prefix="pendpipe-fuzz-", dir=place))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _one_line(fault: InputError) -> None:
+    if "\n" in str(fault) or len(str(fault)) > 2000:
+        raise InvalidError(f"no message of one line: {str(fault)[:300]!r}")
+
+
+def _hold(recording: Recording) -> None:
+    """Refuse a recording that is not one."""
+    check("fuzzed", recording)
+    if recording.time_s.shape != recording.values.shape:
+        raise InvalidError("times and values differ in length")
+    if recording.quality is not None and len(recording.quality) != len(recording):
+        raise InvalidError("quality and values differ in length")
+    step = recording.resolution
+    if step is not None and not (np.isfinite(step) and step > 0):
+        raise InvalidError(f"resolution {step}")
+
+
+def run_file(case: Case) -> bool:
+    """Read a file and write it for WinDaq; inspect every other; whether it was readable."""
+    path = _folder() / f"fuzzed{case.suffix}"
+    path.write_bytes(case.data)
+    readable = False
+    try:
+        recording = read(path)
+    except InputError as fault:
+        _one_line(fault)
+    else:
+        readable = True
+        _hold(recording)
+        try:
+            windaq_hires("out.wdh", recording)
+        except InputError as fault:
+            _one_line(fault)
+    if len(case.data) % 2:
+        return readable
+    try:
+        json.dumps(inspect(path).as_json())
+    except InputError as fault:
+        _one_line(fault)
+    return readable
+
+
+def run_raw(case: Case) -> bool:
+    """Decode a raw recording."""
+    try:
+        recording = decode_recording(case.data)
+    except InputError as fault:
+        _one_line(fault)
+        return False
+    _hold(recording)
+    return True
+
+
+def run_decoder(case: Case) -> bool:
+    """Decode a stream whole and in pieces: nothing is lost to the books, both give the same."""
+    model, channels, seed = case.detail.split()
+    driver, count, random = find_driver(model), int(channels), Random(int(seed))
+    whole = driver.decoder(count)
+    one, end = whole.feed(case.data), whole.finish()
+    counts = np.concatenate([one.counts, end.counts])
+    losses = [*one.losses, *end.losses]
+    limit = 1 << (driver.bits - 1)
+    if counts.shape[1:] != (count,) or (
+        len(counts) and not -limit <= counts.min() <= counts.max() < limit
+    ):
+        raise InvalidError(f"counts {counts.shape}")
+    spent = len(counts) * whole.bytes_per_scan + sum(loss.discarded_bytes for loss in losses)
+    if not 0 <= len(case.data) - spent < whole.bytes_per_scan:
+        raise InvalidError(f"{spent} of {len(case.data)} bytes accounted for")
+    places = [loss.after_scan for loss in losses]
+    if places != sorted(places) or any(not 0 <= place <= len(counts) for place in places):
+        raise InvalidError(f"losses after scans {places}")
+    cut = driver.decoder(count)
+    pieces, at = [], 0
+    while at < len(case.data):
+        step = random.choice((1, 2, 3, 7, 64))
+        pieces.append(cut.feed(case.data[at : at + step]).counts)
+        at += step
+    pieces.append(cut.finish().counts)
+    if not np.array_equal(np.concatenate(pieces), counts):
+        raise InvalidError("pieces give other scans than the whole")
+    return bool(len(counts))
+
+
+class AnsweringLine(Line):
+    """A line to a device without a clock, whose answers are damaged on the way."""
+
+    def __init__(self, device: Dialect, random: Random, rate: float) -> None:
+        self.port = "FUZZ"
+        self._device, self._random, self._rate = device, random, rate
+        self._arrived = b""
+
+    def set_baudrate(self, baudrate: int) -> None:
+        pass
+
+    def write(self, data: bytes) -> None:
+        answer = self._device.respond(data)
+        if answer and self._random.random() < self._rate:
+            answer = mutate(answer, self._random)[:4096]
+        self._arrived += answer
+
+    def receive(self, limit_s: float) -> bytes:
+        data, self._arrived = self._arrived, b""
+        return data
+
+    def read(self, size: int, limit_s: float) -> bytes:
+        data, self._arrived = self._arrived[:size], self._arrived[size:]
+        return data
+
+    def read_until(self, end: bytes, limit_s: float) -> bytes:
+        before, found, self._arrived = self._arrived.partition(end)
+        return before + found
+
+    def discard(self, quiet_s: float, limit_s: float = 1.0) -> bytes:
+        return self.receive(0.0)[-64:]
+
+    def close(self) -> None:
+        pass
+
+
+def run_answers(case: Case) -> bool:
+    """Identify, configure, start and stop, with damaged answers."""
+    model, seed = case.detail.split()
+    random = Random(int(seed))
+    line = AnsweringLine(DEVICES[model](), random, random.choice((0.1, 0.5, 1.0)))
+    driver = find_driver(model)(line, ScaledClock(1e9))
+    try:
+        driver.identify()
+        driver.configure((1, 2), 50.0)
+        driver.start()
+        driver.read(0.0)
+        driver.stop()
+    except InputError as fault:
+        _one_line(fault)
+        return False
+    return True
+
+
+MODELS = tuple(DRIVERS)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader: how an input is drawn, what is done with it, how many of them."""
+
+    draw: Callable[[Random], Case]
+    run: Callable[[Case], bool]
+    inputs: int
+
+
+def _files(files: list[tuple[str, bytes]], others: bool = True) -> Callable[[Random], Case]:
+    every = [data for _, data in files]
+
+    def draw(random: Random) -> Case:
+        suffix, data = random.choice(files)
+        return Case(mutate(data, random, every if others else ()), suffix)
+
+    return draw
+
+
+def _named(suffix: str, datas: list[bytes]) -> list[tuple[str, bytes]]:
+    return [(suffix, data) for data in datas]
+
+
+def _excel_parts(random: Random) -> Case:
+    parts = dict(_workbook())
+    for _ in range(random.choice((1, 1, 2))):
+        name = random.choice(["xl/worksheets/sheet1.xml"] * 3 + list(parts))
+        parts[name] = mutate(parts[name], random)
+    return Case(seeds.zipped(parts), ".xlsx")
+
+
+_workbook = cache(seeds.workbook)
+
+
+def _matlab_packed(random: Random) -> Case:
+    data = random.choice(_matlabs())
+    return Case(seeds.repacked_matlab(data[:128] + mutate(data[128:], random)), ".mat")
+
+
+_matlabs = cache(seeds.matlab)
+
+
+@cache
+def _raws() -> tuple[bytes, ...]:
+    return (
+        seeds.raw_file(),
+        seeds.raw_file("di154", "DI-154RS"),
+        seeds.raw_file("di245", "DI-245"),
+        seeds.raw_file("di1100", "DI-1100"),
+    )
+
+
+def _raw_checked(random: Random) -> Case:
+    """Damage under check sums that are right: what no disk, but a wrong program would do."""
+    head, frames = seeds.raw_frames(random.choice(_raws()))
+    for _ in range(random.choice((1, 1, 2, 4))):
+        what = random.randrange(6)
+        place = random.randrange(len(frames)) if frames else 0
+        if what == 0:
+            head = mutate(head, random).replace(b"\n", b" ")
+        elif what == 1:
+            key = random.choice([*seeds.RAW_HEADER, "version"])
+            value = random.choice(
+                [None, "", "x", -1, 0, 1e-300, 1e300, [], [0], [1, 1], ["1"], {}, True, 2**70]
+            )
+            head = seeds.raw_header({key: value})
+        elif not frames:
+            continue
+        elif what == 2:
+            kind, time_s, body = frames[place]
+            frames[place] = (kind, time_s, mutate(body, random) if body else b"x")
+        elif what == 3:
+            kind, time_s, body = frames[place]
+            odd = random.choice([-1.0, 0.0, 1e300, float("nan"), float("inf"), time_s + 100.0, 1e7])
+            frames[place] = (kind, odd, body)
+        elif what == 4:
+            del frames[place]
+        else:
+            frames.insert(place, random.choice(frames))
+    return Case(seeds.raw_joined(head, frames))
+
+
+def _stream(model: str) -> Callable[[Random], Case]:
+    sent = {count: seeds.streams(model, count) for count in (1, 2, 3, 4)}
+
+    def draw(random: Random) -> Case:
+        count = random.choice((1, 2, 3, 4))
+        data = mutate(sent[count], random)
+        return Case(data, detail=f"{model} {count} {random.randrange(1 << 30)}")
+
+    return draw
+
+
+def _answers(random: Random) -> Case:
+    return Case(b"", detail=f"{random.choice(MODELS)} {random.randrange(1 << 30)}")
+
+
+@cache
+def _large_files() -> list[tuple[str, bytes]]:
+    """Files of about a megabyte, in which what is quadratic would take its time."""
+    text = ("t,theta\n" + seeds.rows("{t:.3f},{x:.5f}\n", count=60_000)).encode()
+    blanks = ("t;theta\n" + seeds.rows("{t:.3f};\n", count=60_000)).encode()
+    return [
+        (".csv", text),
+        (".csv", blanks),
+        (".csv", text.replace(b"\n", b",")),
+        (".csv", b"1;" * 400_000),
+        (".csv", b'"' + text),
+        (".WDQ", seeds.windaq(hires=False, scans=250_000)),
+        (".WDH", seeds.windaq(hires=True, scans=250_000, comment=True)),
+    ]
+
+
+def _large(random: Random) -> Case:
+    suffix, data = random.choice(_large_files())
+    if suffix != ".csv" and random.random() < 0.7:
+        head = mutate(data[:200], random)
+        return Case(head[:200].ljust(200, b"\0") + data[200:], suffix)
+    return Case(mutate(data, random), suffix)
+
+
+def targets() -> dict[str, Target]:
+    """All that is fuzzed; a million inputs together."""
+    found = {
+        "text tables": Target(_files(_named(".csv", seeds.texts())), run_file, 90_000),
+        "the plain form": Target(_files(_named(".csv", seeds.plain())), run_file, 60_000),
+        "WinDaq CSV": Target(_files(_named(".csv", seeds.windaq_csv())), run_file, 25_000),
+        "DI-149 captures": Target(_files(_named(".cso", seeds.captures())), run_file, 40_000),
+        "WinDaq": Target(_files(seeds.windaq_files()), run_file, 200_000),
+        "MATLAB": Target(_files(_named(".mat", seeds.matlab())), run_file, 40_000),
+        "MATLAB, inside the compression": Target(_matlab_packed, run_file, 15_000),
+        "Excel": Target(_files([(".xlsx", seeds.zipped(_workbook()))]), run_file, 5_000),
+        "Excel, inside the archive": Target(_excel_parts, run_file, 10_000),
+        "raw recordings": Target(_files(_named("", list(_raws()))), run_raw, 60_000),
+        "raw, with right check sums": Target(_raw_checked, run_raw, 60_000),
+        "large files": Target(_large, run_file, 200),
+        "answers of devices": Target(_answers, run_answers, 94_800),
+    }
+    for model in MODELS:
+        marked = isinstance(find_driver(model).decoder(1), SyncBitDecoder)
+        inputs = 20_000 if marked else 25_000
+        found[f"decoder {model}"] = Target(_stream(model), run_decoder, inputs)
+    return found
+
 
 JOURNAL = "fuzz"
 BLOCK = 500
@@ -166,8 +691,9 @@ def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, whole: bool
                 said = "the interpreter died in this block, or in one beside it"
                 tally |= {"inputs": _length(name, whole)}
                 done.setdefault(name, {})[str(number)] = {
-                    **tally, "wrong": [[number * BLOCK, said]]
-                }  # fmt: skip
+                    **tally,
+                    "wrong": [[number * BLOCK, said]],
+                }
 
 
 def _total(blocks: dict[str, Tally]) -> Tally:

@@ -39,14 +39,18 @@ def texts() -> list[bytes]:
         ("\ufeffZeit [s];Winkel [rad]\r\n" + comma.replace("\n", "\r\n")).encode(),
         ("made by hand\nsample rate: 10 Hz\nangle (deg)\n" + rows("{x:.3f}\n", 57.3)).encode(),
         ("time(ms) count\n" + steps).encode(),
-        ('"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)"\n'
-         + rows('{t:.6E},{x:.6E},"1.0E-3"\n')).encode(),
+        (
+            '"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)"\n'
+            + rows('{t:.6E},{x:.6E},"1.0E-3"\n')
+        ).encode(),
         ("mass A,,\nt,x,y\n" + rows("{t:.3f},{x:.4f},-0.9\n")).encode(),
-        ("Run #1;;Run #2;\nTime ( s );Angle ( rad );Time ( s );Angle ( rad )\n"
-         + rows("{t:.2f};{x:.4f};{t:.2f};\n")).encode(),
+        (
+            "Run #1;;Run #2;\nTime ( s );Angle ( rad );Time ( s );Angle ( rad )\n"
+            + rows("{t:.2f};{x:.4f};{t:.2f};\n")
+        ).encode(),
         ("% remark\nlocal time,angle_deg\n" + clock).encode("utf-16"),
         ("sample rate (Hz): 10\n" + rows("{n}\t{x:.4f}\t{x:.2e}\n")).encode(),
-    ]  # fmt: skip
+    ]
 
 
 def plain() -> list[bytes]:
@@ -81,8 +85,16 @@ def captures() -> list[bytes]:
     ]
 
 
-def windaq(*, hires: bool, size: int = 1156, channels: int = 2, packed: bool = False,
-           comment: bool = False, wrapped: bool = False, scans: int = ROWS) -> bytes:  # fmt: skip
+def windaq(
+    *,
+    hires: bool,
+    size: int = 1156,
+    channels: int = 2,
+    packed: bool = False,
+    comment: bool = False,
+    wrapped: bool = False,
+    scans: int = ROWS,
+) -> bytes:
     """A WinDaq file after the format's description."""
     counts = np.rint(swing(scans)[1] * 8000).astype(np.int64)[:, None].repeat(channels, 1)
     words = counts if hires else counts * 4
@@ -188,9 +200,15 @@ def streams(model: str, channels: int, scans: int = ROWS) -> bytes:
 
 
 RAW_HEADER = {
-    "model": "DI-2108", "port": "COM3", "channels": [1, 2], "rate_hz": 100.0, "range_volts": 10.0,
-    "recorded_at": "2026-01-01T00:00:00+00:00", "clock_scale": 1.0, "firmware": "1.35",
-}  # fmt: skip
+    "model": "DI-2108",
+    "port": "COM3",
+    "channels": [1, 2],
+    "rate_hz": 100.0,
+    "range_volts": 10.0,
+    "recorded_at": "2026-01-01T00:00:00+00:00",
+    "clock_scale": 1.0,
+    "firmware": "1.35",
+}
 
 
 def raw_file(model: str = "di2108", title: str = "DI-2108") -> bytes:

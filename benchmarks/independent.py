@@ -141,9 +141,17 @@ def motion(truth: Truth, noise_rad: float, start_s: float) -> tuple[np.ndarray, 
         sign = -math.copysign(1.0, x)
         at_rest.direction = -sign  # type: ignore[attr-defined]
         run = solve_ivp(
-            force, (time, time + 3 * math.pi / w), [x, 0.0], "DOP853", events=at_rest,
-            args=(sign,), rtol=1e-12, atol=1e-16, dense_output=True, first_step=0.02 / w,
-        )  # fmt: skip
+            force,
+            (time, time + 3 * math.pi / w),
+            [x, 0.0],
+            "DOP853",
+            events=at_rest,
+            args=(sign,),
+            rtol=1e-12,
+            atol=1e-16,
+            dense_output=True,
+            first_step=0.02 / w,
+        )
         pieces.append((time, run.t[-1], run.sol))
         time, x = run.t[-1], float(run.y[0, -1])
     end = min(time, truth.longest + start_s)

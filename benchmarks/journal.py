@@ -20,8 +20,11 @@ def code() -> str:
     digest = hashlib.sha256()
     for module in ("pendpipe.acquire.simulated", "pendpipe.formats.writing"):
         digest.update(code_version(module).encode())
-    for folder, pattern in (("src/pendpipe/formats", "*.py"), ("benchmarks", "fuzz*.py"),
-                            ("benchmarks", "acquisition*.py")):  # fmt: skip
+    for folder, pattern in (
+        ("src/pendpipe/formats", "*.py"),
+        ("benchmarks", "fuzz*.py"),
+        ("benchmarks", "acquisition*.py"),
+    ):
         for path in sorted((ROOT / folder).glob(pattern)):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]

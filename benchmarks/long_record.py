@@ -97,9 +97,11 @@ def measured(samples: int) -> dict[str, FloatArray]:
         for name in names:
             done = subprocess.run(
                 [sys.executable, "-m", "benchmarks.long_record", name, str(samples)],
-                cwd=Path(__file__).resolve().parents[1], capture_output=True, text=True,
+                cwd=Path(__file__).resolve().parents[1],
+                capture_output=True,
+                text=True,
                 check=True,
-            )  # fmt: skip
+            )
             found[name].append(json.loads(done.stdout))
     return {name: np.array(times) for name, times in found.items()}
 
@@ -137,25 +139,40 @@ def rows(samples: int = SAMPLES) -> list[Row]:
     shown = f"{PROCESSES} processes, {CALLS} calls in each; one core; CPU time, median (range)"
     return [
         Row(f"{samples:.0e} readings, {len(points)} turning points", shown),
-        Row("ours: a process's first call; the calls after it",
-            f"{spread(first['ours'])}; {spread(later['ours'])}"),
-        Row("`find_peaks` in pieces, likewise",
-            f"{spread(first['pieces'])}; {spread(later['pieces'])}"),
-        Row("`find_peaks` of the whole, likewise",
-            f"{spread(first['whole'])}; {spread(later['whole'])}"),
+        Row(
+            "ours: a process's first call; the calls after it",
+            f"{spread(first['ours'])}; {spread(later['ours'])}",
+        ),
+        Row(
+            "`find_peaks` in pieces, likewise",
+            f"{spread(first['pieces'])}; {spread(later['pieces'])}",
+        ),
+        Row(
+            "`find_peaks` of the whole, likewise",
+            f"{spread(first['whole'])}; {spread(later['whole'])}",
+        ),
         Row("`np.sum` of the readings, the later calls: the floor", spread(later["sum"])),
         Row("ours on all cores, the later calls, wall time", f"{wall:.3f} s"),
         at_least("over `find_peaks` in pieces, first call", once["pieces"] / once["ours"], 6.0),
         at_least("the same, later calls", middle["pieces"] / middle["ours"], 6.0),
-        at_least("over `find_peaks` of the whole, first call (it must get 0.8 GB for \\|x\\|)",
-                 once["whole"] / once["ours"], 15.0),
-        at_least("the same, later calls (15 would be below the floor)",
-                 middle["whole"] / middle["ours"], 15.0),
+        at_least(
+            "over `find_peaks` of the whole, first call (it must get 0.8 GB for \\|x\\|)",
+            once["whole"] / once["ours"],
+            15.0,
+        ),
+        at_least(
+            "the same, later calls (15 would be below the floor)",
+            middle["whole"] / middle["ours"],
+            15.0,
+        ),
         at_most("extra memory", extra, 64.0, " MB"),
         at_most("bias of the amplitudes over the noise", float(error.mean() / NOISE), 0.01),
-        Row("sd of the amplitudes over the noise", f"{error.std() / NOISE:.3f}",
-            f"bound {math.sqrt(2.0 / PER_HALF_CYCLE):.3f}"),
-    ]  # fmt: skip
+        Row(
+            "sd of the amplitudes over the noise",
+            f"{error.std() / NOISE:.3f}",
+            f"bound {math.sqrt(2.0 / PER_HALF_CYCLE):.3f}",
+        ),
+    ]
 
 
 def main() -> None:

@@ -51,8 +51,18 @@ def fit_eq8(time_s: FloatArray, angle_rad: FloatArray, noise_rad: float) -> Base
     window = time_s - time_s[0] < 12.0 / omega
     c, s = np.linalg.lstsq(shape[window], swing[window], rcond=None)[0]
     rate = 3.0 / span
-    unit = np.array([amplitude, amplitude * omega, 0.1 / (omega * span), rate, rate,
-                     rate / (omega * amplitude), rate * omega * amplitude, amplitude])  # fmt: skip
+    unit = np.array(
+        [
+            amplitude,
+            amplitude * omega,
+            0.1 / (omega * span),
+            rate,
+            rate,
+            rate / (omega * amplitude),
+            rate * omega * amplitude,
+            amplitude,
+        ]
+    )
     start = np.array([c, omega * s, omega, decay, 0.0, 0.0, 0.0, np.median(angle_rad)])
 
     def run(u: FloatArray) -> Track:
@@ -74,9 +84,12 @@ def fit_eq8(time_s: FloatArray, angle_rad: FloatArray, noise_rad: float) -> Base
     low = np.full(8, -np.inf)
     low[3:7] = -start[3:7] / unit[3:7] - 1e-3
     found = least_squares(
-        lambda u: np.nan_to_num((reading(u) - angle_rad) / noise_rad, nan=1e6), np.zeros(8),
-        jac=jacobian, bounds=(low, np.inf), max_nfev=60,
-    )  # fmt: skip
+        lambda u: np.nan_to_num((reading(u) - angle_rad) / noise_rad, nan=1e6),
+        np.zeros(8),
+        jac=jacobian,
+        bounds=(low, np.inf),
+        max_nfev=60,
+    )
     track = run(found.x)
     left = angle_rad - reading(found.x)
     omega = float(start[2] + unit[2] * found.x[2])
@@ -120,9 +133,12 @@ def templates(base: Baseline) -> dict[str, list[FloatArray]]:
         after, ring = t >= at, size / size[k]
         turned = phase - phase[k]
         for name, shape in (
-            ("equilibrium-step", 1.0 - ring * np.cos(turned)), ("impulse", ring * np.sin(turned)),
-            ("amplitude-step", x), ("frequency-step", (t - at) * v), ("damping-step", (t - at) * x),
-        ):  # fmt: skip
+            ("equilibrium-step", 1.0 - ring * np.cos(turned)),
+            ("impulse", ring * np.sin(turned)),
+            ("amplitude-step", x),
+            ("frequency-step", (t - at) * v),
+            ("damping-step", (t - at) * x),
+        ):
             found.setdefault(name, []).append(np.where(after, shape, 0.0))
     return {name: [s.reshape(len(t), -1) for s in shapes] for name, shapes in found.items()}
 

@@ -106,8 +106,14 @@ def machine() -> str:
 def write(part: str, title: str, rows: Sequence[Row]) -> None:
     """Print a part's table, and put it in the place of the one on the page."""
     words = {None: "", True: "met", False: "**missed**"}
-    lines = [f"## {title}", "", f"{machine()}.", "", "| what | measured | asked | |",
-             "|---|---|---|---|"]  # fmt: skip
+    lines = [
+        f"## {title}",
+        "",
+        f"{machine()}.",
+        "",
+        "| what | measured | asked | |",
+        "|---|---|---|---|",
+    ]
     lines += [f"| {row.what} | {row.measured} | {row.asked} | {words[row.met]} |" for row in rows]
     table = "\n".join(lines)
     print(table, flush=True)

@@ -90,15 +90,18 @@ def gains(sized: Sized, angle_rad: FloatArray) -> list[float]:
     tangent = bench.tangent(sized.point)
     residual = (angle_rad - there)[kept]
     scenario = sized.without
-    waves = [replace(scenario.noise, alpha=alpha).slow(scenario.time_s)[kept]
-             for alpha in STEEPNESS]  # fmt: skip
+    waves = [
+        replace(scenario.noise, alpha=alpha).slow(scenario.time_s)[kept] for alpha in STEEPNESS
+    ]
     without, with_it = (
         np.max([likelihoods(columns, residual, slow, scenario.sd_rad) for slow in waves], axis=0)
         for columns in (tangent, np.column_stack([tangent, drift]))
     )
     strengths = np.array(STRENGTHS)
-    allowed = [(strengths == 0.0) | ((strengths < most) & (strengths > 1.0 / most))
-               for most in KNOWN.values()]  # fmt: skip
+    allowed = [
+        (strengths == 0.0) | ((strengths < most) & (strengths > 1.0 / most))
+        for most in KNOWN.values()
+    ]
     return [float(with_it[part].max() - without[part].max()) for part in allowed]
 
 
@@ -141,8 +144,11 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"| effect | recordings | {' | '.join(KNOWN)} |\n|---|---{'|---' * len(KNOWN)}|")
     for name in SLOW:
-        cases = [Case("single", (name,), size, number)
-                 for number in range(arguments.count) for size in SIZES]  # fmt: skip
+        cases = [
+            Case("single", (name,), size, number)
+            for number in range(arguments.count)
+            for size in SIZES
+        ]
         with process_pool(arguments.processes) as pool:
             told = list(zip(cases, pool.map(answered, cases), strict=True))
         known = [(case.size, answer) for case, answer in told if answer is not None]
