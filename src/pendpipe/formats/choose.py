@@ -210,7 +210,10 @@ def _time(
             return before[-1], False
     taken = (options.reading_column or "").lower()
     best: tuple[float, Column | None] = (0.0, None)
-    for place, column in enumerate(table.columns):
+    counted = len(table.columns) > 2 and _counts_samples(
+        table.columns[0], roles[table.columns[0].number]
+    )
+    for place, column in enumerate(table.columns, start=-counted):
         role, share = roles[column.number], one_way(column.values)
         if role in ("none", "signal", "volts", "velocity", "acceleration"):
             continue
@@ -226,9 +229,11 @@ def _time(
         first = place == 0 and role in ("unknown", "index", "length") and share > 0.99
         if not named and even < 0.5 and not first:
             continue
-        score = 10.0 * named + 2.0 * (place == 0) + 3.0 * even + share + 8.0 * (distinct - 1.0)
+        score = 10.0 * named + 2.0 * (place == 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
         if role == "index":
             score -= 5.0
+        elif not named and _counts_samples(column, role):
+            score -= 3.0  # a number of the row, where anything else is a time
         if role == "angle" or (role == "length" and place > 0):
             score -= 4.0
         if score > best[0]:
@@ -345,11 +350,23 @@ def _not_a_derivative(
     for column in alive:
         if column is chosen or roles[column.number] not in ("unknown", "signal"):
             continue
-        if derivative_slope(clock, chosen.values, column.values) is not None:
+        forward = derivative_slope(clock, chosen.values, column.values)
+        backward = derivative_slope(clock, column.values, chosen.values)
+        if forward is None and backward is None:
+            continue
+        # Of a swing the derivative's derivative is the swing again, but upside down.
+        first = 2 * _like_units(forward) - 2 * _like_units(backward)
+        if first + (1 if forward is not None and forward > 0 else -1) > 0:
             return (chosen,), f", whose derivative '{column.label}' is"
-        if derivative_slope(clock, column.values, chosen.values) is not None:
-            return (column,), f", whose derivative '{chosen.label}' is"
+        return (column,), f", whose derivative '{chosen.label}' is"
     return (chosen,), why
+
+
+def _like_units(slope: float | None) -> bool:
+    """Whether a slope is 1, or what comes of degrees beside radians."""
+    return slope is not None and any(
+        abs(abs(slope) / ratio - 1.0) < 0.1 for ratio in (1.0, np.pi / 180, 180 / np.pi)
+    )
 
 
 def _moves(column: Column) -> bool:
@@ -392,4 +409,5 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     if np.std(radius) > 0.3 * np.std(x) or abs(np.median(angle)) > 0.4 or not swing_of(x).clear:
         return False
     # On a circle y follows x squared; two columns without names must show it.
-    return named or bool(np.corrcoef(x**2, np.abs(y))[0, 1] < -0.5)
+    follows = np.corrcoef(x**2, np.abs(y))[0, 1] < -0.5 and np.std(radius) < 0.5 * np.std(y)
+    return named or (bool(follows) and one_way(y) < 0.9)

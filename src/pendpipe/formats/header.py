@@ -68,24 +68,31 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
 def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     """Split a line of names as its rows are, and in the other ways that fit their width."""
     bare = line.strip().lstrip("".join(COMMENT)).strip()
-    yield layout.split(line)
-    yield layout.split(bare)
+    own = [layout.split(line), layout.split(bare)]
+    yield from (cells for cells in own if len(cells) == layout.width)
+    if layout.width > 1 and not any(map(layout.is_number, layout.split(bare))):
+        # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
+        joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
+        for cells in (
+            *(bare.split(sign) for sign in "\t;,|"),
+            re.split(r"\s{2,}", bare),
+            [cell.replace("\0", " ") for cell in joined],
+        ):
+            cells = [cell.strip() for cell in cells]
+            while len(cells) > layout.width and not cells[-1]:
+                cells.pop()
+            if len(cells) == layout.width:
+                yield cells
     if is_comment(line):
         yield bare.split()
-    if any(map(layout.is_number, layout.split(bare))):
-        return
-    # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
-    joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare)
-    for cells in (
-        *(bare.split(sign) for sign in "\t;,|"),
-        re.split(r"\s{2,}", bare),
-        [cell.replace("\0", " ") for cell in joined.split()],
-    ):
-        cells = [cell.strip() for cell in cells]
-        while len(cells) > layout.width and not cells[-1]:
-            cells.pop()
-        if len(cells) == layout.width:
-            yield cells
+    yield from own
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Say whether a row holds nothing but units: known ones, or all in brackets."""
+    filled = [cell for cell in cells if cell]
+    bracketed = all(re.fullmatch(r"[\[({<].*[\])}>]", cell) for cell in filled)
+    return bool(filled) and (bracketed or all(map(unit_of, filled)))
 
 
 def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list[str]]:
@@ -105,7 +112,9 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
                 continue
             if len(cells) < layout.width and not is_comment(line):
                 continue
-            if all(map(unit_of, cells)) and candidates and candidates[-1][0] == len(cells):
+            if candidates and any(map(layout.is_number, cells)):
+                continue
+            if _are_units(cells) and candidates and candidates[-1][0] == len(cells):
                 continue
             if layout.width == 1 and (len(bare.split()) > 4 or "," in bare or ":" in bare):
                 continue
@@ -120,10 +129,9 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
 def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     """Read a row under the names that holds units only."""
     for line in below:
-        cells = layout.split(line.strip().lstrip("#%"))
-        only_units = any(map(unit_of, cells)) and all(not cell or unit_of(cell) for cell in cells)
-        if len(cells) == layout.width and only_units:
-            return [cell.strip("[](){} ") for cell in cells]
+        for cells in _splits(line.strip().lstrip("#%"), layout):
+            if len(cells) == layout.width and _are_units(cells):
+                return [cell.strip("[](){} ") for cell in cells]
     return None
 
 

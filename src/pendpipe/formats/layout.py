@@ -137,6 +137,8 @@ def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
             if layout.is_number(cell):
                 found += 1
                 numbers[place] += 1
+            elif ":" in cell and _CLOCK.fullmatch(cell.lstrip("'")):
+                found += 1
             else:
                 blank += cell.lower() in BLANK_CELLS
         total += found / max(width - blank, 1)
@@ -173,21 +175,35 @@ def _wanted_decimals(options: ReadOptions) -> tuple[str, ...]:
 def first_row(lines: Sequence[str], layout: Layout) -> int:
     """Find the first line of the block of numbers.
 
-    It has the usual width and at least half of its filled cells are numbers; so has the
-    next row (a lone row of numbers above the block belongs to the header).
+    It has the usual width and at least half of its filled cells are numbers; the next row
+    has numbers in the same cells (a lone row of numbers, or a title that ends in one, belongs
+    to the header).
     """
     held: int | None = None
+    above: list[str] = []
+    first: int | None = None
     for place, line in enumerate(lines):
         if not line.strip() or is_comment(line):
             continue
         fits = _is_row(line, layout)
-        if fits and held is not None:
+        cells = layout.split(line) if fits else []
+        if fits and first is None:
+            first = place
+        if fits and held is not None and not _is_title(above, cells, layout):
             return held
-        held = place if fits else None
-    fitting = [place for place, line in enumerate(lines) if _is_row(line, layout)]
-    if not fitting:
+        held, above = (place, cells) if fits else (None, [])
+    if first is None:
         raise NotThisFormatError("no row of numbers was found")
-    return fitting[0]
+    return first
+
+
+def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> bool:
+    """Say whether a row has words where the next one has a number or a time of day."""
+    return any(
+        not any(map(str.isdigit, word)) and word.lower() not in BLANK_CELLS
+        for word, cell in zip(above, cells, strict=True)
+        if any(map(str.isdigit, cell)) and not layout.is_number(word)
+    )
 
 
 def _is_row(line: str, layout: Layout) -> bool:

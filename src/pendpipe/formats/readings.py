@@ -12,7 +12,7 @@ from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice
 from pendpipe.formats.examine import resolution
 from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.swing import derivative_slope, follows_sine
+from pendpipe.formats.swing import derivative_slope, follows_sine, periods
 from pendpipe.formats.table import Column, Table
 from pendpipe.formats.words import Unit, unit_of
 from pendpipe.recording import Quantity
@@ -162,7 +162,9 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
         return _Guess(_RADIAN)
     reach = _reach(finite)
     words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
-    said = re.search(r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b|_deg|°", words)
+    said = re.search(
+        r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
+    )
     if said and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     by_step = _by_step(finite)
@@ -184,23 +186,23 @@ def _by_size(
     if turns:
         return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
     if reach > 1.1 * np.pi:
-        slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 180 else None
+        slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 170 else None
         if slope is not None and abs(slope - 1.0) < 0.4:
             return _Guess(
                 _DEGREE, "is taken to be in degrees (its period grows as such swings' does)"
             )
-        if reach > 400.0 or not named:
-            if reach <= 180.0:
-                return _Guess(
-                    _DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True
-                )
+        odd = slope is not None and np.radians(reach) > 0.5
+        if reach > 360.0 or odd or not (named or reach <= 90.0):
             return _Guess(
                 _UNKNOWN, f"has no unit and swings by {reach:.4g}: analysed in its own", True
             )
-        return _Guess(_DEGREE, f"is taken to be in degrees (it swings by {reach:.3g})")
+        return _Guess(_DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True)
     slope = follows_sine(time_s, column.values, 1.0)
     if slope is not None and abs(slope - 1.0) < 0.35:
-        return _Guess(_RADIAN, "is taken to be in radians (its period grows as such swings' does)")
+        why = "is taken to be in radians (its period grows as such swings' does)"
+        # Of a pendulum 1 m long (2 s) metres look the same.
+        usual = float(np.median(periods(time_s, column.values)[0]))
+        return _Guess(_RADIAN, why, weak=not named and abs(usual - 2.0) < 0.3)
     if slope is not None and abs(slope) < 0.35 and reach > 0.35:
         # No pendulum of so many radians: a torsion pendulum, or another unit.
         odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"

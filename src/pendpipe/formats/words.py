@@ -239,9 +239,11 @@ def role_of(name: str) -> Role:
     """
     words = plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip()))
     whole = re.sub(r"[\s_\-.]+", " ", words).strip()
-    for role, pattern in _PATTERNS:
-        if pattern.fullmatch(whole) or pattern.fullmatch(words):
-            return role
+    # "Zeit2" is the time of the second run.
+    for form in (whole, words, re.sub(r" ?\d+$", "", whole)):
+        for role, pattern in _PATTERNS:
+            if pattern.fullmatch(form):
+                return role
     for role, pattern in _PATTERNS:
         found = pattern.search(whole)
         # One letter inside a longer name ("pendulum a") says little.
