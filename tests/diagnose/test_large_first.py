@@ -152,7 +152,7 @@ def test_a_search_that_is_not_taken_leaves_the_record_whole(
         )
         return True
 
-    monkeypatch.setattr("pendpipe.diagnose.large_first.grown", not_to_the_end)
+    monkeypatch.setattr("pendpipe.diagnose.large_first.progressive_start", not_to_the_end)
     large_first(beginning, state, add_circular_error)
     assert followed[1] < followed[0] == len(beginning.data)
     assert len(state.data) == len(state.noise.weight) == len(beginning.data)
