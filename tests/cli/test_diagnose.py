@@ -138,7 +138,7 @@ def test_circular_error_is_named_and_the_fit_improves_to_the_noise(
     frequency = content["improved"]["parameters"]["frequency"]
     assert abs(frequency["value"] - FREQUENCY_HZ) < 5 * frequency["sd"]
     assert content["figures"] == [
-        "residual_map.svg", "residual_spectrum.svg", "damping.svg", "frequency.svg",
+        "decay.svg", "residual_map.svg", "residual_spectrum.svg", "damping.svg", "frequency.svg",
     ]  # fmt: skip
     assert {path.name for path in tmp_path.glob("*.svg")} == set(content["figures"])
 
@@ -229,9 +229,18 @@ def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> 
 
     cli.main(["diagnose", str(linear), "--out", str(tmp_path), "--no-figures", "--seed", "3"])
     outcome = diagnose_recording(read_plain(linear), seed=3)
-    own, filed = outcome.diagnosis.as_json(), diagnosis(tmp_path)
+    own, filed = outcome.to_dict(), diagnosis(tmp_path)
     for key in TOP - {"provenance"}:
         assert json.loads(json.dumps(own[key])) == filed[key]
+
+
+def test_json_goes_to_standard_output_and_needs_no_folder(
+    linear: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["diagnose", str(linear), "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    check_contract(content)
+    assert content["verdict"] == "consistent"
 
 
 def test_importing_the_diagnosis_costs_nothing() -> None:

@@ -81,8 +81,8 @@ def test_the_whole_catalogue_accuses_noise_as_often_as_it_says() -> None:
 
     def p_value() -> float:
         noise_alone = generator.standard_normal(len(fit.residual))
-        place = replace(fit.place, residual=noise_alone)
-        return detect(scanner, replace(fit, place=place), seed=5, known=known).p_value
+        evaluation = replace(fit.evaluation, residual=noise_alone)
+        return detect(scanner, replace(fit, evaluation=evaluation), seed=5, known=known).p_value
 
     found = np.array([p_value() for _ in range(count)])
     for level in (0.1, 0.3):

@@ -329,10 +329,8 @@ def test_glitches_need_no_model(clean: FloatArray) -> None:
     """The clock is wrong by a hundredth; single readings are found, a shifted stretch is none."""
     noisy = clean + white(generator(), AIR.count)
     right = fitted(AIR, noisy)
-    far = replace(
-        right.fit,
-        place=replace(right.fit.place, at=right.fit.model.evaluate(1.01 * right.fit.value)),
-    )
+    off = right.fit.model.evaluate(1.01 * right.fit.value)
+    far = replace(right.fit, evaluation=replace(right.fit.evaluation, at=off))
     where = np.array([420, 1501, 3300])
     for wrong, expected in ((where, where.tolist()), (np.arange(1500, 1508), [])):
         readings = noisy.copy()

@@ -129,7 +129,7 @@ def test_a_search_that_is_not_taken_leaves_the_record_whole(
     noise = first_noise(beginning)
     fit = refine(beginning.model, beginning.data, noise, beginning.value)
     only_the_end = np.where(np.arange(len(fit.residual)) > 0.99 * len(fit.residual), 1e3, 0.0)
-    fit = replace(fit, place=replace(fit.place, residual=only_the_end))
+    fit = replace(fit, evaluation=replace(fit.evaluation, residual=only_the_end))
     state = State(fit, beginning.data, noise, [], beginning.value, fit.value)
     followed: list[int] = []
 

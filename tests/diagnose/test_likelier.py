@@ -137,9 +137,7 @@ def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
     outcome = diagnosed("two")
     first = outcome.search.steps[0]
     other = first.rivals[1]
-    monkeypatch.setattr(
-        likelier, "_likeliest", lambda _, step, __: other if step is first else None
-    )
+    monkeypatch.setattr(likelier, "_likelier", lambda _, step, __: other if step is first else None)
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert found.steps[0].winner is other
     assert found.steps[1].before is other.fit

@@ -113,10 +113,10 @@ def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
     found = beginning_of(ROD)
     small = small_swings(fitted(ROD, circular_error=(1.0,)), found.data, first_noise(found))
     assert small is not None
-    assert small.sure
+    assert small.significant
     assert small.amplitude < 0.04
     assert 0.005 < small.excess < 0.1
-    assert "stiffer" in small.said("rad")
+    assert "stiffer" in small.sentence("rad")
 
 
 def test_bearing_and_air_share_the_loss_of_a_rig() -> None:

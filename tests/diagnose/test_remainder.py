@@ -36,7 +36,7 @@ def test_noise_alone_leaves_nothing_and_widens_no_error() -> None:
     ("where", "extra"),
     [
         ("harmonics", 4e-4 * np.cos(3.0 * 2.0 * np.pi * 0.9 * TIME_S)),
-        ("level", 6e-4 * np.sin(2.0 * np.pi * 0.02 * TIME_S)),
+        ("offset", 6e-4 * np.sin(2.0 * np.pi * 0.02 * TIME_S)),
         ("between", 4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S)),
     ],
 )

@@ -233,7 +233,7 @@ def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> N
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
 def test_the_result_is_json_without_nan(name: str) -> None:
-    content = diagnosed(name).diagnosis.as_json()
+    content = diagnosed(name).diagnosis.to_dict()
     again = json.loads(json.dumps(content, allow_nan=False))
     assert set(again) >= {
         "schema_version",
@@ -270,4 +270,4 @@ def test_the_result_is_json_without_nan(name: str) -> None:
 def test_the_seed_decides_the_draws_and_nothing_else() -> None:
     record = recording(other_engine(TRUTH), 1)
     again = diagnose_recording(record).diagnosis
-    assert again.as_json() == diagnosed("null").diagnosis.as_json()
+    assert again.to_dict() == diagnosed("null").diagnosis.to_dict()

@@ -1,14 +1,15 @@
-"""Say where model and recording differ, and what physics was left out.
+"""Find where model and recording differ, and what physics is missing.
 
-Eq. 8 (or Eq. 3) is fitted to a free decay; what it leaves is searched for every effect of
-the catalogue, dynamics and measurement alike, and those that chance does not explain are
-added to the model. DIR gets diagnosis.json and the figures; the answer in one paragraph
-goes to standard output.
+Eq. 8 (or Eq. 3) is fitted to a free decay. Its residual is searched for every effect of the
+catalogue, of the pendulum and of the measurement alike; those that chance does not explain are
+added to the model. The answer goes to standard output as one paragraph, and DIR gets
+diagnosis.json and the figures.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,19 +27,24 @@ FOUND = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe diagnose``."""
     _reading.add_arguments(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for the results")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write diagnosis.json and the figures there"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print diagnosis.json instead of the paragraph"
+    )
     parser.add_argument(
         "--baseline",
         choices=("eq8", "viscous"),
         default="eq8",
-        help="eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
+        help="the null model; eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
     )
     parser.add_argument(
         "--fix",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="hold a parameter, so that a prediction is compared (a, b, c, frequency, amplitude,"
+        help="hold a parameter, so that a prediction is tested (a, b, c, frequency, amplitude,"
         " offset, quality_factor_hysteretic, quality_factor_viscous); repeatable",
     )
     parser.add_argument(
@@ -46,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_probability,
         default=0.01,
         metavar="P",
-        help="how often a recording that lacks nothing may be accused (%(default)s)",
+        help="false-alarm probability for a recording that lacks nothing (%(default)s)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the draws that count trials"
@@ -58,13 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--figures",
         choices=("all", "found", "none"),
         default="all",
-        help="draw them always (all), where something is missing (found), or never",
+        help="draw them always (all), where something is missing (found), or never (none)",
     )
     parser.add_argument(
         "--no-figures", dest="figures", action="store_const", const="none", help="as --figures none"
     )
     parser.add_argument(
-        "--turning-points", type=Path, metavar="CSV", help="found before, with their cuts"
+        "--turning-points", type=Path, metavar="CSV", help="of an earlier stage, with their cuts"
     )
     parser.add_argument(
         "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
@@ -73,15 +79,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Diagnose, write, and say it."""
+    """Diagnose, write the result, and print the answer."""
     from pendpipe.analysis.fit.fixed import parse_fixed
+    from pendpipe.errors import InputError
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
     from pendpipe.stages.diagnose import DiagnosisOptions
 
+    if arguments.record is not None and arguments.out is None:
+        raise InputError("--record", "a campaign's record needs a folder", "add --out DIR")
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
-    question = DiagnosisOptions(
+    options = DiagnosisOptions(
         arguments.baseline,
         fixed,
         arguments.seed,
@@ -89,11 +98,11 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.figures,
         arguments.record is not None,
     )
-    if Path(arguments.file).is_file():
-        # Before the work: a long diagnosis must not end without a place for it.
+    if arguments.out is not None and Path(arguments.file).is_file():
+        # Before the work: a long diagnosis must not end without a folder to write to.
         make_folder(arguments.out)
     if arguments.record is None:
-        return _answer(arguments, question)
+        return _answer(arguments, options)
     from pendpipe.manifest import check, job
     from pendpipe.stages.diagnose import RESULT
 
@@ -101,7 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
     inputs = [path for path in read if path is not None]
     with job(arguments.out.parent, "diagnose", inputs=inputs) as running:
-        status = _answer(arguments, question)
+        status = _answer(arguments, options)
         running.outputs.append(arguments.out / RESULT)
         running.extras += sorted(
             path for path in arguments.out.iterdir() if path.suffix in (".svg", ".png")
@@ -109,63 +118,78 @@ def run(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _answer(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
+def _answer(arguments: argparse.Namespace, options: DiagnosisOptions) -> int:
     """Diagnose, unless the record was refused before."""
     from pendpipe.stages.diagnose import refused_before
 
     earlier = refused_before(arguments.refused)
     if earlier is not None:
-        return _not_analysable(arguments, question, earlier, {})
-    return _diagnose(arguments, question)
+        return _not_analysable(arguments, options, earlier, {})
+    return _diagnose(arguments, options)
 
 
-def _diagnose(arguments: argparse.Namespace, question: DiagnosisOptions) -> int:
+def _diagnose(arguments: argparse.Namespace, options: DiagnosisOptions) -> int:
     from pendpipe.commands._motion import read_motion
     from pendpipe.errors import DamagedError, InputError
     from pendpipe.stages.diagnose import diagnose_motion, write_diagnosis
 
-    provenance: dict[str, Any] = {"seed": question.seed, "fixed": list(arguments.fix)}
+    provenance: dict[str, Any] = {"seed": options.seed, "fixed": list(arguments.fix)}
     try:
         recording, made = read_motion(arguments)
-        provenance = made | provenance | {"level": question.level}
+        provenance = made | provenance | {"level": options.level}
         outcome = diagnose_motion(
             recording,
-            question,
+            options,
             place=arguments.file,
             turning_points=arguments.turning_points,
             provenance=provenance,
-            progress=_say,
+            progress=_print_progress,
         )
-    except InputError as fault:
-        if isinstance(fault, DamagedError) or not Path(arguments.file).is_file():
+    except InputError as error:
+        if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
         from pendpipe.stages.refusal import within_results
 
-        reason = within_results(fault, arguments.refused)
-        return _not_analysable(arguments, question, reason, provenance)
-    content = write_diagnosis(arguments.out, outcome, question, _say)
+        reason = within_results(error, arguments.refused)
+        return _not_analysable(arguments, options, reason, provenance)
+    content = outcome.to_dict()
+    if arguments.out is not None:
+        content = write_diagnosis(arguments.out, outcome, options, _print_progress)
     for warning in content["warnings"]:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
-    print(content["statement"])
-    asked = arguments.fail_on == content["verdict"]
-    return FOUND if asked else 0
+    _print_answer(arguments, content)
+    return FOUND if arguments.fail_on == content["verdict"] else 0
 
 
 def _not_analysable(
     arguments: argparse.Namespace,
-    question: DiagnosisOptions,
+    options: DiagnosisOptions,
     reason: str,
     provenance: dict[str, Any],
 ) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
+    from pendpipe.diagnose.result import not_analysable
     from pendpipe.stages.diagnose import write_not_analysable
 
-    write_not_analysable(arguments.out, question, reason, provenance)
+    if arguments.out is not None:
+        write_not_analysable(arguments.out, options, reason, provenance)
+    if arguments.json:
+        _print_answer(arguments, not_analysable(options.baseline, reason, provenance))
     print(f"pendpipe: {reason}", file=sys.stderr)
     return 2 if arguments.refused is None else 0
 
 
-def _say(line: str) -> None:
+def _print_answer(arguments: argparse.Namespace, content: dict[str, Any]) -> None:
+    """Print the paragraph, or the whole result with ``--json``."""
+    from pendpipe.files import finite
+
+    if arguments.json:
+        print(json.dumps(finite(content), indent=1, allow_nan=False))
+    else:
+        print(content["statement"])
+
+
+def _print_progress(line: str) -> None:
     """Progress goes to standard error."""
     print(f"  {line}", file=sys.stderr, flush=True)
 

@@ -12,6 +12,14 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.scores import Bank, local_p_values
 from pendpipe.diagnose.spectrum import ToneScans
 
+CATALOGUE_SHARE: Final = 0.5
+"""Part of the significance level for the scan of the catalogue."""
+RED_NOISE_SHARE: Final = 0.2
+"""Part of it for the test whether red noise is an effect."""
+TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
+"""Part of it that the tests of the measurement share."""
+SMALLEST: Final = 1e-12
+"""Smaller p-values rest on tails of the noise that nobody has tested."""
 DRAWS: Final = 256
 FEW_DRAWS: Final = 64
 """They tell the number of trials to a fifth: enough where chance is plainly enough."""
@@ -116,9 +124,10 @@ def _trials(smallest: FloatArray, growth: float) -> Trials:
     return Trials(max(middle, 1.0), growth, min(at, 0.5))
 
 
-CATALOGUE_SHARE: Final = 0.5
-"""Part of the level that the catalogue's scan spends."""
-RED_NOISE_SHARE: Final = 0.2
-"""Part of it for the doubt whether red noise is an effect."""
-TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
-"""Part of it that the tests of the measurement share."""
+def printed(p_value: float) -> str:
+    """Return a p-value as it is printed: below 1e-12 it would rest on untested tails.
+
+    >>> printed(0.0312), printed(0.0)
+    ('p = 0.031', 'p < 1e-12')
+    """
+    return f"p = {p_value:.2g}" if p_value >= SMALLEST else f"p < {SMALLEST:.0e}"

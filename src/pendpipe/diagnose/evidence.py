@@ -76,8 +76,13 @@ class Rival:
 
     @property
     def identifier(self) -> str:
-        """The effect's."""
+        """The effect's identifier."""
         return self.lead.effect.identifier
+
+    @property
+    def name(self) -> str:
+        """The effect's name in words."""
+        return self.lead.effect.name
 
     @property
     def prior(self) -> float:

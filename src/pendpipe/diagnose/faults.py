@@ -60,7 +60,7 @@ class Forensics:
     def __init__(self, samples: Samples, level: float) -> None:
         self.samples, self.level = samples, level
         self._quiet: dict[str, float] = {}
-        self.said: list[str] = []
+        self.clock_notes: list[str] = []
 
     def p_value(self, faults: Sequence[Fault]) -> float:
         """The least global p-value: of the faults that are kept, and of tests that accused none.
@@ -71,8 +71,8 @@ class Forensics:
 
     def before(self, state: State, progress: Progress) -> None:
         """Mend what would corrupt the fit: stamps, lost samples, clipping, glitches."""
-        self._mend_stamps(state, progress)
-        self._mend_clock(state, progress)
+        self._correct_time_stamps(state, progress)
+        self._correct_lost_samples(state, progress)
         if is_gross(state.fit, state.data):
             self._examine("glitches", state, progress, find_in_misfit)
             return
@@ -154,9 +154,9 @@ class Forensics:
         if np.any((others | finding.mask) != (masked.weight == 0.0)):
             _refit(state, others | finding.mask)
 
-    def _mend_stamps(self, state: State, progress: Progress) -> None:
+    def _correct_time_stamps(self, state: State, progress: Progress) -> None:
         """Take an even clock's times where the readings are evener than their stamps."""
-        if state.fit.max_phase_error_rad > _IN_PHASE or self.said:
+        if state.fit.max_phase_error_rad > _IN_PHASE or self.clock_notes:
             return
         finding = TESTS["time-stamps"](state.data, state.fit, state.noise, self.samples)
         if finding.time_s is None or finding.p_value > self.level * _EACH:
@@ -168,10 +168,10 @@ class Forensics:
         if fit.chi2 / data.used > state.fit.chi2 / state.data.used:
             return
         progress(finding.summary)
-        self.said.append(finding.summary)
+        self.clock_notes.append(finding.summary)
         state.settle(fit, data, noise)
 
-    def _mend_clock(self, state: State, progress: Progress) -> None:
+    def _correct_lost_samples(self, state: State, progress: Progress) -> None:
         """Put the readings behind lost samples where they belong."""
         data = state.data
         interval = data.interval_s / data.fold
@@ -181,10 +181,10 @@ class Forensics:
         time = data.time_s.copy()
         for each in lost:
             time[data.time_s >= each.time_s - 1e-9] += each.number * interval
-        mended = replace(data, time_s=time, uniform=False)
+        corrected = replace(data, time_s=time, uniform=False)
         model = state.fit.model.at_times(time)
         try:
-            fit = refine(model, mended, state.noise, state.fit.value, held=state.holding)
+            fit = refine(model, corrected, state.noise, state.fit.value, held=state.holding)
         except NoMotionError:
             return  # so much later the pendulum of this model has come to rest
         if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
@@ -203,7 +203,7 @@ class Forensics:
             summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
         state.faults.append(Fault(found, 0.0, len(state.steps)))
-        state.settle(fit, mended)
+        state.settle(fit, corrected)
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
         """Ask whether random kicks explain more than the best effect of the catalogue does."""

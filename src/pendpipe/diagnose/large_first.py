@@ -1,9 +1,9 @@
-"""Large amplitudes first, where a misfit is gross: then the whole record, from what was found.
+"""Large amplitudes first where a misfit is gross, then the whole record from there.
 
-Contacts and the Coulomb stop rule the last cycles of a record that goes down to rest, the
-restoring torque and the fluid its first. While both are wrong, the end alone loses the phase,
-and no step of Gauss and Newton can be taken that does not stop the pendulum too early. So the
-large amplitudes are searched by themselves, and the rest is added bit by bit.
+Contacts and Coulomb friction dominate the last cycles of a record that decays to rest, the
+restoring torque and the fluid its first. While both are wrong, the end loses the phase, and every
+Gauss-Newton step stops the pendulum too early. So the large amplitudes are searched alone, and
+the rest is added progressively.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.diagnose.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 
-_LARGE: Final = 0.2
-"""Of the first amplitude."""
+_LARGE_AMPLITUDE: Final = 0.2
+"""Amplitudes above this part of the first are large."""
 _FEWEST_CYCLES: Final = 8
-_SHORTER: Final = 0.97
-_CUTS: Final = 8
+_CUT: Final = 0.97
+_MOST_CUTS: Final = 8
 
 
 def large_first(beginning: Beginning, state: State, add_one: Callable[[State], bool]) -> None:
@@ -35,11 +35,11 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
     Parameters
     ----------
     beginning
-        Of the search.
+        Readings, baseline and start values.
     state
-        Behind the baseline's fit to the whole record; what is found goes into it.
+        After the baseline's fit to the whole record; updated with what is found.
     add_one
-        Adds the best effect to a state, and says whether there was one.
+        Adds the best effect to a state, and returns whether there was one.
     """
     count = _large_readings(beginning)
     if count is None or not is_gross(state.fit, state.data):
@@ -49,28 +49,28 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
         return
     while is_gross(part.fit, part.data) and add_one(part):
         pass
-    found = _over_all(part, state)
+    found = _extended(part, state)
     if found is None:
         return
     fit, data, noise = found
-    # Only the readings that it follows can be compared (gross misfits have white noise, so that
-    # each has its own residual).
+    # Compare only the readings that it follows (the noise of a gross misfit is white, so that
+    # each reading has its own residual).
     before = float(np.sum(state.fit.residual[: len(data)] ** 2))
     if not fit.model.effects or fit.chi2 >= before:
         return
     state.steps, state.first, state.holding = part.steps, part.first, part.holding
-    # What was gross is explained now: the noise is what this model leaves, no more.
+    # The gross misfit is explained: estimate the noise anew from this model.
     state.settle(fit, data, noise)
 
 
 def _large_readings(beginning: Beginning) -> int | None:
-    """How many readings are at large amplitudes; None where that is all, or too few."""
+    """Count the readings at large amplitudes; None if these are all or too few."""
     points, data = beginning.points, beginning.data
     amplitude = np.abs(points.amplitude_rad)
     inside = points.time_s <= data.time_s[-1]
     if np.count_nonzero(inside) < 4 * _FEWEST_CYCLES:
         return None
-    large = np.flatnonzero(amplitude[inside] > _LARGE * amplitude[inside].max())
+    large = np.flatnonzero(amplitude[inside] > _LARGE_AMPLITUDE * amplitude[inside].max())
     last = int(large[-1])
     if not 2 * _FEWEST_CYCLES < last < 0.9 * np.count_nonzero(inside):
         return None
@@ -90,11 +90,11 @@ def _first_part(beginning: Beginning, state: State, count: int) -> State | None:
     return part
 
 
-def _over_all(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
-    """Follow what was found to the end of the record, or of as much as it can be followed."""
+def _extended(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
+    """Extend the model to the end of the record, or as far as it can be fitted."""
     whole = state.data
-    for cut in range(_CUTS):
-        data = whole.first(int(len(whole) * _SHORTER**cut))
+    for cut in range(_MOST_CUTS):
+        data = whole.first(int(len(whole) * _CUT**cut))
         model = part.fit.model.at_times(data.time_s)
         noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
         try:

@@ -1,4 +1,4 @@
-"""Naming: the leaders are refitted, and weighed against each other."""
+"""Naming: refit the leading effects, and rank them."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from pendpipe.diagnose.refits import NEAR, believable, side_by_side
 from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.dynamics.any_law import NoMotionError
 
-_MOST: Final = 9
-_MORE: Final = 3
-"""Names beyond these where a bound holds scores back."""
-_BEHIND: Final = 0.3
-"""Part of the best score that a refit may make up for."""
-_BEHIND_WIDE: Final = 0.6
-"""The same where a bound holds scores back."""
-_ALIKE: Final = 0.98
-_LOST: Final = 1.0
-"""Phase in rad from which a model has lost the motion."""
-_FROM_AFAR: Final = 4
-"""How many leads are then followed from the first cycles on."""
-_MUCH: Final = 0.5
-"""Part of the best gain that a name must explain to go before a curve."""
-_SOME: Final = 0.25
-"""The same of what every pendulum has."""
+_MOST_REFITTED: Final = 9
+_MORE_AT_BOUND: Final = 3
+"""More named effects to refit where a value at its bound lowers the scores."""
+_SCORE_MARGIN: Final = 0.3
+"""Part of the best score that a refit may catch up."""
+_SCORE_MARGIN_AT_BOUND: Final = 0.6
+"""The same where a value at its bound lowers the scores."""
+_EQUAL_GAIN: Final = 0.98
+_LOST_PHASE_RAD: Final = 1.0
+"""Phase error in rad from which a model has lost the motion."""
+_FROM_FIRST_CYCLES: Final = 4
+"""Leads that are then refitted from the first cycles on."""
+_NAMED_SHARE: Final = 0.5
+"""Part of the best gain from which a named effect precedes a curve."""
+_EXPECTED_SHARE: Final = 0.25
+"""The same for effects that every pendulum has."""
 
 
 def refit_leads(
@@ -50,21 +50,21 @@ def refit_leads(
     held: Sequence[int],
     gross: bool,
     origin: FloatArray,
-    most: int = _MOST,
+    most: int = _MOST_REFITTED,
 ) -> list[Rival]:
-    """Refit the leading effects nonlinearly; the best first."""
+    """Refit the leading effects nonlinearly, and return them ranked, the best first."""
     leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
-        lost = base.max_phase_error_rad > _LOST and len(fits) < _FROM_AFAR
-        # With the baseline's friction a law may not get through to the end.
+        lost = base.max_phase_error_rad > _LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
+        # With the baseline's friction the motion may stop before the end.
         if lost or (gross and fit is None):
-            fit = _better(fit, _from_afar(base, data, noise, lead, held, origin))
+            fit = _better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
         if fit is not None and believable(base, fit, lead.effect):
             fits.append((lead, fit))
     if not fits:
         return []
-    # What is still left makes differences of chi^2 mean less.
+    # A remaining misfit makes differences of chi^2 mean less.
     left = max(min(fit.chi2 for _, fit in fits) / max(data.used, 1), 1.0)
     rivals = []
     for lead, fit in fits:
@@ -75,44 +75,44 @@ def refit_leads(
 
 
 def _named_first(rivals: list[Rival]) -> list[Rival]:
-    """While the misfit is gross, prefer names that explain much of it to curves that bend."""
+    """In a gross misfit, rank named effects that explain much of it before curves."""
     rivals = sorted(rivals, key=lambda rival: -rival.evidence)
     best = max(rival.gain for rival in rivals)
     named = [
         rival
         for rival in rivals
         if rival.lead.effect.kind != "unnamed"
-        and rival.gain > (_SOME if rival.lead.effect.expected else _MUCH) * best
+        and rival.gain > (_EXPECTED_SHARE if rival.lead.effect.expected else _NAMED_SHARE) * best
     ]
-    # What is likelier beforehand goes before a name that merely fits a trifle better.
-    near = _ALIKE * max((rival.gain for rival in named), default=0.0)
+    # A higher prior precedes a marginally better fit.
+    near = _EQUAL_GAIN * max((rival.gain for rival in named), default=0.0)
     named.sort(key=lambda rival: (0, -rival.prior) if rival.gain > near else (1, 0.0))
-    # Bearing and fluid are there in any case, and what else bends is judged with them.
+    # Bearing friction and drag are always present: other effects are tested beside them.
     named.sort(key=lambda rival: not rival.lead.effect.expected)
     return [*named, *(rival for rival in rivals if rival not in named)]
 
 
 def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -> list[Lead]:
-    """The leads that may win, or be in the winner's class.
+    """Return the leads that may win, or be in the winner's class.
 
-    They are more (`wide`) where the base has a value at its bound: beside an effect that lets
-    go of it, the refit gains far more than the score, which holds it there.
+    There are more (`wide`) where the base has a value at its bound: the score keeps it there,
+    while a refit may release it and gain far more.
     """
     leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
     if not leads:
         return []
     best = _rank(leads[0])
-    part = 0.9 if gross else _BEHIND_WIDE if wide else _BEHIND
+    part = 0.9 if gross else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
     near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
     if gross:
         near = near[: most + 2]
     else:
-        # So many names: curves, which lead wherever a misfit bends, take no name's place.
+        # Curves lead in many misfits; they don't count in the number of named effects.
         names = [lead for lead in near if lead.effect.kind != "unnamed"]
-        names = names[: most + _MORE if wide else most]
+        names = names[: most + _MORE_AT_BOUND if wide else most]
         near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
-    # Asked whatever their first order says: what the user holds, which is little; and in a gross
-    # misfit bearing and fluid, which are in every pendulum.
+    # Always refitted: parameters that the user holds (few), and in a gross misfit bearing friction
+    # and drag, which every pendulum has.
     asked = [
         lead
         for lead in leads
@@ -125,10 +125,10 @@ def _rank(lead: Lead) -> float:
     return equivalent(lead.p_value, lead.score) + lead.effect.prior
 
 
-def _from_afar(
+def _from_first_cycles(
     base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], origin: FloatArray
 ) -> Fit | None:
-    """Refit from the first cycles on, where the base has lost the phase."""
+    """Refit in a progressive window where the base has lost the phase."""
     effect = lead.effect
     if isinstance(effect, ReleasedParameter) or effect.kind == "unnamed":
         return None

@@ -1,7 +1,7 @@
-"""Several names, or one law that has none: a curve that does as well alone is preferred.
+"""Several named effects or one unknown law: prefer a single curve that does as well.
 
-Two entries of the catalogue together bend far enough to follow many a law that is in none.
-That both should be there by chance is improbable; that one unknown thing is, is not.
+Two effects of the catalogue together can imitate many a law outside it. That both are present is
+less probable than one unknown effect.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
 BETTER: Final = 22.0
-"""By how much (in chi^2, two a free value counted) two names must be better than one curve: each
-is one of some forty (2 ln 40 = 7.4), and to need two at once is as rare."""
-_KNOTS: Final = 0.012
-"""Part of a curve's gain that it may miss between its knots: of laws that are in no catalogue
-the best curve missed a hundredth at most (development recordings, opened challenges)."""
-_PART: Final = 0.5
-"""Of its gain beside other names: what something sudden must keep beside a curve."""
-_EACH: Final = 2.0
-_REST: Final = 1e-4
-"""Part of the gain that further names must add to be more than a correction of the first."""
+"""Difference of chi^2 + 2 (free values) by which two named effects must be better than one curve:
+each is one of some forty (2 ln 40 = 7.4), and needing two at once is as rare."""
+_LOST_AT_KNOTS: Final = 0.012
+"""Part of a curve's gain lost between its knots: at most a hundredth for laws outside the
+catalogue (development recordings, opened challenges)."""
+_SUDDEN_SHARE: Final = 0.5
+"""Part of its gain that a sudden effect must keep beside a curve to stay."""
+_PER_VALUE: Final = 2.0
+_CORRECTION: Final = 1e-4
+"""Part of the gain that further effects must add to be more than a correction of the first."""
 
 
 def prefer_one_curve(state: State, progress: Progress) -> None:
-    """Put one curve in the place of several names, where it does as well.
+    """Replace several named effects by one curve if it does as well.
 
-    What every pendulum has, and a line of its own in the spectrum that is more than what a curve
-    leaves, stay where they are, and so does what happened at an instant and is as needed beside
-    the curve; and a name to which the others add next to nothing is not one of several.
+    Some effects stay: those that every pendulum has, a separate spectral line larger than what a
+    curve leaves, and a sudden effect that is as needed beside the curve. If one effect explains
+    nearly everything, the others count as its corrections and nothing is replaced.
     """
     total = sum(step.winner.gain for step in state.steps)
     _prefer(
@@ -59,27 +59,29 @@ def _prefer(state: State, kept: Sequence[Step], progress: Progress) -> None:
         return
     if _one_alone(names):
         return
-    bare = _bare(state, kept)
+    bare = _without_names(state, kept)
     if bare is None:
         return
-    fits = [fit for curve in _curves(bare, state) for fit in [_drawn(bare, curve, state)] if fit]
+    fits = [
+        fit for curve in _curves(bare, state) for fit in [_with_curve(bare, curve, state)] if fit
+    ]
     if not fits:
         return
     rivals = ranked([_rival(bare, fit) for fit in fits])
     best = rivals[0]
-    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, _misses(names) * best.gain):
+    if cost(best.fit) > cost(state.fit) + math.hypot(BETTER, _allowance(names) * best.gain):
         return
-    sudden = [step for step in names if _lasts(step, best.fit, state)]
+    sudden = [step for step in names if _needed_beside(step, best.fit, state)]
     if sudden:
         _prefer(state, [*kept, *sudden], progress)
         return
-    progress(f"{best.identifier} alone does as well as {len(names)} names")
+    progress(f"{best.name} alone does as well as {len(names)} effects")
     state.steps[:] = [*kept, Step(tuple(rivals), names[0].p_value, bare)]
     state.settle(best.fit)
 
 
-def _lasts(step: Step, drawn: Fit, state: State) -> bool:
-    """Whether what happened at an instant is needed beside a curve, which has no instants."""
+def _needed_beside(step: Step, drawn: Fit, state: State) -> bool:
+    """Whether a sudden effect is needed beside a curve, which can't be sudden."""
     effect = step.winner.lead.effect
     if not effect.local:
         return False
@@ -91,7 +93,7 @@ def _lasts(step: Step, drawn: Fit, state: State) -> bool:
         )
     except (NoMotionError, np.linalg.LinAlgError):
         return False
-    return cost(drawn) - cost(both) > max(BETTER, _PART * step.winner.gain)
+    return cost(drawn) - cost(both) > max(BETTER, _SUDDEN_SHARE * step.winner.gain)
 
 
 def _stays(step: Step, state: State, left: float) -> bool:
@@ -102,19 +104,19 @@ def _stays(step: Step, state: State, left: float) -> bool:
 
 
 def _one_alone(names: Sequence[Step]) -> bool:
-    """Whether one name explains so much that the others may be its own form."""
+    """Whether one effect explains so much that the others may correct its form."""
     gains = [step.winner.gain for step in names]
-    return sum(gains) - max(gains) < _REST * sum(gains)
+    return sum(gains) - max(gains) < _CORRECTION * sum(gains)
 
 
-def _misses(names: Sequence[Step]) -> float:
-    """Part of its gain by which a curve may fall short of names and still be preferred.
+def _allowance(names: Sequence[Step]) -> float:
+    """Part of its gain by which a curve may fall short and still be preferred.
 
-    Where all names but one add no more than the form of a real law may differ from the
-    catalogue's, they may be corrections of one wrong name.
+    If all effects but one add no more than a real law's form may differ from the catalogue's,
+    they may be corrections of one wrong effect.
     """
     gains = [step.winner.gain for step in names]
-    return _KNOTS if sum(gains) - max(gains) > MISSHAPEN * sum(gains) else MISSHAPEN
+    return _LOST_AT_KNOTS if sum(gains) - max(gains) > MISSHAPEN * sum(gains) else MISSHAPEN
 
 
 def _rival(bare: Fit, fit: Fit) -> Rival:
@@ -125,12 +127,12 @@ def _rival(bare: Fit, fit: Fit) -> Rival:
 
 
 def cost(fit: Fit) -> float:
-    """Return chi^2, with two for each free value (Akaike)."""
-    return fit.chi2 + _EACH * len(fit.free)
+    """Return chi^2 + 2 (free values) (Akaike)."""
+    return fit.chi2 + _PER_VALUE * len(fit.free)
 
 
-def _bare(state: State, kept: Sequence[Step]) -> Fit | None:
-    """The baseline and what is kept, as the readings and their noise are judged now."""
+def _without_names(state: State, kept: Sequence[Step]) -> Fit | None:
+    """Refit the baseline with the effects that are kept, with the present noise."""
     model, value = state.fit.model, state.fit.value
     for step in state.steps:
         if step not in kept:
@@ -143,13 +145,13 @@ def _bare(state: State, kept: Sequence[Step]) -> Fit | None:
 
 
 def _curves(bare: Fit, state: State) -> list[Curve]:
-    """The mixtures that the recording can see; a curve in time follows anything, and is none."""
-    drawn = [curve(bare.at.span) for curve in (*CURVES, *FOLLOW_UP_CURVES) if not curve.in_time]
+    """Return the curves with the coefficients that the recording resolves; none against time."""
+    drawn = [curve(bare.at.span) for curve in (*CURVES, *CLOSER_CURVES) if not curve.in_time]
     seen = build_bank(bare, state.noise, drawn).candidates
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 
 
-def _drawn(bare: Fit, curve: Curve, state: State) -> Fit | None:
+def _with_curve(bare: Fit, curve: Curve, state: State) -> Fit | None:
     start: FloatArray = np.concatenate([bare.value, np.zeros(curve.count)])
     try:
         fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.holding)

@@ -1,8 +1,8 @@
-"""Values of a model that is far from the readings, from a window that grows.
+"""Start values for a model far from the readings, fitted in a progressively longer window.
 
-Over a whole record at large amplitude the phase of a wrong start is off by many turns, and no
-step of Gauss and Newton finds back. Over the first cycles it is not: there the model is
-fitted, then over more and more of the record, each time from where the last one ended.
+Over a whole record at large amplitude the phase of a wrong start is off by many turns, too far
+for Gauss-Newton steps. Over the first cycles it is not: the model is fitted there, then over
+more and more of the record, each time from the last result.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from pendpipe.diagnose.refine import refine
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Model
 
-_FIRST: Final = 4
-"""Cycles of the first window."""
+_FIRST_CYCLES: Final = 4
+"""Cycles in the first window."""
 _GROWTH: Final = 1.6
-_CLOSER: Final = 1.1
-"""Where much of the record is known."""
+_SLOW_GROWTH: Final = 1.1
+"""Growth of the window where much of the record is fitted already."""
 _ROUNDS: Final = 8
 
 
@@ -36,7 +36,7 @@ def progressive_start(
     held: Iterable[int] = (),
     first: int | None = None,
 ) -> FloatArray:
-    """Fit the beginning of a record, then more and more of it.
+    """Fit the first part of a record, then more and more of it.
 
     Parameters
     ----------
@@ -45,18 +45,18 @@ def progressive_start(
     data
         All readings.
     noise_rms
-        Standard deviation of one.
+        Standard deviation of one reading.
     start
-        Values that are right for the first cycles at least (from turning points).
+        Values that hold for the first cycles at least (from turning points).
     held
-        Indices of what is not fitted.
+        Indices of values that are not fitted.
     first
-        How many readings the start values are right for, if known.
+        How many readings the start values hold for, if known.
 
     Returns
     -------
     FloatArray
-        Values from which the whole record can be fitted, shape (size,).
+        Start values for a fit of the whole record, shape (size,).
 
     Raises
     ------
@@ -65,8 +65,8 @@ def progressive_start(
     """
     value = np.asarray(start, dtype=np.float64)
     fixed = tuple(held)
-    count = first or int(_FIRST * 2.0 * np.pi / value[OMEGA] / data.interval_s)
-    growth = _GROWTH if first is None else _CLOSER
+    count = first or int(_FIRST_CYCLES * 2.0 * np.pi / value[OMEGA] / data.interval_s)
+    growth = _GROWTH if first is None else _SLOW_GROWTH
     if first is not None:
         count = int(growth * count)
     while count < len(data):

@@ -1,4 +1,4 @@
-"""Maximum likelihood of a model's values, from however far away."""
+"""Maximum-likelihood fit of a model, also from start values far away."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.gauss_newton import SETTLED, GaussNewton, Place
+from pendpipe.diagnose.gauss_newton import SETTLED, Evaluation, GaussNewton
 from pendpipe.diagnose.noise import Noise
 from pendpipe.effects.baseline import C
 from pendpipe.effects.model import Evaluated, Model
 
 ROUNDS: Final = 14
-"""How many steps a fit may take."""
-_AS_PROMISED: Final = 0.02
-"""Part by which a step may gain less or more than promised, and the model be called linear."""
-_CREEP: Final = 0.25
-"""Of chi^2: three rounds that gain less are the last."""
-_LAST: Final = 3
-"""How many steps show what further ones may gain."""
-_PULL: Final = 3.0
-"""Standard deviations beyond a bound from which it is the bound that is believed."""
+"""Largest number of steps of a fit."""
+_LINEAR_WITHIN: Final = 0.02
+"""Relative difference between the expected and the actual gain up to which the model counts as
+linear."""
+_SLOW_GAIN: Final = 0.25
+"""Fall of chi^2: a fit ends after three rounds that gain less."""
+_LAST_STEPS: Final = 3
+"""Last steps from which the gain of further ones is extrapolated."""
+_FAR_BEYOND_SD: Final = 3.0
+"""Standard deviations beyond a bound from which the value counts as known: the bound."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +35,17 @@ class Fit:
 
     Parameters
     ----------
-    place
-        Its values, and what they give.
+    evaluation
+        The values, and the model evaluated there.
     free
         Indices of the values that were fitted.
     converged
         Whether the last step was negligible.
     error_scale
-        Factor of all standard deviations, for what is left beyond the noise.
+        Factor on all standard deviations, for a misfit beyond the noise.
     """
 
-    place: Place
+    evaluation: Evaluation
     free: tuple[int, ...]
     converged: bool
     error_scale: float = 1.0
@@ -52,37 +53,37 @@ class Fit:
     @property
     def model(self) -> Model:
         """The model."""
-        return self.place.model
+        return self.evaluation.model
 
     @property
     def value(self) -> FloatArray:
         """Its values."""
-        return self.place.value
+        return self.evaluation.value
 
     @property
     def at(self) -> Evaluated:
         """The model there."""
-        return self.place.at
+        return self.evaluation.at
 
     @property
     def chi2(self) -> float:
         """Sum of squares of the whitened residual, with the share's prior."""
-        return self.place.chi2
+        return self.evaluation.chi2
 
     @property
     def residual(self) -> FloatArray:
         """Whitened; one entry more than there are readings (the prior), shape (n + 1,)."""
-        return self.place.residual
+        return self.evaluation.residual
 
     @property
     def jacobian(self) -> FloatArray:
         """Of the whitened readings by all values, with the prior's row, shape (n + 1, size)."""
-        return self.place.columns
+        return self.evaluation.columns
 
     @property
     def max_phase_error_rad(self) -> float:
-        """The largest phase by which model and readings differ."""
-        return self.place.max_phase_error_rad
+        """The largest phase difference between model and readings."""
+        return self.evaluation.max_phase_error_rad
 
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
@@ -96,7 +97,7 @@ class Fit:
 
 
 def pulled(fit: Fit) -> list[int]:
-    """Indices of fitted values that are at a bound and would be far beyond it, if they could."""
+    """Return the indices of fitted values that the readings pull far beyond a bound."""
     low, high = fit.model.bounds()
     found = []
     for index in fit.free:
@@ -108,7 +109,7 @@ def pulled(fit: Fit) -> list[int]:
         part = fit.jacobian[:, others]
         rest = column - part @ np.linalg.lstsq(part, column, rcond=1e-11)[0]
         alone = float(np.linalg.norm(rest))
-        if alone > 1e-9 * length and abs(float(rest @ fit.residual)) > _PULL * alone:
+        if alone > 1e-9 * length and abs(float(rest @ fit.residual)) > _FAR_BEYOND_SD * alone:
             found.append(index)
     return found
 
@@ -121,13 +122,13 @@ def refine(
     *,
     held: Iterable[int] = (),
     rounds: int = ROUNDS,
-    of_use: float = math.inf,
+    useful: float = math.inf,
 ) -> Fit:
-    """Minimise chi^2 by Gauss and Newton, within the bounds.
+    """Minimise chi^2 by Gauss-Newton steps, within the bounds.
 
-    Where model and readings are out of phase by much, the residual is taken along the
-    motion (amplitude and unwrapped phase, cycle by cycle), so that it stays linear. A fit that
-    can't come down to a chi^2 `of_use` is left where it is.
+    Where model and readings are far out of phase, the residual is taken along the motion
+    (amplitude and unwrapped phase, cycle by cycle), so that it stays linear. A fit that
+    can't reach a chi^2 of `useful` stops early.
 
     Raises
     ------
@@ -135,14 +136,14 @@ def refine(
         If the model can't be evaluated at the start.
     """
     refining = Refining(model, data, noise, start, held=held)
-    refining.go(rounds, of_use)
+    refining.go(rounds, useful)
     return refining.fit
 
 
 class Refining:
-    """A refit that can be left and gone on with; parameters are those of `refine`.
+    """A fit that can be interrupted and resumed; parameters are those of `refine`.
 
-    Two rounds that gain less than `little` are the last, and so are three that creep.
+    It ends after two rounds that gain less than `little`, or three that gain less than 0.25.
     """
 
     def __init__(
@@ -157,104 +158,104 @@ class Refining:
     ) -> None:
         fixed = {*held, *model.held()}
         self._free = np.array([k for k in range(model.size) if k not in fixed])
-        self._climb = GaussNewton(model, data, noise)
-        self._here = self._climb.start(start)
+        self._steps = GaussNewton(model, data, noise)
+        self._here = self._steps.evaluate_within_bounds(start)
         self._gains: list[float] = []
-        self._stalled = ((2, little), (3, max(little, _CREEP)))
+        self._stalled = ((2, little), (3, max(little, _SLOW_GAIN)))
         self._ended = self._converged = False
 
     @property
     def chi2(self) -> float:
-        """Where it is now."""
+        """The current chi^2."""
         return self._here.chi2
 
     @property
     def fit(self) -> Fit:
-        """What it has come to."""
+        """The fit so far."""
         return Fit(self._here, tuple(self._free.tolist()), self._converged)
 
-    def go(self, rounds: int, of_use: float = math.inf) -> None:
-        """Go on for some rounds, or until it is at the minimum, or hopeless.
+    def go(self, rounds: int, useful: float = math.inf) -> None:
+        """Run some rounds, or fewer if the fit converges or becomes hopeless.
 
         Parameters
         ----------
         rounds
             How many.
-        of_use
-            A chi^2 above which the fit is of no use: it is left where it is where as many rounds
-            as are left, if they gain what the last ones have, won't bring it there.
+        useful
+            Largest chi^2 that is of any use: the fit stops where the remaining rounds, gaining
+            what the last ones did, would not reach it.
         """
         for left in range(rounds, 0, -1):
-            if self._ended or self._hopeless(left, of_use):
+            if self._ended or self._hopeless(left, useful):
                 break
             self._round()
-        self._climb.forget()
+        self._steps.forget()
 
-    def _hopeless(self, left: int, of_use: float) -> bool:
-        last = self._gains[-_LAST:]
-        return len(last) == _LAST and self.chi2 - left * sum(last) / _LAST > of_use
+    def _hopeless(self, left: int, useful: float) -> bool:
+        last = self._gains[-_LAST_STEPS:]
+        return len(last) == _LAST_STEPS and self.chi2 - left * sum(last) / _LAST_STEPS > useful
 
     def _round(self) -> None:
-        here, free, climb = self._here, self._free, self._climb
-        step = climb.step(here, free)
-        promised = _promised(here, here.columns, step)
-        tried = climb.tried(here, step, free, promised)
-        straight = tried is not None
-        if tried is None and C in free:
-            # More friction would stop it before the last reading: the others go first.
+        here, free, steps = self._here, self._free, self._steps
+        step = steps.step(here, free)
+        expected = _expected(here, here.columns, step)
+        better = steps.line_search(here, step, free, expected)
+        direct = better is not None
+        if better is None and C in free:
+            # More friction would stop the motion before the last reading: move the others first.
             others = free[free != C]
-            step = climb.step(here, others)
-            tried = climb.tried(here, step, others, _promised(here, here.columns, step))
-        if tried is None:
-            self._ended, self._converged = True, promised < 10.0 * SETTLED
+            step = steps.step(here, others)
+            better = steps.line_search(here, step, others, _expected(here, here.columns, step))
+        if better is None:
+            self._ended, self._converged = True, expected < 10.0 * SETTLED
             return
-        self._here = tried
-        gained = here.chi2 - tried.chi2
+        self._here = better
+        gained = here.chi2 - better.chi2
         self._gains.append(gained)
-        if promised < SETTLED or (gained < SETTLED and promised < 1.0):
+        if expected < SETTLED or (gained < SETTLED and expected < 1.0):
             self._ended = self._converged = True
-        elif straight and abs(promised - gained) < _AS_PROMISED * promised:
+        elif direct and abs(expected - gained) < _LINEAR_WITHIN * expected:
             self._settle(here)
         self._ended |= self._stalls()
 
     def _stalls(self) -> bool:
-        """Whether what is promised is not given any more.
+        """Whether steps no longer gain what is expected.
 
-        A derivative is wrong there (of an instant, say), the motion stops just beyond, or two
-        values take each other's place.
+        A derivative is wrong there (that of an instant, say), the motion stops just beyond, or two
+        values compensate each other.
         """
         return any(
             len(self._gains) >= rounds and max(self._gains[-rounds:]) < little
             for rounds, little in self._stalled
         )
 
-    def _settle(self, before: Place) -> None:
-        """Take the last step by the derivatives of the step before, where it is negligible.
+    def _settle(self, before: Evaluation) -> None:
+        """Take the last, negligible step with the derivatives of the step before.
 
-        They are as good as those here where that step gave what it had promised.
+        They are as good as new ones where the step before gained what was expected.
         """
         here = self._here
         if not np.all(np.any(before.columns[:, self._free], axis=0)):
-            # The shape of an effect that was not there did nothing then.
+            # The shape of an effect had no influence while its size was zero.
             return
-        step = self._climb.step(here, self._free, before.columns)
-        promised = _promised(here, before.columns, step)
-        if promised < SETTLED:
-            self._here = self._climb.tried(here, step, self._free, promised) or here
+        step = self._steps.step(here, self._free, before.columns)
+        expected = _expected(here, before.columns, step)
+        if expected < SETTLED:
+            self._here = self._steps.line_search(here, step, self._free, expected) or here
             self._ended = self._converged = True
 
 
-def _promised(here: Place, columns: FloatArray, step: FloatArray) -> float:
-    """What a step takes off chi^2, if the model is linear."""
+def _expected(here: Evaluation, columns: FloatArray, step: FloatArray) -> float:
+    """Return the fall of chi^2 along a step of a linear model."""
     return here.chi2 - float(np.sum((here.residual - columns @ step) ** 2))
 
 
 def misfit(model: Model, data: Data, noise: Noise, value: FloatArray) -> float:
-    """Return chi^2 at values, nothing fitted.
+    """Return chi^2 at given values.
 
     Raises
     ------
     NoMotionError
         If the model can't be evaluated there.
     """
-    return GaussNewton(model, data, noise).place(value).chi2
+    return GaussNewton(model, data, noise).evaluate(value).chi2

@@ -1,4 +1,4 @@
-"""The refits of all leads side by side: none is followed that can't come near the best."""
+"""Refit all leads side by side, and stop those that can't come near the best."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 
 NEAR: Final = 16.0
-"""By how much of twice the log-likelihood one may be behind the best, and win in the end."""
+"""Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
 OF_A_CURVE: Final = 0.4
-"""Part of a curve's gain that a name must explain by itself to be asked beside another."""
-_BEHIND: Final = 0.1
-"""Part of a name's gain by which a refit may end behind it, with `NEAR`, and be of use."""
+"""Part of a curve's gain that a named effect must explain alone to be tried with a second."""
+_BEHIND_NAMED: Final = 0.1
+"""Part of a named effect's gain by which a refit may end behind it, beyond `NEAR`, and matter."""
 _FIRST_ROUNDS: Final = 4
-"""After how many the refits are compared."""
-_LITTLE: Final = 0.3
-"""Of chi^2: what two rounds must gain for a refit to go on that is refined again if it wins."""
-_LARGEST: Final = 0.5
-"""Of the first amplitude: what an effect may add to the reading."""
+"""Rounds after which the refits are compared."""
+_STALLED_GAIN: Final = 0.3
+"""Fall of chi^2 in two rounds below which a refit stops (a winner is refined again)."""
+_LARGEST_DISPLACEMENT: Final = 0.5
+"""Largest displacement that an effect may add to the reading, over the first amplitude."""
 
 
 def side_by_side(
@@ -44,61 +44,61 @@ def side_by_side(
 ) -> list[tuple[Lead, Fit | None]]:
     """Refit each lead; None where that fails.
 
-    In a gross misfit, where what explains a quarter may come first, and gains grow while a
-    scale is still far off, all are followed to their ends.
+    In a gross misfit all refits run to their end: an effect that explains a quarter may come
+    first, and gains still grow while a scale is far off.
     """
-    # The winner is refined once more where the noise is judged by what it leaves.
-    little = SETTLED if gross or data.time_noise else _LITTLE
-    refits = [_begun(base, data, noise, lead, held, little) for lead in leads]
-    of_use = math.inf if gross else _limit(base, leads, refits)
+    # The winner is refined again when the noise is estimated from its residual.
+    little = SETTLED if gross or data.time_noise else _STALLED_GAIN
+    refits = [_started(base, data, noise, lead, held, little) for lead in leads]
+    useful = math.inf if gross else _limit(base, leads, refits)
     return [
-        (lead, _ended(refit, of_use) if refit else None)
+        (lead, _finished(refit, useful) if refit else None)
         for lead, refit in zip(leads, refits, strict=True)
     ]
 
 
-def limit_of_use(best: float, gain: float, *, drawn: bool) -> float:
-    """Return up to which chi^2 a rival is of use.
+def useful_chi2(best: float, gain: float, *, drawn: bool) -> float:
+    """Return the largest chi^2 at which a rival still matters.
 
     Parameters
     ----------
     best, gain
-        The best's chi^2, and by how much that is lower than without it.
+        The best chi^2, and its gain over the model without the effect.
     drawn
-        Whether the best is a curve: two names may take its place, and a name that has far fewer
+        Whether the best is a curve: two named effects may replace it, and one with far fewer
         values is as good with a smaller gain.
     """
-    return best + NEAR + (1.0 - OF_A_CURVE if drawn else _BEHIND) * max(gain, 0.0)
+    return best + NEAR + (1.0 - OF_A_CURVE if drawn else _BEHIND_NAMED) * max(gain, 0.0)
 
 
 def believable(base: Fit, fit: Fit, effect: Effect) -> bool:
-    """Whether displacements that an effect adds are smaller than the motion itself.
+    """Whether the displacements that an effect adds are smaller than the motion itself.
 
-    Two tones of nearly one frequency can take each other's place: a second that is as large
-    as the first describes a change of phase, and no second mode.
+    A second tone that is as large as the motion and has nearly its frequency describes a change
+    of phase, not a second mode.
     """
     first = len(base.value) + effect.parameter_free
     own = fit.value[first:]
     if not effect.believable(own):
         return False
     span = base.at.span
-    return effect.displacement(own, span.duration_s) < _LARGEST * span.first_amplitude
+    return effect.displacement(own, span.duration_s) < _LARGEST_DISPLACEMENT * span.first_amplitude
 
 
 def _limit(base: Fit, leads: Sequence[Lead], refits: Sequence[Refining | None]) -> float:
-    """The largest chi^2 of use, by the best that may be believed so far."""
+    """Return the largest useful chi^2, from the best credible refit so far."""
     best = [
-        limit_of_use(refit.chi2, base.chi2 - refit.chi2, drawn=lead.effect.kind == "unnamed")
+        useful_chi2(refit.chi2, base.chi2 - refit.chi2, drawn=lead.effect.kind == "unnamed")
         for lead, refit in zip(leads, refits, strict=True)
         if refit and believable(base, refit.fit, lead.effect)
     ]
     return min(best, default=math.inf)
 
 
-def _begun(
+def _started(
     base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], little: float
 ) -> Refining | None:
-    """The first rounds of a lead's refit."""
+    """Start a lead's refit: its first rounds."""
     effect = lead.effect
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
@@ -115,13 +115,13 @@ def _begun(
 
 
 def _sizes(effect: Effect) -> FloatArray:
-    """A switch that is on, or sizes of nothing."""
-    return np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
+    """Start sizes: 1 for an effect without a free size, else 0."""
+    return np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
 
 
-def _ended(refit: Refining, of_use: float) -> Fit | None:
+def _finished(refit: Refining, useful: float) -> Fit | None:
     try:
-        refit.go(ROUNDS - _FIRST_ROUNDS, of_use)
+        refit.go(ROUNDS - _FIRST_ROUNDS, useful)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
     return refit.fit

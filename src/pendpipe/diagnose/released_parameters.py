@@ -1,4 +1,4 @@
-"""A parameter that was held, and may be wrong: told from missing physics by being fitted."""
+"""Held parameters that may be wrong: fitting them separates this from missing physics."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _PART: Final = {"quality_factor_hysteretic": HYSTERETIC, "quality_factor_viscous
 
 
 class ReleasedParameter(Effect):
-    """A baseline parameter given by ``--fix``, set free.
+    """A baseline parameter given by ``--fix``, released and fitted.
 
     Parameters
     ----------
     fixed
-        Its name (contract: a, b, c, frequency, amplitude, offset, quality_factor_...).
+        Its name: a, b, c, frequency, amplitude, offset or quality_factor_...
     """
 
     kind = "parameter"
@@ -56,21 +56,21 @@ class ReleasedParameter(Effect):
 
     @property
     def count(self) -> int:
-        """It has no values of its own: it is one of the baseline's."""
+        """Zero: it is one of the baseline's values."""
         return 0
 
     def without(self, held: Iterable[int]) -> list[int]:
-        """Of held indices, those that are held still (held parts of b are the model's matter)."""
+        """Return the indices that stay held (the model itself handles held parts of b)."""
         return [index for index in held if index != self.index]
 
     def sensitivity(self, fit: Fit) -> FloatArray:
-        """What a little more of it does to the whitened readings, shape (n + 1,)."""
+        """Derivative of the whitened readings by the parameter, shape (n + 1,)."""
         if self.index is not None:
             return fit.jacobian[:, self.index]
         value, parts = fit.value, fit.model.held_parts()
-        others = [part for part in parts if part != self.frees]
-        if not others and value[B] > parts[str(self.frees)]:
-            # b is fitted, along with the other part: only how it divides is new.
+        others = [part for part in parts if part != self.releases]
+        if not others and value[B] > parts[str(self.releases)]:
+            # b is fitted with the other part already: only the share is new.
             return fit.jacobian[:, SHARE]
         share = float(value[SHARE])
         by_part = (1.0 - share if self.frees == HYSTERETIC else -share) / float(value[B])
@@ -79,5 +79,5 @@ class ReleasedParameter(Effect):
 
 
 def released_parameters(fixed: Mapping[str, float]) -> list[ReleasedParameter]:
-    """One for each parameter that is held."""
+    """Return one for each held parameter."""
     return [ReleasedParameter(name) for name in fixed]

@@ -29,7 +29,7 @@ _HARMONICS: Final = 4
 _STANDS_OUT: Final = 9.0
 """Squares of unit numbers above which a coefficient is no noise."""
 _FEWEST: Final = 2.0
-_NAMES: Final = ("level", "amplitude", "phase", "harmonics", "between")
+_NAMES: Final = ("offset", "amplitude", "phase", "harmonics", "between")
 
 
 @dataclass(frozen=True)

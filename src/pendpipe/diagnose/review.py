@@ -1,4 +1,4 @@
-"""A last look at the names where much is left: what could be part of the rest is withdrawn."""
+"""Final review of the named effects where a large misfit remains: doubtful ones are withdrawn."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.diagnose import Progress
-from pendpipe.diagnose.chance import Trials
+from pendpipe.diagnose.chance import Trials, printed
 from pendpipe.diagnose.detect import Detection
 from pendpipe.diagnose.evidence import Rival
 from pendpipe.diagnose.location import tone_of
@@ -23,18 +23,18 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.curves import Curve
 
-_MOST: Final = 0.75
-"""Part of the misfit that a name must explain where the model leaves more than noise."""
-_OFF: Final = 0.1
-"""Of the motion's frequency: how far from a harmonic a line must be."""
-_AS_WELL: Final = 0.99
-"""Part of the largest gain from which a curve describes a record as well."""
-_DESCRIBES: Final = 0.5
-"""Part of the excess that a curve must take away to be drawn on top of names."""
+_EXPLAINED_SHARE: Final = 0.75
+"""Part of the misfit that a named effect must explain where more than noise remains."""
+_OFF_HARMONIC: Final = 0.1
+"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
+_EQUALLY_GOOD: Final = 0.99
+"""Part of the largest gain from which another curve counts as equally good."""
+_CURVE_SHARE: Final = 0.5
+"""Part of the excess chi^2 that a curve must remove to be added to named effects."""
 
 
 def credible(step: Step, state: State, level: float) -> bool:
-    """Say whether a step's winner stands against what it would leave itself; curves do."""
+    """Return whether a step's winner is significant against its remainder; curves always are."""
     winner = step.winner
     if winner.lead.effect.kind == "unnamed" or stands_apart(winner.lead.effect, winner.fit):
         return True
@@ -45,21 +45,21 @@ def credible(step: Step, state: State, level: float) -> bool:
 
 
 def credibility(step: Step, remainder: Remainder, gain: float) -> float:
-    """Global p-value of a gain in chi^2 against what is left, the effect's shapes counted.
+    """Return the global p-value of a gain in chi^2 against the remaining misfit.
 
-    It is 1 where the effect does not explain most of the misfit: then it may just as well be
-    the nearest thing to what is missing.
+    It is 1 if the effect does not explain most of the misfit: then it may only imitate what is
+    missing.
 
     Parameters
     ----------
     step
         Where the effect was added.
     remainder
-        What the final model leaves.
+        Misfit of the final model.
     gain
         By how much chi^2 rises without the effect.
     """
-    if gain < _MOST * (gain + remainder.excess):
+    if gain < _EXPLAINED_SHARE * (gain + remainder.excess):
         return 1.0
     effect = step.winner.lead.effect
     values = max(effect.count, 1)
@@ -68,10 +68,10 @@ def credibility(step: Step, remainder: Remainder, gain: float) -> float:
 
 
 def stands_apart(effect: Effect, fit: Fit) -> bool:
-    """Say whether an effect needs no doubt beside what is left.
+    """Return whether the remaining misfit can't be mistaken for an effect.
 
-    A line of its own in the spectrum, off the motion's harmonics, has no rival in what is
-    left of the motion; and what every pendulum has is there in any case.
+    This holds for a separate spectral line, off the motion's harmonics, and for effects that
+    every pendulum has.
     """
     if effect.expected:
         return True
@@ -79,19 +79,19 @@ def stands_apart(effect: Effect, fit: Fit) -> bool:
     if line is None:
         return False
     order = line / (0.5 * float(fit.value[OMEGA]) / np.pi)
-    return abs(order - round(order)) > _OFF and order > _OFF
+    return abs(order - round(order)) > _OFF_HARMONIC and order > _OFF_HARMONIC
 
 
 def _trials(step: Step) -> Trials:
-    # Any of those that were refitted might have been the one.
+    # Any of the refitted rivals might have been reported.
     return Trials(float(max(len(step.rivals), 1)), 0.0)
 
 
 def withdraw_doubtful(state: State, level: float, progress: Progress) -> None:
-    """Withdraw, one after another, the names that could be part of what is left.
+    """Withdraw, one after another, the effects that could be part of the remaining misfit.
 
-    Nothing is withdrawn where the model leaves little more than noise. A curve is drawn anew
-    behind the names, since it would hide what they leave.
+    Nothing is withdrawn where little more than noise remains. Curves are removed first (and
+    fitted again later), since they would hide the misfit.
     """
     if not remainder_of(state.fit, state.data, state.noise).systematic:
         return
@@ -108,7 +108,9 @@ def withdraw_doubtful(state: State, level: float, progress: Progress) -> None:
         step, without, p_value = worst
         if p_value < level:
             return
-        progress(f"{step.winner.identifier} could be part of what is left (p = {p_value:.2g})")
+        progress(
+            f"withdrawing {step.winner.name}: part of the remaining misfit ({printed(p_value)})"
+        )
         state.fit = without
         state.steps.remove(step)
 
@@ -127,7 +129,7 @@ def _least_credible(state: State, remainder: Remainder) -> tuple[Step, Fit, floa
 
 
 def fit_without(state: State, step: Step) -> Fit | None:
-    """The model without one effect; None where it can't move so: then it is needed."""
+    """Fit the model without one effect; None where it has no such motion: the effect is needed."""
     effect: Effect = step.winner.lead.effect
     model, value = state.fit.model.dropping(effect, state.fit.value)
     bare = np.concatenate([state.bare, value[len(state.bare) :]])
@@ -143,9 +145,9 @@ def fit_without(state: State, step: Step) -> Fit | None:
 
 
 def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
-    """Add the curve that describes what is left best; say whether there is one.
+    """Add the curve that describes the remaining misfit best; return whether there is one.
 
-    Where nothing has been named, any curve that helps is better than silence.
+    If nothing has been named, any curve that helps is added.
     """
     leads = tuple(lead for lead in detection.leads if lead.effect.kind == "unnamed")
     rivals = refit_leads(
@@ -159,9 +161,9 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
     )
     if not rivals:
         return False
-    best = _of_the_motion(rivals)
+    best = _best_curve(rivals)
     excess = remainder_of(state.fit, state.data, state.noise).excess
-    if best.gain < (_DESCRIBES * excess if state.steps else 0.0):
+    if best.gain < (_CURVE_SHARE * excess if state.steps else 0.0):
         return False
     others = tuple(rival for rival in rivals if rival is not best)
     state.steps.append(Step((best, *others), p_value, state.fit))
@@ -169,15 +171,15 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
     return True
 
 
-def _of_the_motion(rivals: list[Rival]) -> Rival:
-    """The curve of the largest gain; before one in time, one of the motion that does as well.
+def _best_curve(rivals: list[Rival]) -> Rival:
+    """Return the curve of the largest gain, preferring laws of the motion to curves in time.
 
-    A curve in time follows whatever happens once; where a law of the angle or the amplitude,
-    that must repeat itself each cycle, leaves as little, it is the law that is drawn.
+    A curve in time can follow anything that happens once. A law of angle or amplitude, which
+    repeats in each cycle, is preferred if it does as well.
     """
     largest = max(rival.gain for rival in rivals)
     # Where no curve helps, the gains are negative.
-    near = [rival for rival in rivals if rival.gain >= min(_AS_WELL * largest, largest)]
+    near = [rival for rival in rivals if rival.gain >= min(_EQUALLY_GOOD * largest, largest)]
     return min(
         near,
         key=lambda rival: (

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from pendpipe.diagnose.held_out import HeldOut, held_out
 from pendpipe.diagnose.likelier import swap_in_likelier
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.released_parameters import released_parameters
-from pendpipe.diagnose.result import Diagnosis, FittedModel, FoundEffect
+from pendpipe.diagnose.result import FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnose.search import Search, search
 from pendpipe.diagnose.small_swings import SmallSwings, small_swings
 from pendpipe.diagnose.statement import statement
@@ -31,17 +32,109 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 LEVEL: Final = 0.01
-"""Probability with which a recording that holds nothing is accused."""
+"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Outcome:
-    """The answer, and what its figures are drawn from."""
+    """A diagnosis with the fits and readings behind it. It prints as one paragraph.
+
+    Parameters
+    ----------
+    diagnosis
+        The answer.
+    search, beginning
+        The fits, and the readings with the start values: what the figures are drawn from.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pendpipe.recording import Recording
+    >>> time_s = np.arange(900) / 15.0
+    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
+    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
+    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
+    >>> found.verdict
+    'consistent'
+    >>> print(str(found)[:33])
+    Eq. 8 describes this recording: t
+    """
 
     diagnosis: Diagnosis
     search: Search
     beginning: Beginning
+
+    @property
+    def verdict(self) -> str:
+        """``"consistent"`` or ``"missing-physics"``."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """What is missing, in the order in which it was found."""
+        return self.diagnosis.effects
+
+    def __str__(self) -> str:
+        return self.diagnosis.statement
+
+    def __repr__(self) -> str:
+        return self.diagnosis.statement
+
+    def _repr_html_(self) -> str:
+        return f"<p>{html.escape(self.diagnosis.statement)}</p>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``diagnosis.json``."""
+        return self.diagnosis.to_dict()
+
+    def save(self, folder: str | Path, *, figures: bool = True) -> dict[str, Any]:
+        """Write ``diagnosis.json`` and the figures.
+
+        Parameters
+        ----------
+        folder
+            Made if it is not there.
+        figures
+            Whether to draw them.
+
+        Returns
+        -------
+        dict
+            What ``diagnosis.json`` holds.
+
+        Raises
+        ------
+        InputError
+            If the folder can't be written.
+        """
+        from pendpipe.files import make_folder, write_json
+
+        place, diagnosis = Path(folder), self.diagnosis
+        make_folder(place)
+        if figures:
+            from pendpipe.figures.diagnosis import draw_diagnosis
+
+            drawn = draw_diagnosis(self, place)
+            diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
+        content = diagnosis.to_dict()
+        write_json(place / FILE_NAME, content)
+        return content
+
+    def plot(self) -> Figure:
+        """Draw the decay with both models, and what each of them leaves.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from pendpipe.figures.diagnosis_data import shown
+        from pendpipe.figures.diagnosis_decay import draw
+
+        return draw(shown(self))
 
 
 def diagnose_recording(
@@ -55,7 +148,7 @@ def diagnose_recording(
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Outcome:
-    """Say where Eq. 8 and a recording differ, and what was left out.
+    """Find where Eq. 8 and a recording differ, and what effect is missing.
 
     Parameters
     ----------
@@ -64,17 +157,17 @@ def diagnose_recording(
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
-        Parameters that are held, by name, so that a prediction is compared.
+        Parameters that are held, by name, so that a prediction is tested.
     seed
-        Of the draws that count the trials of the scans.
+        Of the random draws that count the trials of the scans.
     level
-        Global p-value below which something is said to be missing.
+        The false-alarm probability: an effect is reported where the global p-value is below it.
     place
-        FoundEffect in messages.
+        Named in error messages.
     provenance
         Goes into the result.
     progress
-        Is told each step in a line.
+        Receives one line for each step.
 
     Raises
     ------
@@ -100,7 +193,7 @@ def diagnose_recording(
     )
 
 
-# Trials far from any motion overflow; they are looked at, and thrown away.
+# Trial models far from the motion overflow; they are computed and rejected.
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def diagnose_decay(
     part: Recording,
@@ -115,9 +208,21 @@ def diagnose_decay(
     progress: Progress = silent,
     whole: Recording | None = None,
 ) -> Outcome:
-    """The same for a free decay whose turning points are known.
+    """Diagnose a free decay whose turning points are known.
 
-    Of the `whole` recording that it was cut from only the time stamps are looked at.
+    Parameters
+    ----------
+    part, points
+        The free decay, and its turning points.
+    baseline, fixed, seed, level, place, provenance, progress
+        As for `diagnose_recording`.
+    whole
+        The recording that the decay was cut from; only its time stamps are used.
+
+    Raises
+    ------
+    InputError
+        If a parameter can't be held, or the decay can't be analysed.
     """
     fixed = fixed or {}
     check_fixed(fixed, baseline)
@@ -126,29 +231,28 @@ def diagnose_decay(
         found, weighed, beginning = _searched(
             samples, points, baseline, fixed, level, seed, progress
         )
-    except NoMotionError as fault:
+    except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
-        raise NotAnalysableError(place, f"the model can't follow it ({fault})", remedy) from fault
-    named = _as_added(found, weighed)
+        raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
+    effects = _in_order(found, weighed)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
-    stamps = (*([gap] if gap else []), *found.said)
-    notes = (*points.notes, *stamps)
-    rms = max(found.noise.rms, found.data.step / 12.0**0.5)
-    before = _judged(found.baseline, found)
+    stamps = (*([gap] if gap else []), *found.clock_notes)
+    noise_rms = max(found.noise.rms, found.data.step / 12.0**0.5)
+    before = _fitted_model(found.baseline, found)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
-    after = before if same else _judged(found.improved, found)
-    if named:
-        progress("predicting held-out blocks")
-    held = _held_out(found, beginning) if named else None
+    after = before if same else _fitted_model(found.improved, found)
+    if effects:
+        progress("predicting cycles that are left out of the fit")
+    held = _held_out(found, beginning) if effects else None
     swings = _small_swings(found)
     diagnosis = Diagnosis(
         baseline,
         before,
         after,
-        rms,
-        "missing-physics" if named else "consistent",
+        noise_rms,
+        "missing-physics" if effects else "consistent",
         found.p_value,
-        named,
+        effects,
         held,
         after.residual_rms_rad,
         found.unexplained,
@@ -156,9 +260,10 @@ def diagnose_decay(
             baseline,
             before,
             after,
-            named,
+            effects,
             held,
-            rms,
+            noise_rms,
+            found.p_value,
             found.unexplained,
             level,
             unit=found.data.unit,
@@ -166,7 +271,7 @@ def diagnose_decay(
             swings=swings,
             notes=stamps,
         ),
-        warnings=notes,
+        warnings=(*points.notes, *stamps),
         remainder=found.remainder,
         small_swings=swings,
         provenance=dict(provenance or {}),
@@ -193,32 +298,32 @@ def _searched(
         baseline=baseline,
         level=level,
         seed=seed,
-        freed=released_parameters(fixed),
+        released=released_parameters(fixed),
         progress=progress,
     )
-    return *swap_in_likelier(found, beginning), beginning
+    return *swap_in_likelier(found, beginning, progress), beginning
 
 
-def _as_added(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, ...]:
-    """Name effects and faults in the order in which they were added."""
+def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, ...]:
+    """List effects and measurement faults in the order in which they were added."""
     effects = [
-        (place, effect_named(found, step, each))
-        for place, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
+        (number, effect_named(found, step, each))
+        for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
     ]
     faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
-    # Sorting keeps the order of equals: a fault goes before the effect that followed it.
-    return tuple(name for _, name in sorted([*faults, *effects], key=lambda pair: pair[0]))
+    # The sort is stable: a fault goes before the effect that followed it.
+    return tuple(each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0]))
 
 
 def _small_swings(found: Search) -> SmallSwings | None:
-    """What the names leave open there; a curve that is drawn over it would hide it."""
+    """Compare the frequency at small amplitudes with the named effects' model, without curves."""
     if not found.named.remainder.systematic:
         return None
     swings = small_swings(found.named.fit, found.data, found.noise)
-    return swings if swings is not None and swings.sure else None
+    return swings if swings is not None and swings.significant else None
 
 
-def _judged(fit: Fit, found: Search) -> FittedModel:
+def _fitted_model(fit: Fit, found: Search) -> FittedModel:
     data = found.data
     residual = data.residual(fit.at.reading)[data.weight > 0.0]
     dof = max(data.used - len(fit.free), 1)

@@ -1,4 +1,4 @@
-"""One effect after another, until nothing is left at the level asked."""
+"""Add one effect after another, until nothing significant is left."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnose import Progress, silent
 from pendpipe.diagnose.begin import Beginning
-from pendpipe.diagnose.chance import CATALOGUE_SHARE
+from pendpipe.diagnose.chance import CATALOGUE_SHARE, printed
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.detect import Detection, more_leads
 from pendpipe.diagnose.drift_or_red_noise import reconsider_red_noise
@@ -40,19 +40,19 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.curves import FOLLOW_UP_CURVES
 
-_MOST: Final = 6
-_NEEDED: Final = 9.0
-"""Delta chi^2 below which an effect that others have joined is dropped again."""
-_PART: Final = 0.15
-"""Part of a gross misfit that an effect must explain to be worth naming."""
+_MOST_EFFECTS: Final = 6
+_NEEDED_CHI2: Final = 9.0
+"""Delta chi^2 below which an effect is dropped once others have been added."""
+_GROSS_SHARE: Final = 0.15
+"""Part of a gross misfit that an effect must explain to be added."""
 _LESS_FRICTION: Final = (0.9, 0.7, 0.4)
-"""Parts of the Coulomb friction with which a baseline still moves at the last reading."""
-_MAIN: Final = 0.5
-"""The same while large amplitudes are looked at by themselves: only what rules there."""
+"""Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
+_LARGE_AMPLITUDE_SHARE: Final = 0.5
+"""The same while the large amplitudes alone are fitted: only what dominates there."""
 
 
 class Reviewed(NamedTuple):
-    """A model, and what it leaves."""
+    """A model, and its remaining misfit."""
 
     fit: Fit
     remainder: Remainder
@@ -60,35 +60,35 @@ class Reviewed(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """What a search has found.
+    """The result of a search.
 
     Parameters
     ----------
     data, noise
-        The readings (masks included) and their noise as it was judged last.
+        The readings (with masks) and the final estimate of their noise.
     baseline
-        The baseline's fit, under that noise.
+        The baseline's fit, with that noise.
     improved
         The extended model's fit (the baseline's where nothing was found).
     steps
-        One an effect.
+        One for each effect.
     faults
-        Of the measurement, found by tests of their own.
+        Of the measurement, found by their own tests.
     p_value
         Global, on the baseline: of the catalogue's largest score, and of the tests.
     unexplained
-        Global p-value of what is left at the end.
+        Global p-value of the final residual.
     detection
-        The first: of the baseline.
+        The first scan: of the baseline's residual.
     held
-        Indices of what was not fitted in the extended model.
+        Indices of values that are not fitted in the extended model.
     remainder
-        What the extended model leaves beyond the noise.
+        Misfit of the extended model beyond the noise.
     named
-        The extended model by which names are weighed: without the curve that has been drawn
-        over what they leave.
-    said
-        What the tests of the time stamps have found, a clause each.
+        The model with the named effects only, without the curve for the rest: probabilities of
+        names refer to it.
+    clock_notes
+        What the tests of the time stamps found, a clause each.
     """
 
     data: Data
@@ -103,7 +103,7 @@ class Search:
     held: tuple[int, ...]
     remainder: Remainder
     named: Reviewed
-    said: tuple[str, ...] = ()
+    clock_notes: tuple[str, ...] = ()
 
 
 def search(
@@ -114,10 +114,30 @@ def search(
     baseline: str,
     level: float,
     seed: int,
-    freed: Sequence[ReleasedParameter] = (),
+    released: Sequence[ReleasedParameter] = (),
     progress: Progress = silent,
 ) -> Search:
-    """Fit the baseline, and add what improves it most, until chance explains the rest."""
+    """Fit the baseline, and add what improves it most, until chance explains the rest.
+
+    Parameters
+    ----------
+    beginning
+        Readings, baseline and start values.
+    samples
+        The readings as they were recorded.
+    catalogue
+        The effects that may be missing.
+    baseline
+        Its name.
+    level
+        The significance level (global p-value).
+    seed
+        Of the random draws that count trials.
+    released
+        The held parameters that may be wrong.
+    progress
+        Receives one line for each step.
+    """
     data, held = beginning.data, list(beginning.held)
     progress(f"fitting {baseline} to {data.used} readings")
     white = first_noise(beginning)
@@ -125,8 +145,8 @@ def search(
     state = State(fit, data, white, held, beginning.value, fit.value)
     state.settle(fit)
     forensics = Forensics(samples, level)
-    task = Task(catalogue, freed, baseline, level, seed, forensics, progress)
-    large_first(beginning, state, lambda part: _add_one(part, task, _MAIN))
+    task = Task(catalogue, released, baseline, level, seed, forensics, progress)
+    large_first(beginning, state, lambda part: _add_one(part, task, _LARGE_AMPLITUDE_SHARE))
     _add_all(state, task)
     if reconsider_curve(state, task):
         _add_all(state, task)
@@ -147,13 +167,13 @@ def search(
         tuple(state.holding),
         remainder,
         named or Reviewed(state.fit, remainder),
-        tuple(forensics.said),
+        tuple(forensics.clock_notes),
     )
 
 
 def _add_all(state: State, task: Task) -> None:
-    """Add effects until chance explains the rest, and put one curve for several if it does."""
-    while len(state.steps) < _MOST:
+    """Add effects until chance explains the rest; one curve may replace several effects."""
+    while len(state.steps) < _MOST_EFFECTS:
         task.forensics.before(state, task.progress)
         if not _add_one(state, task):
             break
@@ -164,16 +184,21 @@ def _add_all(state: State, task: Task) -> None:
 
 
 def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
-    """Keep the names that stand against what is left, describe the rest, and measure it.
+    """Withdraw names that the remaining misfit makes doubtful, and describe it by a curve.
 
-    Where a curve is drawn on top of them, the names' model is handed back as well.
+    Returns
+    -------
+    Reviewed or None
+        The model of the named effects alone, if a curve was added to it.
+    Remainder
+        Misfit of the final model.
     """
     before = state.fit
     withdraw_doubtful(state, task.level, task.progress)
     remainder = remainder_of(state.fit, state.data, state.noise)
-    if state.fit is not before or len(state.steps) >= _MOST:
+    if state.fit is not before or len(state.steps) >= _MOST_EFFECTS:
         task.scanned(state)
-    if not remainder.systematic or _drawn(state):
+    if not remainder.systematic or _ends_with_curve(state):
         return None, remainder
     assert state.now is not None
     named = Reviewed(replace(state.fit, error_scale=remainder.error_scale), remainder)
@@ -183,9 +208,9 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
-    """The baseline under the noise that was judged last, at the times that were recorded."""
+    """Refit the baseline with the final noise, at the recorded times."""
     model, data = state.fit.model.bare(), state.data
-    # The last readings may have been left out since.
+    # Readings at the end may have been left out meanwhile.
     read = beginning.data.first(len(data))
     if np.array_equal(data.time_s, read.time_s):
         if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
@@ -206,20 +231,22 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     raise fault
 
 
-def _add_one(state: State, task: Task, share: float = _PART) -> bool:
-    """Scan the catalogue, and add the best effect if it is needed; say whether to go on.
+def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
+    """Scan the catalogue and add the best effect if it is needed; return whether one was added.
 
-    Of a gross misfit it must explain a `share`.
+    It must explain a `share` of a gross misfit.
     """
     gross, threshold, progress = is_gross(state.fit, state.data), task.threshold, task.progress
     effects = task.scanned(state)
     assert state.now is not None
     if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
-    if state.now.p_value > threshold or _drawn(state):
+    if state.now.p_value > threshold or _ends_with_curve(state):
         return False
-    progress(f"something is there (p = {state.now.p_value:.2g}): refitting the leaders")
-    closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
+    progress(
+        f"chance does not explain the residual ({printed(state.now.p_value)}): refitting leads"
+    )
+    closer = more_leads(state.fit, state.noise, undrawn(CLOSER_CURVES, state.fit))
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
         state.fit,
@@ -236,48 +263,58 @@ def _add_one(state: State, task: Task, share: float = _PART) -> bool:
         rivals = prefer_two_names(state, rivals, task)
     if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
         return False
-    if not rivals or rivals[0].gain <= max(_NEEDED, share * state.fit.chi2 if gross else 0.0):
+    if not rivals or rivals[0].gain <= max(_NEEDED_CHI2, share * state.fit.chi2 if gross else 0.0):
         return False
     step = Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit)
     if gross and state.steps and not credible(step, state, task.level):
         return False
-    if share == _MAIN and rivals[0].lead.effect.kind == "unnamed":
+    if share == _LARGE_AMPLITUDE_SHARE and rivals[0].lead.effect.kind == "unnamed":
         return False
     state.steps.append(step)
     winner = rivals[0]
-    progress(f"adding {winner.identifier}: Delta chi^2 = {winner.gain:.4g}")
+    before, after = (_rms(fit, state.data) for fit in (state.fit, winner.fit))
+    unit = state.data.unit
+    progress(
+        f"adding {winner.name}: the residual falls from {before:.3g} to {after:.3g} {unit} rms"
+    )
     if isinstance(winner.lead.effect, ReleasedParameter):
         state.holding = winner.lead.effect.without(state.holding)
     state.settle(winner.fit)
     return True
 
 
-def _prune(state: State, progress: Progress) -> None:
-    """Drop what later effects have made needless; a curve in time, that follows any, drops none.
+def _rms(fit: Fit, data: Data) -> float:
+    """Root mean square of the readings that count less the model."""
+    residual = data.residual(fit.at.reading)[data.weight > 0.0]
+    return float(np.sqrt(np.mean(residual**2)))
 
-    A curve leaves a part of what it describes between its knots: a name that explains no more
-    than that may be made of it.
+
+def _prune(state: State, progress: Progress) -> None:
+    """Drop effects that are no longer needed beside later ones.
+
+    A curve in time can imitate any effect and so drops none. Another curve misfits between its
+    knots by a few per cent of its gain: a name that explains no more than that may be an artefact.
     """
-    if _drawn(state) and state.steps[-1].winner.lead.effect.in_time:
+    if _ends_with_curve(state) and state.steps[-1].winner.lead.effect.in_time:
         return
     between = 0.0
-    if _drawn(state) and len(state.steps) > 1:
+    if _ends_with_curve(state) and len(state.steps) > 1:
         without = fit_without(state, state.steps[-1])
         between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
-    # The last has been joined by others only if a fault was found behind it.
+    # The last effect has others after it only if a fault was found after it.
     joined = any(fault.behind == len(state.steps) for fault in state.faults)
-    for step in list(state.steps if joined and not _drawn(state) else state.steps[:-1]):
+    for step in list(state.steps if joined and not _ends_with_curve(state) else state.steps[:-1]):
         effect = step.winner.lead.effect
         without = None if isinstance(effect, ReleasedParameter) else fit_without(state, step)
         if without is None:
             continue
-        needed = _NEEDED if stands_apart(effect, state.fit) else max(_NEEDED, between)
+        needed = _NEEDED_CHI2 if stands_apart(effect, state.fit) else max(_NEEDED_CHI2, between)
         if without.chi2 - state.fit.chi2 < needed:
-            progress(f"{effect.identifier} is needless now")
+            progress(f"{effect.name} is no longer needed")
             state.fit = without
             state.steps.remove(step)
 
 
-def _drawn(state: State) -> bool:
-    """Whether a curve without a name was the last: nothing is named on top of it."""
+def _ends_with_curve(state: State) -> bool:
+    """Whether the last effect is a curve without a name: no name is added after it."""
     return bool(state.steps) and state.steps[-1].winner.lead.effect.kind == "unnamed"

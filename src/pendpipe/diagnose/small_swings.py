@@ -1,7 +1,7 @@
 """How a model's frequency differs from the readings' at the smallest amplitudes.
 
-Contacts that stick, and a bearing's elastic deflection, show there alone, in a few cycles that
-weigh little in a sum of squares. So these are looked at by themselves.
+Sticking contacts and the elastic deflection of a bearing show only there, in a few cycles that
+have little weight in chi^2. So these cycles are tested by themselves.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
 
-_FEWEST: Final = 8
-"""Spans of cycles, from which the scatter of the others is known."""
-_SURE: Final = 5.0
-"""Standard deviations, the scatter of all other spans being one of them."""
+_FEWEST_SPANS: Final = 8
+"""Spans of cycles needed to estimate their scatter."""
+_SIGNIFICANT_SD: Final = 5.0
+"""Standard deviations (reading error and scatter of the other spans) that are significant."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class SmallSwings:
     amplitude
         In the middle of that span, rad (or m).
     excess, excess_sd
-        (f - f_model)/f_model, and its error: that of reading, and the scatter of the others.
+        (f - f_model)/f_model, and its error from the readings and the scatter of the others.
     """
 
     amplitude: float
@@ -40,9 +40,9 @@ class SmallSwings:
     excess_sd: float
 
     @property
-    def sure(self) -> bool:
-        """Whether it is more than the scatter."""
-        return abs(self.excess) > _SURE * self.excess_sd
+    def significant(self) -> bool:
+        """Whether it exceeds the scatter."""
+        return abs(self.excess) > _SIGNIFICANT_SD * self.excess_sd
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
@@ -63,12 +63,12 @@ class SmallSwings:
 
 
 def small_swings(fit: Fit, data: Data, noise: Noise) -> SmallSwings | None:
-    """Compare the last span of cycles with a model; None where there are too few to judge."""
+    """Compare the last span of cycles with a model; None where there are too few."""
     measured = cycles(data.values, data.weight, fit.at, noise.white_rms)
-    if len(measured.time_s) < _FEWEST:
+    if len(measured.time_s) < _FEWEST_SPANS:
         return None
     ends = span_ends(measured)
-    if len(ends) <= _FEWEST:
+    if len(ends) <= _FEWEST_SPANS:
         return None
     own = cycles(fit.at.reading, data.weight, fit.at, 0.0).at(measured.time_s)
     one, other = between(measured, ends), between(own, ends)

@@ -1,21 +1,60 @@
-"""The answer as one paragraph of plain English."""
+"""The answer as one paragraph of plain English that can be copied into a report."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from pendpipe.diagnose.held_out import HeldOut
-from pendpipe.diagnose.remainder import Remainder
-from pendpipe.diagnose.result import FittedModel, FoundEffect
-from pendpipe.diagnose.small_swings import SmallSwings
-from pendpipe.estimate import Estimate
+from pendpipe.diagnose.chance import printed
+from pendpipe.estimate import Estimate, rounded
 
-_SURE: Final = 0.5
-"""Probability below which a name is said with a perhaps."""
-_SMALLEST: Final = 1e-12
-"""p-values below it rest on tails that nobody has tested."""
+if TYPE_CHECKING:
+    from pendpipe.diagnose.held_out import HeldOut
+    from pendpipe.diagnose.remainder import Remainder
+    from pendpipe.diagnose.result import FittedModel, FoundEffect
+    from pendpipe.diagnose.small_swings import SmallSwings
+
+_PROBABLE: Final = 0.5
+"""Probability from which an effect is reported without "possibly"."""
+_CERTAIN: Final = 0.95
+"""Probability from which an effect without rivals needs no further measurement."""
+_SIGNIFICANT: Final = 3.0
+"""Standard deviations from which a change of a parameter is reported as a bias."""
 _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
+_KINDS = {
+    "dynamics": "from the model of the pendulum",
+    "measurement": "from the model of the measurement",
+    "unnamed": "from the model, and unlike any effect of the catalogue",
+}
+_MEANINGS = {
+    "circular-error": "the restoring torque follows sin x, not x",
+    "presliding-friction": "the bearing yields elastically before it slides",
+    "ac-coupling": "the sensor loses slow signals",
+    "jitter": "the sampling times are uncertain",
+    "second-mode": "another part of the apparatus oscillates too",
+}
+"""What the names mean that a newcomer may not know."""
+_UNNAMED = {
+    "unnamed-damping": "a loss of unknown form",
+    "unnamed-restoring": "a restoring torque of unknown form",
+    "unnamed-drive": "an unknown drive",
+    "unnamed-measurement": "an unknown error of the sensor",
+}
+_PARAMETERS = {
+    "a": "quadratic damping rate a",
+    "b": "linear damping rate b",
+    "c": "Coulomb damping rate c",
+    "amplitude": "initial amplitude",
+    "offset": "offset",
+}
+_PARTS = {
+    "offset": "in the offset",
+    "amplitude": "in the amplitude",
+    "phase": "in the phase",
+    "harmonics": "in the higher harmonics",
+    "between": "between the harmonics",
+}
 
 
 def statement(
@@ -25,6 +64,7 @@ def statement(
     effects: Sequence[FoundEffect],
     held: HeldOut | None,
     noise_rms: float,
+    p_value: float,
     unexplained: float,
     level: float,
     *,
@@ -33,110 +73,204 @@ def statement(
     swings: SmallSwings | None = None,
     notes: Sequence[str] = (),
 ) -> str:
-    """Say where it differs, what was left out, how much better the fit is, what is open."""
+    """Write the paragraph.
+
+    It answers in this order: does the baseline describe the recording, what is missing and how
+    sure is that, what cannot be distinguished from it and what to measure next, how much of the
+    misfit it explains, what it changes in period and Q, what is left.
+
+    Parameters
+    ----------
+    baseline
+        ``"eq8"`` or ``"viscous"``.
+    before, after
+        The baseline and the extended model.
+    effects
+        What was found.
+    held
+        How well both models predict cycles that they were not fitted to.
+    noise_rms
+        Of one reading.
+    p_value, unexplained
+        Global p-values of the baseline and of what the extended model leaves.
+    level
+        The significance level.
+    unit
+        Of the readings.
+    remainder, swings
+        What the extended model leaves, and the frequency at the smallest amplitudes.
+    notes
+        Properties of the time stamps, a clause each.
+    """
     model = _NAMES.get(baseline, baseline)
-    stamps = [f"Of the record itself: {'; '.join(notes)}."] if notes else []
+    stamps = [f"Note on the time stamps: {'; '.join(notes)}."] if notes else []
     if not effects:
         nothing = (
-            f"{model} describes the recording: what it leaves"
-            f" ({before.residual_rms_rad:.3g} {unit}) is noise ({noise_rms:.3g} {unit}), and"
-            f" nothing in the catalogue does better than chance (global {_chance(unexplained)})."
+            f"{_capital(model)} describes this recording: the residual of"
+            f" {_size(before.residual_rms_rad, unit)} rms agrees with the noise"
+            f" ({_size(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
+            f" than chance would ({printed(unexplained)})."
         )
         return " ".join([nothing, *stamps])
-    said = [
-        f"{model} leaves {before.residual_rms_rad:.3g} {unit} where the noise is"
-        f" {noise_rms:.3g} {unit}.",
+    times = before.residual_rms_rad / noise_rms
+    text = [
+        f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
+        f" {_size(before.residual_rms_rad, unit)} rms, {_times(times)} the noise of"
+        f" {_size(noise_rms, unit)}.",
         *(_effect(effect) for effect in effects),
-        _improvement(len(effects), before, after, held, unit),
+        _improvement(before, after, held, unit),
+        _changes(before.parameters, after.parameters),
+        _rest(unexplained, level, remainder),
     ]
-    moved = _moved(before.parameters, after.parameters)
-    if moved:
-        said.append(f"The omission had falsified {moved}.")
-    said.append(_open(unexplained, level, remainder))
     if swings is not None:
-        said.append(swings.sentence(unit))
-    return " ".join([*said, *stamps])
-
-
-def _improvement(
-    number: int, before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str
-) -> str:
-    text = (
-        f"With {'it' if number == 1 else 'them'} the residual falls to"
-        f" {after.residual_rms_rad:.3g} {unit} (chi^2 per degree of freedom"
-        f" {before.chi2_per_dof:.4g} to {after.chi2_per_dof:.4g})"
-    )
-    if held is None:
-        return text + "."
-    by = f"{abs(held.gain):.4g} +- {held.gain_sd:.2g} in log density"
-    if held.gain < 0.0:
-        return (
-            f"{text}, but blocks held out are predicted worse by {by}: the extended model does"
-            " not stand this test."
-        )
-    return f"{text}, and blocks held out are predicted better by {by}."
-
-
-def _open(unexplained: float, level: float, remainder: Remainder | None) -> str:
-    """What is still open, and what that makes of names and errors."""
-    if remainder is None or not remainder.systematic:
-        if unexplained > level:
-            return f"Nothing else stands out (global {_chance(unexplained)})."
-        return f"Something is left that has not been explained (global {_chance(unexplained)})."
-    places = {
-        "level": "in the level",
-        "amplitude": "in the amplitude of the motion",
-        "phase": "in its phase",
-        "harmonics": "in its higher harmonics",
-        "between": "between the harmonics",
-    }
-    shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
-    where = ", ".join(f"{share:.0%} {places[name]}" for name, share in shares if share > 0.05)
-    return (
-        f"What is left is {remainder.over_noise:.3g} times the noise and has not been explained"
-        f" (global {_chance(unexplained)}; {where}): it is systematic, so that all errors given"
-        f" are {remainder.error_scale:.3g} times those of noise alone, and no name is believed more"
-        " than the part of the misfit that it explains."
-    )
-
-
-def _chance(p_value: float) -> str:
-    """A p-value in words that a computer's smallest number doesn't spoil."""
-    return f"p = {p_value:.2g}" if p_value >= _SMALLEST else f"p < {_SMALLEST:.0e}"
+        text.append(swings.sentence(unit))
+    return " ".join([*(part for part in text if part), *stamps])
 
 
 def _effect(effect: FoundEffect) -> str:
-    """One sentence on one effect."""
-    where = f", {effect.location.summary}" if effect.location.summary else ""
-    if effect.kind == "unnamed":
-        return (
-            f"Left out is something that no entry of the catalogue explains: {effect.name}{where}."
-        )
-    numbers = ", ".join(_number(name, each) for name, each in effect.parameters.items())
-    kind = {"dynamics": "physics", "measurement": "the measurement", "parameter": "a parameter"}
-    lead = "Left out is" if effect.probability > _SURE else "Left out is perhaps"
-    text = f"{lead} {effect.name} ({kind.get(effect.kind, effect.kind)}"
-    text += f"; {numbers})" if numbers else ")"
-    text += f"{where} (Delta chi^2 = {effect.delta_chi2:.4g}, {_chance(effect.p_value)})"
+    """What one effect is, how sure that is, where it shows, and what would decide."""
+    if effect.kind == "parameter":
+        lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
+    else:
+        missing = "Missing" if effect.probability > _PROBABLE else "Possibly missing"
+        name = f"{missing} {_KINDS.get(effect.kind, 'from the model')}: {effect.name}"
+        meaning = _MEANINGS.get(effect.identifier)
+        lead = f"{name}, that is, {meaning}" if meaning else name
+    numbers = [f"{name} = {each}" for name, each in effect.parameters.items()]
+    lead += f" ({'; '.join([f'probability {_percent(effect.probability)}', *numbers])})"
+    if effect.location.summary:
+        lead += f"; it shows {effect.location.summary}"
     if effect.indistinguishable:
-        others = ", ".join(name for name, _ in effect.indistinguishable)
-        text += f"; this recording cannot tell it from {others}: {effect.discriminating_test}"
-    return text if text.endswith("?") else text + "."
+        others = [f"{_rival(name)} ({_percent(share)})" for name, share in effect.indistinguishable]
+        lead += f". This recording alone cannot distinguish it from {_listed(others, 'or')}"
+    elif effect.probability > _CERTAIN or effect.kind == "unnamed":
+        return f"{lead}."
+    return _ended(f"{lead}. What to measure next: {effect.deciding}")
 
 
-def _number(name: str, each: Estimate) -> str:
-    unit = f" {each.unit}" if each.unit else ""
-    return f"{name} = {each.value:.4g} +- {each.sd:.2g}{unit}"
+def _improvement(before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str) -> str:
+    """How much of the misfit the effects explain, and whether they predict."""
+    old, new = before.residual_rms_rad, after.residual_rms_rad
+    text = f"Including this reduces the residual from {_size(old, unit)} to {_size(new, unit)} rms"
+    if old > 1.05 * new > 0.0:
+        text += (
+            f", by a factor of {old / new:.2g}"
+            if old < 99.5 * new
+            else (f", by a factor of {old / new:.0f}")
+        )
+    if held is None or not math.isfinite(held.gain):
+        return text + "."
+    sd = held.gain_sd if math.isfinite(held.gain_sd) else None
+    by = rounded(abs(held.gain), sd)
+    if held.gain < 0.0:
+        return (
+            f"{text}, but cycles left out of the fit are predicted worse (log-likelihood lower by"
+            f" {by}), so the extended model fails this test."
+        )
+    return f"{text}, and cycles left out of the fit are predicted better (log-likelihood up {by})."
 
 
-def _moved(before: Mapping[str, Estimate], after: Mapping[str, Estimate]) -> str:
-    """Baseline parameters that changed by more than three of their standard deviations."""
-    found = []
-    for name, new in after.items():
-        old = before[name]
-        if name == "phase" or not new.sd > 0.0:
+def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate]) -> str:
+    """What it changes in the small-angle period, in Q, and in the other parameters."""
+    parts = []
+    for name, of in (("small-angle period", _period), ("Q limit (pi f/b)", _quality_factor)):
+        old, new = of(before), of(after)
+        if old is None or new is None:
             continue
-        off = abs(old.value - new.value) / new.sd
-        if off > 3.0:
-            found.append(f"{name} ({old.value:.5g} for {new.value:.5g} {new.unit}, {off:.3g} sd)")
-    return ", ".join(found)
+        if _biased(old, new):
+            parts.append(f"the {name} from {_like(old, new)} to {new}")
+        else:
+            parts.append(f"the {name} by less than its error ({new})")
+    moved = [
+        f"{_PARAMETERS[name]} {_like(before[name], new)} instead of {new}"
+        for name, new in after.items()
+        if name in _PARAMETERS and _biased(before[name], new)
+    ]
+    text = f"It changes {_listed(parts, 'and')}." if parts else ""
+    if moved:
+        text += f" Without it the fit was biased: {'; '.join(moved)}."
+    return text.strip()
+
+
+def _period(parameters: Mapping[str, Estimate]) -> Estimate | None:
+    """The period at small angles, 1/f."""
+    frequency = parameters.get("frequency")
+    if frequency is None or not frequency.value > 0.0:
+        return None
+    return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
+
+
+def _quality_factor(parameters: Mapping[str, Estimate]) -> Estimate | None:
+    """The limit of Q that the linear damping rate alone sets; None where b is not resolved."""
+    frequency, linear = parameters.get("frequency"), parameters.get("b")
+    if frequency is None or linear is None or not linear.value > 2.0 * linear.sd:
+        return None
+    value = math.pi * frequency.value / linear.value
+    return Estimate(value, value * linear.sd / linear.value, "")
+
+
+def _biased(old: Estimate, new: Estimate) -> bool:
+    return new.sd > 0.0 and abs(old.value - new.value) > _SIGNIFICANT * new.sd
+
+
+def _like(old: Estimate, new: Estimate) -> str:
+    """A value with the digits of another's error, without an error of its own."""
+    return rounded(old.value, new.sd).split(" +- ")[0]
+
+
+def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
+    """What is left, and what that means for probabilities and errors."""
+    if remainder is None or not remainder.systematic:
+        if unexplained > level:
+            return f"The remaining residual is consistent with noise ({printed(unexplained)})."
+        return f"A small misfit remains unexplained ({printed(unexplained)})."
+    shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
+    where = ", ".join(f"{_percent(share)} {_PARTS[name]}" for name, share in shares if share > 0.05)
+    return (
+        f"The remaining residual is still {_times(remainder.over_noise)} the noise ({where}), so"
+        " the model is incomplete: the errors given here are enlarged by a factor of"
+        f" {remainder.error_scale:.2g} for it, and the probabilities are reduced."
+    )
+
+
+def _percent(share: float) -> str:
+    """A probability in per cent."""
+    if share > 0.995:
+        return "> 99 %"
+    return f"{100.0 * share:.0f} %" if share > 0.01 else "< 1 %"
+
+
+def _times(ratio: float) -> str:
+    """A factor in words."""
+    return f"{ratio:.2g} times" if ratio < 99.5 else f"{float(f'{ratio:.2g}'):.0f} times"
+
+
+def _size(value: float, unit: str) -> str:
+    """A size without an error."""
+    return f"{value:.3g} {unit}"
+
+
+def _rival(identifier: str) -> str:
+    """The name behind an identifier."""
+    from pendpipe.effects.catalogue import by_identifier
+
+    if identifier in _UNNAMED:
+        return _UNNAMED[identifier]
+    if identifier.startswith("parameter-"):
+        return f"another value of {identifier.removeprefix('parameter-').replace('_', ' ')}"
+    return by_identifier(identifier).name
+
+
+def _listed(items: Sequence[str], last: str) -> str:
+    """Join items to "x, y and z"."""
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} {last} {items[-1]}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith("?") else f"{text}."

@@ -1,4 +1,4 @@
-"""What a search is asked, and which effects it may choose from."""
+"""What a search is to do, and the effects that it may choose from."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pendpipe.effects.curves import CURVES, Curve
 
 
 def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
-    """Choose the effects that a baseline may lack, and curves for what has no name.
+    """Return the effects that a baseline may lack, and curves for what has no name.
 
-    What happens at an instant may happen again: a second one is an object of its own, by which
-    its values are found in the model.
+    What happens at an instant may happen twice: a second one is a copy, so that the model can
+    tell their values apart.
     """
     value = fit.value
     present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
@@ -37,35 +37,35 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         and (effect.identifier not in used or effect.local)
     ]
     bent = SoftClipping()
-    drawn = any(effect.key == bent.key for effect in fit.model.effects)
-    return [*named, *([] if drawn else [bent]), *undrawn(CURVES, fit)]
+    clipped = any(effect.key == bent.key for effect in fit.model.effects)
+    return [*named, *([] if clipped else [bent]), *undrawn(CURVES, fit)]
 
 
 def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:
-    """Curves along a fitted motion, without those that are in its model."""
-    drawn = {effect.key for effect in fit.model.effects}
+    """Return the curves along a fitted motion, without those in its model."""
+    present = {effect.key for effect in fit.model.effects}
     made = [curve(fit.at.span) for curve in curves]
-    return [curve for curve in made if curve.key not in drawn]
+    return [curve for curve in made if curve.key not in present]
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a search is asked, and what it asks with.
+    """What a search is to do.
 
     Parameters
     ----------
-    catalogue, freed
+    catalogue, released
         The effects that may be missing, and the held parameters that may be wrong.
     baseline, level, seed
         As in `search`.
     forensics
         The tests of the measurement.
     progress
-        Is told each step.
+        Receives one line for each step.
     """
 
     catalogue: Sequence[Effect]
-    freed: Sequence[ReleasedParameter]
+    released: Sequence[ReleasedParameter]
     baseline: str
     level: float
     seed: int
@@ -74,14 +74,14 @@ class Task:
 
     @property
     def threshold(self) -> float:
-        """The catalogue's part of the level."""
+        """The catalogue's part of the significance level."""
         return self.level * CATALOGUE_SHARE
 
     def scanned(self, state: State) -> list[Effect]:
-        """Score all that may be missing on what a state leaves (`state.now`)."""
+        """Score all that may be missing on a state's residual (into `state.now`)."""
         effects = [
             *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
-            *(entry for entry in self.freed if entry not in state.fit.model.effects),
+            *(entry for entry in self.released if entry not in state.fit.model.effects),
         ]
         self.progress(f"scanning {len(effects)} effects")
         scanner = prepare(state.fit, state.data, state.noise, effects)

@@ -1,4 +1,4 @@
-"""A curve, or two things that have names: what one name leaves, a second may explain."""
+"""A curve or two named effects: what one effect leaves, a second may explain."""
 
 from __future__ import annotations
 
@@ -17,19 +17,18 @@ from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.state import State
 from pendpipe.diagnose.task import Task, applicable
 
-_FIRST: Final = 2
-"""How many names are tried."""
-_SECOND: Final = 3
-"""How many are refitted beside each."""
+_FIRST_TRIED: Final = 2
+"""Named effects tried as the first of two."""
+_SECOND_TRIED: Final = 3
+"""Named effects refitted as the second, beside each of them."""
 
 
 def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:
-    """Put a name before the curve that leads, where it and a second are better than the curve.
+    """Put a named effect before the leading curve if it and a second one are better than it.
 
-    A curve bends far enough to follow some of both of two effects, and once it is drawn
-    nothing is named on top of it. The margin is wider than that of `prefer_one_curve`, since
-    the names come after it, and beyond what their own scans take off. A held parameter that is
-    wrong bends nothing by itself: a name beside it need only be as good as the curve.
+    A curve can follow parts of two effects, and no name is added after a curve. The margin is
+    that of `prefer_one_curve`, beyond the charges for the effects' own scans. Beside a wrong held
+    parameter, which bends nothing by itself, a named effect need only be as good as the curve.
     """
     curve = rivals[0]
     if not curve.drawn:
@@ -37,8 +36,8 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
     least_gain = OF_A_CURVE * curve.gain
     names = [rival for rival in rivals if not rival.drawn and rival.gain > least_gain]
     names = names or [rival for rival in _first(state) if rival.gain > least_gain]
-    for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST]:
-        task.progress(f"is it {name.identifier} and something else?")
+    for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST_TRIED]:
+        task.progress(f"trying {name.name} with a second effect instead of a curve")
         if any(
             name.evidence + second.evidence > curve.evidence + _margin(curve, name, second)
             for second in _second(state, name, task)
@@ -48,21 +47,21 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
 
 
 def _margin(curve: Rival, *names: Rival) -> float:
-    """By how much two names must be better than a curve."""
+    """Return by how much two named effects must be better than a curve."""
     if any(isinstance(name.lead.effect, ReleasedParameter) for name in names):
         return 0.0
     return math.hypot(BETTER, form_spread(curve))
 
 
 def _first(state: State) -> list[Rival]:
-    """The best names, where curves alone were worth refitting."""
+    """Refit the best named effects where only curves had been."""
     assert state.now is not None
     leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
-    return _refitted(state.fit, replace(state.now, leads=leads), state, state.holding, _FIRST)
+    return _refitted(state.fit, replace(state.now, leads=leads), state, state.holding, _FIRST_TRIED)
 
 
 def _second(state: State, name: Rival, task: Task) -> list[Rival]:
-    """The best names that could be added to a first."""
+    """Return the best named effects that could be added to a first."""
     effects = [
         effect
         for effect in applicable(task.catalogue, name.fit, task.baseline, state.data.unit)
@@ -71,12 +70,12 @@ def _second(state: State, name: Rival, task: Task) -> list[Rival]:
     held = state.holding
     if isinstance(name.lead.effect, ReleasedParameter):
         held = name.lead.effect.without(held)
-    freed = [entry for entry in task.freed if entry not in name.fit.model.effects]
-    scanner = prepare(name.fit, state.data, state.noise, [*effects, *freed])
+    released = [entry for entry in task.released if entry not in name.fit.model.effects]
+    scanner = prepare(name.fit, state.data, state.noise, [*effects, *released])
     found = detect(scanner, name.fit, seed=task.seed, known=state.now)
     if found.p_value > task.threshold:
         return []
-    return _refitted(name.fit, found, state, held, _SECOND)
+    return _refitted(name.fit, found, state, held, _SECOND_TRIED)
 
 
 def _refitted(

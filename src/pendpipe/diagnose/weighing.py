@@ -15,7 +15,7 @@ from pendpipe.diagnose.evidence import MISSHAPEN, Rival, of_one_class, probabili
 from pendpipe.diagnose.instants import with_instants
 from pendpipe.diagnose.location import locate
 from pendpipe.diagnose.refine import Fit, refine
-from pendpipe.diagnose.refits import limit_of_use
+from pendpipe.diagnose.refits import useful_chi2
 from pendpipe.diagnose.released_parameters import ReleasedParameter
 from pendpipe.diagnose.result import FoundEffect
 from pendpipe.diagnose.review import stands_apart
@@ -203,13 +203,13 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         return without, step.rivals
     # Even whom the search left far behind: how far that is depends on the noise and on the other
     # effects, and both were others then.
-    of_use = without.chi2
+    useful = without.chi2
     if not found.remainder.systematic:
-        of_use = limit_of_use(found.improved.chi2, gain, drawn=step.winner.drawn)
+        useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
     rivals = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
-        fit = found.improved if own else refitted(without, found, held, rival, of_use)
+        fit = found.improved if own else refitted(without, found, held, rival, useful)
         if fit is not None:
             rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
     return without, rivals
@@ -220,7 +220,7 @@ def _refined(
     found: Search,
     held: Sequence[int],
     *starts: FloatArray,
-    of_use: float = math.inf,
+    useful: float = math.inf,
 ) -> Fit | None:
     """The best fit of a model from several starts; None if it can't move from any."""
     fits = []
@@ -228,7 +228,7 @@ def _refined(
         if len(start) != model.size:
             continue
         try:
-            fits.append(refine(model, found.data, found.noise, start, held=held, of_use=of_use))
+            fits.append(refine(model, found.data, found.noise, start, held=held, useful=useful))
         except (NoMotionError, np.linalg.LinAlgError):
             continue
         if fits[-1].converged and not is_gross(fits[-1], found.data):
@@ -237,7 +237,7 @@ def _refined(
 
 
 def refitted(
-    without: Fit, found: Search, held: Sequence[int], rival: Rival, of_use: float = math.inf
+    without: Fit, found: Search, held: Sequence[int], rival: Rival, useful: float = math.inf
 ) -> Fit | None:
     """Refit a rival in the final model, from where it ended before, as far as it is of use."""
     effect = rival.lead.effect
@@ -246,5 +246,5 @@ def refitted(
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
     return _refined(
-        without.model.adding(effect), found, held, start, rival.fit.value, of_use=of_use
+        without.model.adding(effect), found, held, start, rival.fit.value, useful=useful
     )

@@ -1,8 +1,7 @@
-"""Held parameters that are wrong, or physics that was left out: the parameters are asked first.
+"""Wrong held parameters or missing physics: the parameters are tried first.
 
-A wrong parameter bends nothing that the baseline could not bend by itself. So where held
-parameters, set free together, explain as much as the best name or curve does, nothing needs to
-be missing; and of those only the ones that it takes are accused.
+If held parameters, released together, explain as much as the best effect or curve, nothing need
+be missing. Of these parameters only those that are needed are reported.
 """
 
 from __future__ import annotations
@@ -26,27 +25,27 @@ from pendpipe.dynamics.any_law import NoMotionError
 
 
 def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
-    """Put a held parameter first, where such alone explain as much as all else that was tried.
+    """Put a held parameter first if such parameters alone explain as much as any effect.
 
     Parameters
     ----------
     state
-        What the effects would be added to.
+        The model to which the effects would be added.
     rivals
         Refitted effects, every held parameter among them; the best first.
 
     Returns
     -------
     list
-        The same; of the fewest held parameters that it takes, the one that gains most leads.
+        The same rivals; of the fewest held parameters needed, the one that gains most leads.
     """
-    freed = [rival for rival in rivals if isinstance(rival.lead.effect, ReleasedParameter)]
-    if not freed or (len(freed) == 1 and rivals[0] is freed[0]):
+    released = [rival for rival in rivals if isinstance(rival.lead.effect, ReleasedParameter)]
+    if not released or (len(released) == 1 and rivals[0] is released[0]):
         return list(rivals)
-    most = _together(state, freed)
-    if most is None or not _do_as_well(state, most, freed[:1], rivals):
+    most = _together(state, released)
+    if most is None or not _do_as_well(state, most, released[:1], rivals):
         return list(rivals)
-    needed, fit = _fewest(state, freed, most)
+    needed, fit = _fewest(state, released, most)
     if not _do_as_well(state, fit, needed, rivals):
         return list(rivals)
     first = max(needed, key=lambda rival: rival.gain)
@@ -54,15 +53,16 @@ def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
 
 
 def reconsider_curve(state: State, task: Task) -> bool:
-    """Take the last curve back where a held parameter and a name do as well; say whether they do.
+    """Replace the last curve by a held parameter if that and a named effect do as well.
 
-    What was added one by one to a wrong prediction may be neither, and a curve follows both.
+    A curve can follow a wrong parameter and an effect together, and hide both. Returns whether
+    it was replaced.
     """
-    if not task.freed or not state.steps or not state.steps[-1].winner.drawn:
+    if not task.released or not state.steps or not state.steps[-1].winner.drawn:
         return False
     drawn = state.steps[-1]
     without = fit_without(state, drawn)
-    if without is None or all(entry in without.model.effects for entry in task.freed):
+    if without is None or all(entry in without.model.effects for entry in task.released):
         return False
     before = replace(state, fit=without, steps=state.steps[:-1])
     task.scanned(before)
@@ -80,34 +80,34 @@ def reconsider_curve(state: State, task: Task) -> bool:
     rivals = prefer_two_names(before, sorted(rivals, key=lambda each: -each.evidence), task)
     if not rivals or not isinstance(rivals[0].lead.effect, ReleasedParameter):
         return False
-    task.progress(f"{rivals[0].identifier} and a name do as well as the curve")
+    task.progress(f"{rivals[0].identifier} and a named effect do as well as the curve")
     state.steps[:] = [*before.steps, Step(tuple(rivals), drawn.p_value, without)]
     state.holding = rivals[0].lead.effect.without(state.holding)
     state.settle(rivals[0].fit)
     return True
 
 
-def _fewest(state: State, freed: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
-    """The fewest parameters to which no other would add more than chance does, and their fit."""
-    for number in range(1, len(freed)):
-        tried = [(some, _together(state, some)) for some in combinations(freed, number)]
+def _fewest(state: State, released: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
+    """Return the fewest parameters to which no other adds more than chance, and their fit."""
+    for number in range(1, len(released)):
+        tried = [(some, _together(state, some)) for some in combinations(released, number)]
         fits = [(some, fit) for some, fit in tried if fit is not None]
-        some, best = min(fits, key=lambda each: each[1].chi2, default=(freed, most))
-        if best.chi2 - most.chi2 < SIZE * freed[0].left * (len(freed) - number):
+        some, best = min(fits, key=lambda each: each[1].chi2, default=(released, most))
+        if best.chi2 - most.chi2 < SIZE * released[0].left * (len(released) - number):
             return some, best
-    return freed, most
+    return released, most
 
 
-def _together(state: State, freed: Sequence[Rival]) -> Fit | None:
-    """The model with some held parameters set free."""
-    if len(freed) == 1:
-        return freed[0].fit
+def _together(state: State, released: Sequence[Rival]) -> Fit | None:
+    """Fit the model with some held parameters released."""
+    if len(released) == 1:
+        return released[0].fit
     model, held = state.fit.model, list(state.holding)
-    for rival in freed:
+    for rival in released:
         effect = rival.lead.effect
         assert isinstance(effect, ReleasedParameter)
         model, held = model.adding(effect), effect.without(held)
-    best = min(freed, key=lambda rival: rival.fit.chi2)
+    best = min(released, key=lambda rival: rival.fit.chi2)
     try:
         return refine(model, state.data, state.noise, best.fit.value, held=held)
     except (NoMotionError, np.linalg.LinAlgError):
@@ -115,10 +115,10 @@ def _together(state: State, freed: Sequence[Rival]) -> Fit | None:
 
 
 def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequence[Rival]) -> bool:
-    """Whether wrong parameters explain as much as each name and curve does.
+    """Whether wrong parameters explain as much as each effect and curve.
 
-    That one is wrong is likely beforehand. Several must be better than one name that does as
-    well alone, as two names must be: that all of them are needed at once is as rare.
+    A single wrong parameter has a high prior. Several must be better than one effect that does as
+    well alone, by the margin that two effects need.
     """
     one, more = needed[0], len(needed) - 1
     worth = (state.fit.chi2 - fit.chi2) / one.left - SIZE * more + (0.0 if more else one.prior)

@@ -13,6 +13,7 @@ from pendpipe.figures import (
     diagnosis_codes,
     diagnosis_curve,
     diagnosis_cycles,
+    diagnosis_decay,
     diagnosis_map,
     diagnosis_spectrum,
 )
@@ -21,6 +22,7 @@ from pendpipe.figures.diagnosis_data import Shown, shown
 from pendpipe.figures.style import save
 
 DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
+    "decay": diagnosis_decay.draw,
     "residual_map": diagnosis_map.draw,
     "residual_spectrum": diagnosis_spectrum.draw,
     "damping": diagnosis_cycles.draw_damping,

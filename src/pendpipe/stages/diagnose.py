@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pendpipe.diagnose import Progress, silent
+from pendpipe.diagnose.result import FILE_NAME
 from pendpipe.files import replaced, write_json
 
 if TYPE_CHECKING:
@@ -16,33 +16,35 @@ if TYPE_CHECKING:
     from pendpipe.diagnose.run import Outcome
     from pendpipe.recording import Recording
 
-RESULT: Final = "diagnosis.json"
+RESULT: Final = FILE_NAME
 DIAGNOSIS_FIGURES: Final = ("residual_map", "residual_spectrum", "damping", "frequency")
 """The figures that the diagnosis of every record has."""
-FIGURES: Final = (*DIAGNOSIS_FIGURES, "codes", "curve")
-"""The figures' names; `codes` and `curve` are drawn where they have something to show."""
+FIGURES: Final = (*DIAGNOSIS_FIGURES, "decay", "codes", "curve")
+"""All figures' names; `codes` and `curve` are drawn where they have something to show."""
 _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 <text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
 {}</text></svg>
 """
 Figures = Literal["all", "found", "none"]
-"""Of every recording, of those in which something is missing, or of none."""
+"""Draw figures of every recording, of those in which something is missing, or of none."""
 
 
 @dataclass(frozen=True)
 class DiagnosisOptions:
-    """What a recording is asked.
+    """How a recording is diagnosed.
 
     Parameters
     ----------
     baseline, fixed
-        The model that it is held against, and which of its parameters are held.
-    seed, level
-        Of the draws that count trials; global p-value of an accusation.
+        The null model, and which of its parameters are held.
+    seed
+        Of the random draws that count the trials of the scans.
+    level
+        The false-alarm probability: the global p-value below which an effect is reported.
     figures
-        Which are drawn.
+        Which figures are drawn.
     in_campaign
-        Whether a workflow waits for the figures: one that is not drawn then says so.
+        Whether a workflow waits for the figures: those not drawn then hold one line.
     """
 
     baseline: Baseline = "eq8"
@@ -55,22 +57,22 @@ class DiagnosisOptions:
 
 def diagnose_motion(
     recording: Recording,
-    question: DiagnosisOptions,
+    options: DiagnosisOptions,
     *,
     place: str | Path,
     turning_points: Path | None = None,
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> Outcome:
-    """Diagnose a recording in rad (or m), with turning points found before where there are."""
+    """Diagnose a recording in rad (or m), with the turning points of an earlier stage if given."""
     from pendpipe.analysis.turning_points import read_turning_points
     from pendpipe.diagnose.run import diagnose_decay, diagnose_recording
 
     asked: dict[str, Any] = {
-        "baseline": question.baseline,
-        "fixed": question.fixed,
-        "seed": question.seed,
-        "level": question.level,
+        "baseline": options.baseline,
+        "fixed": options.fixed,
+        "seed": options.seed,
+        "level": options.level,
         "place": place,
         "provenance": provenance,
         "progress": progress,
@@ -83,36 +85,30 @@ def diagnose_motion(
 
 
 def write_diagnosis(
-    folder: Path, outcome: Outcome, question: DiagnosisOptions, progress: Progress = silent
+    folder: Path, outcome: Outcome, options: DiagnosisOptions, progress: Progress = silent
 ) -> dict[str, Any]:
-    """Draw the figures that are asked for, then write the result that names them."""
-    diagnosis = outcome.diagnosis
-    wanted = question.figures == "all" or (
-        question.figures == "found" and diagnosis.verdict == "missing-physics"
+    """Draw the figures that are wanted, then write the result that names them."""
+    wanted = options.figures == "all" or (
+        options.figures == "found" and outcome.verdict == "missing-physics"
     )
-    _forget_figures(folder)
+    _remove_figures(folder)
     if wanted:
-        from pendpipe.figures.diagnosis import draw_diagnosis
-
         progress("drawing")
-        drawn = draw_diagnosis(outcome, folder)
-        diagnosis = dataclasses.replace(diagnosis, figures=tuple(path.name for path in drawn))
-    _say_what_is_not_drawn(folder, question, "Not drawn: nothing is missing here.")
-    content = diagnosis.as_json()
-    write_json(folder / RESULT, content)
+    content = outcome.save(folder, figures=wanted)
+    _write_placeholders(folder, options, "Not drawn: nothing is missing here.")
     return content
 
 
-def _forget_figures(folder: Path) -> None:
-    """Remove what an earlier diagnosis has drawn here."""
+def _remove_figures(folder: Path) -> None:
+    """Remove the figures of an earlier diagnosis."""
     for name in FIGURES:
         for form in (".svg", ".png"):
             folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
 
-def _say_what_is_not_drawn(folder: Path, question: DiagnosisOptions, reason: str) -> None:
-    """Put a line in the place of each figure that a workflow waits for."""
-    if not question.in_campaign or question.figures == "none":
+def _write_placeholders(folder: Path, options: DiagnosisOptions, reason: str) -> None:
+    """Write one line instead of each figure that a workflow waits for and that was not drawn."""
+    if not options.in_campaign or options.figures == "none":
         return
     for name in DIAGNOSIS_FIGURES:
         path = folder / f"{name}.svg"
@@ -122,21 +118,23 @@ def _say_what_is_not_drawn(folder: Path, question: DiagnosisOptions, reason: str
 
 
 def write_not_analysable(
-    folder: Path, question: DiagnosisOptions, reason: str, provenance: Mapping[str, Any]
-) -> None:
-    """Write the result of a recording that can't be analysed."""
+    folder: Path, options: DiagnosisOptions, reason: str, provenance: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Write the result of a recording that can't be analysed, and return its content."""
     from pendpipe.diagnose.result import not_analysable
 
-    _forget_figures(folder)
-    _say_what_is_not_drawn(folder, question, "Not drawn: this record can't be analysed.")
-    write_json(folder / RESULT, not_analysable(question.baseline, reason, provenance))
+    content = not_analysable(options.baseline, reason, provenance)
+    _remove_figures(folder)
+    _write_placeholders(folder, options, "Not drawn: this record can't be analysed.")
+    write_json(folder / RESULT, content)
+    return content
 
 
 def refused_before(refused: Path | None) -> str | None:
-    """Why a record of a campaign was refused by a stage that the diagnosis builds on.
+    """Return why a stage that the diagnosis builds on refused a record of a campaign; else None.
 
-    The fit runs beside the diagnosis and not before it, so it has no say. A diagnosis
-    refuses no record either: what can't be diagnosed may still have been fitted.
+    The fit runs beside the diagnosis, so its refusal does not count. Nor does a diagnosis refuse
+    a record: what can't be diagnosed may still have been fitted.
     """
     from pendpipe.stages.refusal import reason_of
 
