@@ -139,7 +139,7 @@ def test_a_limit_of_chi2_spoils_no_fit_that_gets_below_it(
     other = model.bare().adding(by_identifier(identifier))
     start = np.concatenate([without.value, [0.0], shape])
     whole = refine(other, data, noise, start)
-    limited = refine(other, data, noise, start, of_use=whole.chi2 + above)
+    limited = refine(other, data, noise, start, useful=whole.chi2 + above)
     # The motion is followed from the last one that was asked, to 1e-9.
     assert limited.chi2 == pytest.approx(whole.chi2)
 
@@ -160,7 +160,7 @@ def test_a_hopeless_fit_is_left_after_a_few_steps(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Model, "evaluate", counted)
     whole = refine(drift, data, noise, start)
     spent = len(asked)
-    of_use = whole.chi2 - 30.0
-    limited = refine(drift, data, noise, start, of_use=of_use)
-    assert of_use < limited.chi2 < without.chi2 - 70.0
+    useful = whole.chi2 - 30.0
+    limited = refine(drift, data, noise, start, useful=useful)
+    assert useful < limited.chi2 < without.chi2 - 70.0
     assert len(asked) - spent < 0.7 * spent

@@ -10,7 +10,7 @@ import pytest
 from pendpipe.diagnose.detect import Lead
 from pendpipe.diagnose.evidence import Rival, of_one_class
 from pendpipe.diagnose.refine import refine
-from pendpipe.diagnose.refits import OF_A_CURVE, limit_of_use, side_by_side
+from pendpipe.diagnose.refits import OF_A_CURVE, side_by_side, useful_chi2
 from pendpipe.effects.catalogue import by_identifier
 
 from .records import null_fit, stribeck_record
@@ -21,14 +21,14 @@ def test_whom_the_record_cannot_tell_from_the_best_is_of_use(gain: float) -> Non
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
     best = Rival(lead, fit, gain, gain)
-    at_the_limit = gain - limit_of_use(0.0, gain, drawn=False)
+    at_the_limit = gain - useful_chi2(0.0, gain, drawn=False)
     behind = replace(best, gain=at_the_limit, evidence=at_the_limit)
     assert not of_one_class(best, behind)
 
 
 @pytest.mark.parametrize("gain", [20.0, 400.0, 1e4])
 def test_a_name_that_may_stand_beside_another_for_a_curve_is_of_use(gain: float) -> None:
-    assert limit_of_use(0.0, gain, drawn=True) >= (1.0 - OF_A_CURVE) * gain
+    assert useful_chi2(0.0, gain, drawn=True) >= (1.0 - OF_A_CURVE) * gain
 
 
 def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:

@@ -148,7 +148,7 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
             module.draw(content)
     drawn = draw_diagnosis(outcome, tmp_path)
     assert [path.stem for path in drawn] == [
-        "residual_map", "residual_spectrum", "damping", "frequency",
+        "decay", "residual_map", "residual_spectrum", "damping", "frequency",
     ]  # fmt: skip
     for path in drawn:
         words = "".join(ET.parse(path).getroot().itertext())

@@ -1,4 +1,4 @@
-"""From a recording to readings and start values of the baseline."""
+"""From a recording to the readings and the start values of the baseline."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.model import Model
 from pendpipe.physics.decay import time_at
 
-_FEWEST: Final = 24
-_WIDTHS: Final = 10.0
-"""Of the Coulomb stop's width: nearer to it the rest position jumps with the parameters."""
+_FEWEST_READINGS: Final = 24
+_DEAD_BANDS: Final = 10.0
+"""Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
+jumps with the parameters."""
 
 
 @dataclass(frozen=True)
 class Beginning:
-    """Where a diagnosis begins.
+    """Readings, baseline and start values of a diagnosis.
 
     Parameters
     ----------
     data
-        The readings of the free decay, not those about the stop.
+        The readings of the free decay, without those near its end at rest.
     model
-        The baseline alone.
+        The baseline.
     value
         Its start values.
     held
-        Indices of what is not fitted.
+        Indices of values that are not fitted.
     noise_rms
         First estimate of one reading's noise.
     points
@@ -62,7 +63,7 @@ def begin(
     baseline: Baseline,
     fixed: Mapping[str, float],
 ) -> Beginning:
-    """Choose the readings that are compared, and the values from which the search starts."""
+    """Choose the readings that are compared, and the start values of the search."""
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
     span = usable_span(samples, points, start)
@@ -99,21 +100,21 @@ def begin(
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
-    """Leave readings out whose amplitude is within a few widths of the Coulomb stop."""
+    """Leave out readings whose amplitude is within a few widths of the Coulomb dead band."""
     rates = [max(float(value[k]), 0.0) for k in (A, B, C)]
     width = 0.5 * math.pi * rates[2] / value[OMEGA]
     start = abs(float(value[START]))
-    if not 0.0 < _WIDTHS * width < 0.5 * start:
+    if not 0.0 < _DEAD_BANDS * width < 0.5 * start:
         return data
-    last = value[TIME] + float(time_at(_WIDTHS * width, start, *rates))
+    last = value[TIME] + float(time_at(_DEAD_BANDS * width, start, *rates))
     keep = int(np.searchsorted(data.time_s, last))
-    return data.first(keep) if _FEWEST < keep < len(data) else data
+    return data.first(keep) if _FEWEST_READINGS < keep < len(data) else data
 
 
 def _before_the_stop(
     data: Data, value: FloatArray, order: int, parts: Mapping[str, float]
 ) -> tuple[Data, Model]:
-    """Leave readings at the end out until the start values move the pendulum to the last."""
+    """Leave out readings at the end until the model with the start values moves throughout."""
     while True:
         model = Model(
             data.time_s,
@@ -127,7 +128,7 @@ def _before_the_stop(
             model.evaluate(value)
         except NoMotionError:
             keep = int(0.93 * len(data))
-            if keep < _FEWEST:
+            if keep < _FEWEST_READINGS:
                 raise
             data = data.first(keep)
         else:
@@ -135,7 +136,7 @@ def _before_the_stop(
 
 
 def order_for(amplitude: float, unit: str) -> int:
-    """Nodes in a half cycle: more where sin(x) is far from x."""
+    """Return the number of nodes in a half cycle: more where sin x differs more from x."""
     if unit != "rad" or amplitude < 0.8:
         return 14
     if amplitude < 1.6:
@@ -150,7 +151,7 @@ def _held(
     baseline: Baseline,
 ) -> tuple[int, ...]:
     index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
-    # Held parts of b are the model's matter.
+    # Held parts of b are handled by the model.
     held = [index[name] for name in held_rates if name != "b" or not parts]
     if "frequency" in fixed:
         held.append(OMEGA)

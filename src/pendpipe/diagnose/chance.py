@@ -1,4 +1,4 @@
-"""How often chance alone would do as well somewhere in the whole catalogue."""
+"""How often chance alone does as well anywhere in the catalogue (look-elsewhere effect)."""
 
 from __future__ import annotations
 
@@ -22,23 +22,22 @@ SMALLEST: Final = 1e-12
 """Smaller p-values rest on tails of the noise that nobody has tested."""
 DRAWS: Final = 256
 FEW_DRAWS: Final = 64
-"""They tell the number of trials to a fifth: enough where chance is plainly enough."""
-_AT_ONCE: Final = 32
-"""Draws that are worked on together: few enough to stay in the processor's cache."""
-_TAIL: Final = 0.4
-"""Part of the draws from whose smallest p-values the number of trials is read."""
-_GROWTH: Final = 0.5
-"""A scan over one continuous shape has trials in proportion to the root of the threshold in
-chi^2 (Rice's formula), which is -2 ln p but for slower terms."""
+"""Draws for a first look: they determine the number of trials to 20 %."""
+_DRAWS_AT_ONCE: Final = 32
+"""Draws computed together: few enough for the processor's cache."""
+_TAIL_SHARE: Final = 0.4
+"""Part of the draws, those of the smallest p-values, that determines the number of trials."""
+_TRIALS_EXPONENT: Final = 0.5
+"""Exponent of ln p in the number of trials: a scan over one continuous shape has trials
+proportional to the root of the threshold in chi^2 (Rice's formula), about -2 ln p."""
 
 
 @dataclass(frozen=True)
 class Trials:
-    """The number of independent trials that a scan amounts to.
+    """The effective number of independent trials of a scan.
 
     P(smallest local p-value < p) = 1 - (1 - p)^m(p), with m = first (ln p/ln usual)^growth
-    where p is smaller than usual: scans over continuous shapes have the more trials the rarer
-    the event.
+    for p below usual: the rarer the event, the more trials a scan over continuous shapes has.
     """
 
     first: float
@@ -47,12 +46,12 @@ class Trials:
     """The p-value at which the trials were counted."""
 
     def number_at(self, log_local: float) -> float:
-        """How many trials there are where the local p-value is exp(`log_local`)."""
+        """Return the number of trials at a local p-value of exp(`log_local`)."""
         rarer = max(log_local / math.log(self.usual), 1.0)
         return float(max(self.first * rarer**self.growth, 1.0))
 
     def global_p_value(self, local: float) -> float:
-        """The probability that chance finds a local p-value as small anywhere."""
+        """Return the probability that chance gives such a local p-value anywhere in the scan."""
         if local <= 0.0:
             return 0.0
         trials = self.number_at(math.log(local))
@@ -61,7 +60,7 @@ class Trials:
 
 @dataclass(frozen=True)
 class Chance:
-    """What scans of white residuals find.
+    """Trials of the scans, counted on white residuals.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ class Chance:
     own
         Trials of each effect by itself, by identifier.
     draws
-        From how many these were counted.
+        Number of draws.
     """
 
     everywhere: Trials
@@ -79,10 +78,17 @@ class Chance:
 
 
 def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = DRAWS) -> Chance:
-    """Draw white residuals, project them as the fit does, and see what the scans make of them.
+    """Count trials: draw white residuals, project them as the fit does, and scan them.
 
-    The tail of the smallest p-value is extrapolated with a slowly growing number of trials,
-    as Gross and Vitells do for continuous scans.
+    The tail of the smallest p-value is extrapolated with a slowly growing number of trials, as
+    by Gross and Vitells for continuous scans.
+
+    Parameters
+    ----------
+    bank, tones
+        The effects' derivatives, and the scans for tones.
+    seed, draws
+        Of the generator; the number of draws.
     """
     generator = np.random.default_rng(seed)
     rows = bank.rows()
@@ -90,13 +96,13 @@ def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = DRA
     freedom = {name: bank.freedom[indices[:1]] for name, indices in rows.items()}
     largest: dict[str, list[FloatArray]] = {name: [] for name in rows}
     loudest: list[FloatArray] = []
-    for _ in range(math.ceil(draws / _AT_ONCE)):
-        white = generator.standard_normal((_AT_ONCE, len(bank.basis))).T
+    for _ in range(math.ceil(draws / _DRAWS_AT_ONCE)):
+        white = generator.standard_normal((_DRAWS_AT_ONCE, len(bank.basis))).T
         white -= bank.basis @ (bank.basis.T @ white)
-        scores = bank.scores(white) if rows else np.zeros((0, _AT_ONCE))
+        scores = bank.scores(white) if rows else np.zeros((0, _DRAWS_AT_ONCE))
         for name, indices in rows.items():
             largest[name].append(scores[indices].max(axis=0))
-        tone = np.zeros(_AT_ONCE)
+        tone = np.zeros(_DRAWS_AT_ONCE)
         for scores in tones.scores(white) if tones else []:
             tone = np.maximum(tone, scores.max(axis=0))
         loudest.append(tone)
@@ -105,20 +111,20 @@ def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = DRA
         for name, parts in largest.items()
     }
     own = {
-        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local, _GROWTH)
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local, _TRIALS_EXPONENT)
         for name, local in found.items()
     }
     smallest = np.min([np.exp(-0.5 * np.concatenate(loudest)), *found.values()], axis=0)
-    return Chance(_trials(smallest, _GROWTH), own, draws)
+    return Chance(_trials(smallest, _TRIALS_EXPONENT), own, draws)
 
 
 def _trials(smallest: FloatArray, growth: float) -> Trials:
-    """Read the number of trials off the smallest p-values of many draws: 1 - F = (1 - p)^m."""
+    """Estimate the number of trials from the smallest p-values of many draws: 1 - F = (1 - p)^m."""
     ordered = np.sort(smallest)
     draws = len(ordered)
     rank = (np.arange(1, draws + 1) - 0.3) / (draws + 0.4)
     trials = np.log1p(-rank) / np.log1p(-np.minimum(ordered, 1.0 - 1e-12))
-    part = slice(max(2, draws // 50), int(_TAIL * draws))
+    part = slice(max(2, draws // 50), int(_TAIL_SHARE * draws))
     middle = float(np.exp(np.mean(np.log(trials[part]))))
     at = float(np.exp(np.mean(np.log(ordered[part]))))
     return Trials(max(middle, 1.0), growth, min(at, 0.5))

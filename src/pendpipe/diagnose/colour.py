@@ -1,4 +1,4 @@
-"""The colour of noise: its spectrum from the squares of its cosines, by Whittle's likelihood."""
+"""The spectrum of noise from the squares of its cosines, by Whittle's likelihood."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.arrays import FloatArray
 
 REFERENCE_HZ: Final = 0.05
-"""Where the red part's strength is told, and below which it may end: what drifts (warmth,
-draughts, electronics) is slower than that, and what is faster is mostly white."""
-_WORTH: Final = (2.5, 12.0)
-"""Gain in -2 ln L for which the spectrum is given a red part, and a memory. A red part that
-is missed accuses drifts and slow tones of the noise; a needless one costs little."""
+"""Frequency at which the strength of the red part is given, and above which it may end: drifts
+(temperature, draughts, electronics) are slower, and faster noise is mostly white."""
+_NEEDED_GAIN: Final = (2.5, 12.0)
+"""Gain in -2 ln L from which the spectrum gets a red part, and a memory. A missed red part causes
+false drifts and slow tones; a superfluous one costs little sensitivity."""
 _FLATTEST: Final = 0.3
 _STEEPEST: Final = 1.6
-"""Slopes between which noise is red. Were it flat below the end, a few low cosines that are small
-by chance would tell that the slowest of all must be an effect."""
-_SETTLED: Final = 1e-2
-"""Of -2 ln L: a step that promises less is the last."""
-_MOST: Final = 25
-"""Looks at the likelihood from one start."""
-_OUTLIER: Final = 12.0
-"""Power over the spectrum beyond which a cosine holds no noise but a line."""
+"""Limits of the slope of red noise. With a flat spectrum, a few low cosines that are small by
+chance would turn the slowest one into an effect."""
+_CONVERGED: Final = 1e-2
+"""Expected fall of -2 ln L below which a step is the last."""
+_MOST_EVALUATIONS: Final = 25
+"""Largest number of evaluations from one start."""
+_OUTLIER_RATIO: Final = 12.0
+"""Power over the spectrum above which a cosine is a line and not noise."""
 
 
 class Colour(NamedTuple):
@@ -41,7 +41,7 @@ class Colour(NamedTuple):
     memory
         Correlation of neighbouring readings by a first-order low-pass.
     ends_hz
-        Above this the red part is nothing; inf where it goes on.
+        The red part is zero above this; inf if it does not end.
     """
 
     white: float
@@ -74,50 +74,50 @@ def fit_colour(
     Parameters
     ----------
     power, frequency_hz
-        Squares of the cosines that hold noise alone, and where they are, shape (n,).
+        Squares of the cosines that contain noise alone, and their frequencies, shape (n,).
     interval_s
         Between readings.
     red
         Whether the noise may be red.
     """
-    # Glitches and tones are no noise: what is far above its neighbours is clipped.
+    # Glitches and tones are not noise: clip what is far above its neighbours.
     level = _clipped_mean(power, max(float(np.median(power)) / 0.4549, 1e-300))
     best, least = (
         Colour(level),
-        float(np.sum(math.log(level) + np.minimum(power / level, _OUTLIER))),
+        float(np.sum(math.log(level) + np.minimum(power / level, _OUTLIER_RATIO))),
     )
     for ends in (math.inf, REFERENCE_HZ) if red else ():
         found, cost = _red(power, frequency_hz, level, ends)
-        if cost < least - (_WORTH[0] if not best.red else 0.0):
+        if cost < least - (_NEEDED_GAIN[0] if not best.red else 0.0):
             best, least = found, cost
     found, cost = _low_pass(power, frequency_hz, interval_s, level)
-    if cost < least - _WORTH[1]:
+    if cost < least - _NEEDED_GAIN[1]:
         best = found
     return best
 
 
 def _whittle(power: FloatArray, spectrum: FloatArray, slopes: FloatArray) -> Quadratic:
-    """-2 ln L, what is far above clipped, about a spectrum.
+    """Return -2 ln L, with outliers clipped, expanded about a spectrum.
 
     Parameters
     ----------
     power, spectrum
         Shape (n,).
     slopes
-        Derivatives of ln S by the values that are fitted, shape (values, n). What is expected
-        of the second derivatives by ln S is 1.
+        Derivatives of ln S by the fitted values, shape (values, n). The expected second
+        derivative by ln S is 1.
     """
     ratio = power / spectrum
-    total = float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER)))
-    pull = np.where(ratio < _OUTLIER, ratio, 0.0) - 1.0
+    total = float(np.sum(np.log(spectrum) + np.minimum(ratio, _OUTLIER_RATIO)))
+    pull = np.where(ratio < _OUTLIER_RATIO, ratio, 0.0) - 1.0
     return Quadratic(total, 0.5 * slopes @ pull, 0.5 * slopes @ slopes.T)
 
 
 def _with_white(found: Quadratic, power: FloatArray, white: float) -> Quadratic:
-    """Add cosines of white noise alone, whose variance is the first value's exponential."""
+    """Add cosines of white noise alone, with the exponential of the first value as variance."""
     ratio = power / white
-    inside = ratio < _OUTLIER
-    total = len(power) * math.log(white) + float(np.sum(np.minimum(ratio, _OUTLIER)))
+    inside = ratio < _OUTLIER_RATIO
+    total = len(power) * math.log(white) + float(np.sum(np.minimum(ratio, _OUTLIER_RATIO)))
     gradient, normal = found.gradient.copy(), found.normal.copy()
     gradient[0] += 0.5 * (float(np.sum(ratio[inside])) - len(power))
     normal[0, 0] += 0.5 * len(power)
@@ -127,7 +127,7 @@ def _with_white(found: Quadratic, power: FloatArray, white: float) -> Quadratic:
 def _red(
     power: FloatArray, frequency: FloatArray, level: float, ends: float
 ) -> tuple[Colour, float]:
-    """The best red part that ends at a frequency, or goes on."""
+    """Fit a red part that ends at a frequency, or does not end."""
     inside = frequency <= ends
     if np.count_nonzero(inside) < 3:
         return Colour(level), math.inf
@@ -142,25 +142,28 @@ def _red(
         found = _whittle(near, white * (1.0 + rise), slopes)
         return _with_white(found, beyond, white) if len(beyond) else found
 
-    # Far below the powers all of them are clipped, and the cost would fall without end.
+    # Far below the powers all of them are clipped, and the cost would fall without limit.
     middle = math.log(level)
     bounds = Bounds(
         np.array([middle - 8.0, -12.0, _FLATTEST]), np.array([middle + 4.0, 8.0, _STEEPEST])
     )
-    # What is clipped makes several minima.
+    # Clipping causes several minima.
     starts = [
         np.array([middle, 0.0, 1.0]),
         np.array([middle, 0.0, _STEEPEST]),
         _red_throughout(near, logs, bounds),
     ]
-    ends_at = [minimise(cost, start, bounds, tolerance=_SETTLED, most=_MOST) for start in starts]
+    ends_at = [
+        minimise(cost, start, bounds, tolerance=_CONVERGED, most=_MOST_EVALUATIONS)
+        for start in starts
+    ]
     found = min(ends_at, key=lambda minimum: minimum.quadratic.chi2)
     white, red, slope = found.value.tolist()
     return Colour(math.exp(white), math.exp(red), slope, 0.0, ends), found.quadratic.chi2
 
 
 def _red_throughout(power: FloatArray, logs: FloatArray, bounds: Bounds) -> FloatArray:
-    """Start values of noise that is red at all frequencies: a line through ln P."""
+    """Return start values for noise that is red at all frequencies: a line through ln P."""
     slope, height = np.polyfit(logs, np.log(np.maximum(power, 1e-300)), 1)
     # The logarithm of a squared normal number is -1.27 on average.
     height += 1.27
@@ -171,7 +174,7 @@ def _red_throughout(power: FloatArray, logs: FloatArray, bounds: Bounds) -> Floa
 def _low_pass(
     power: FloatArray, frequency: FloatArray, interval: float, level: float
 ) -> tuple[Colour, float]:
-    """The best first-order memory."""
+    """Fit a first-order memory."""
     cosine = np.cos(2.0 * math.pi * frequency * interval)
 
     def cost(values: FloatArray) -> Quadratic:
@@ -181,13 +184,13 @@ def _low_pass(
 
     middle = math.log(level)
     bounds = Bounds(np.array([middle - 8.0, -0.95]), np.array([middle + 4.0, 0.95]))
-    found = minimise(cost, np.array([middle, 0.3]), bounds, tolerance=_SETTLED)
+    found = minimise(cost, np.array([middle, 0.3]), bounds, tolerance=_CONVERGED)
     return Colour(math.exp(found.value[0]), memory=float(found.value[1])), found.quadratic.chi2
 
 
 def _clipped_mean(power: FloatArray, level: float) -> float:
-    """Mean of chi^2_1 numbers, the far tail left out and made up for."""
+    """Return the mean of chi^2_1 numbers without the far tail, corrected for it."""
     for _ in range(3):
-        inside = power < _OUTLIER * level
+        inside = power < _OUTLIER_RATIO * level
         level = float(np.mean(power[inside])) / 0.9958
     return level

@@ -1,4 +1,4 @@
-"""Amplitude and phase of each cycle, of readings and of models alike, for the figures."""
+"""Amplitude and phase of each cycle, of readings and of models, and loss and frequency between."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.lock_in import lock_in
 from pendpipe.effects.model import Evaluated
 
-_WHOLE: Final = 0.85
-"""Part of a cycle's readings that must be there."""
-_CERTAIN: Final = 0.03
-"""Relative error of a loss at which a span is long enough."""
-_FALL: Final = 0.8
-"""Part to which the amplitude may fall within a span."""
-_SPANS: Final = 40
+_CYCLE_SHARE: Final = 0.85
+"""Part of a cycle's readings that must be present."""
+_LOSS_ERROR: Final = 0.03
+"""Relative error of the loss from which a span is long enough."""
+_AMPLITUDE_RATIO: Final = 0.8
+"""Ratio of amplitudes from which a span is long enough anyway."""
+_MOST_SPANS: Final = 40
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """One number a cycle; all of shape (k,).
+    """One value for each cycle; all of shape (k,).
 
     Parameters
     ----------
     time_s
-        The middle of each.
+        Middle of each cycle.
     amplitude, phase
         Of the readings: amplitude, and phase in rad, rising by 2 pi a cycle.
     sd
@@ -41,7 +41,7 @@ class Cycles:
     sd: FloatArray
 
     def at(self, time_s: FloatArray) -> Cycles:
-        """Return the same at other times: amplitude and frequency change slowly."""
+        """Interpolate at other times: amplitude and frequency change slowly."""
         known = self.time_s
         pace = (self.phase[-1] - self.phase[0]) / (known[-1] - known[0])
         slow = self.phase - pace * known
@@ -60,7 +60,7 @@ class Spans:
     Parameters
     ----------
     amplitude
-        In the middle (geometric mean).
+        Geometric mean of the ends.
     loss, loss_sd
         -d ln y/dt, in 1/s.
     frequency_hz, frequency_sd_hz
@@ -82,13 +82,13 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
     reading, weight
         Readings (or a model's readings) and whether each counts, shape (n,).
     clock
-        The model whose phase tells the cycles apart.
+        The model whose phase numbers the cycles.
     noise_rms
         Standard deviation of one reading; 0 for a model's.
     """
     motion = clock.sampled.motion
-    found = lock_in(reading, weight, clock.sampled, _WHOLE)
-    # The middle of a cycle is a turning point of the model, where all about it is known.
+    found = lock_in(reading, weight, clock.sampled, _CYCLE_SHARE)
+    # The middle of a cycle is a turning point of the model.
     turning = 2 * found.number + 1
     inside = (turning >= 0) & (turning < len(motion.time_s))
     turning = turning[inside]
@@ -100,22 +100,22 @@ def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms:
 
 
 def span_ends(found: Cycles) -> list[int]:
-    """Choose cycles between which loss and frequency are read, by their certainty."""
-    least = max(1, math.ceil((len(found.time_s) - 1) / _SPANS))
+    """Choose cycles between which loss and frequency are precise enough."""
+    least = max(1, math.ceil((len(found.time_s) - 1) / _MOST_SPANS))
     ends, log = [0], np.log(found.amplitude)
     for last in range(1, len(found.time_s)):
         first = ends[-1]
         if last - first < least or found.sd[last] > 0.3:
             continue
         drop = abs(log[first] - log[last])
-        certain = math.hypot(found.sd[first], found.sd[last]) < _CERTAIN * drop
-        if certain or drop > -math.log(_FALL):
+        certain = math.hypot(found.sd[first], found.sd[last]) < _LOSS_ERROR * drop
+        if certain or drop > -math.log(_AMPLITUDE_RATIO):
             ends.append(last)
     return ends
 
 
 def between(found: Cycles, ends: list[int]) -> Spans:
-    """Read loss and frequency between given cycles."""
+    """Return loss and frequency between given cycles."""
     first, last = np.array(ends[:-1], dtype=np.intp), np.array(ends[1:], dtype=np.intp)
     lasts = found.time_s[last] - found.time_s[first]
     log = np.log(found.amplitude)

@@ -9,13 +9,13 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 
-_DITHERS: Final = tuple(np.linspace(0.04, 0.5, 12))
-"""Noise over step that is tried."""
-_WORTH: Final = 12.0
+_NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
+"""Noise over step, at the values that are tried."""
+_NEEDED_GAIN: Final = 12.0
 _MOST_UNEVEN: Final = 3
-"""Times `most`: how many uneven readings are taken."""
-_LEAST_IN_A_CYCLE: Final = 24.0
-"""Means of readings: the fifth harmonic loses 7 %, and the fundamental's loss is known."""
+"""Largest number of unevenly spaced readings, over `most`."""
+_FEWEST_IN_CYCLE: Final = 24.0
+"""Fewest means in a cycle: the fifth harmonic loses 7 %; the loss of the fundamental is known."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class Data:
     time_s, values
         Shape (n,), times rising, values in rad (or m).
     interval_s
-        Between neighbouring readings, usually.
+        Median interval of neighbouring readings.
     uniform
-        Whether they are evenly spaced, so that noise can have a colour.
+        Whether they are evenly spaced, so that the noise may be coloured.
     weight
         1 where a reading counts, 0 where it is masked; shape (n,).
     step
-        Of the readings; 0 where there is none.
+        Of the readings; 0 if they have none.
     unit
         ``"rad"`` or ``"m"``.
     time_noise
@@ -41,13 +41,13 @@ class Data:
     noise_rms
         First estimate of one reading's noise.
     fold
-        How many readings each is the mean of.
+        Number of original readings in each mean.
     lattice
-        Where the rounding rules: a reading's remainder by the step, and the noise before
-        the rounding (rad); None where noise makes the rounding random.
+        If rounding is coarse: a reading's remainder modulo the step, and the noise before
+        rounding (rad); None if noise makes rounding errors random.
     anchor
-        A time in s near the beginning, and the phase of the readings then: so that whole
-        turns are counted alike whatever the model.
+        A time in s near the beginning, and the phase of the readings then, so that whole turns
+        are counted the same way for every model.
     """
 
     time_s: FloatArray
@@ -68,18 +68,18 @@ class Data:
 
     @property
     def used(self) -> int:
-        """How many readings count."""
+        """Number of readings that count."""
         return int(np.count_nonzero(self.weight))
 
     def residual(self, reading: FloatArray) -> FloatArray:
-        """Return the readings minus what a model makes of them, rounding included."""
+        """Return readings minus model, with the mean rounding error of the model."""
         if self.lattice is None:
             return self.values - reading
         origin, noise = self.lattice
         return self.values - reading - rounding_bias(reading - origin, self.step, noise)
 
     def first(self, count: int) -> Data:
-        """The first `count` of them."""
+        """Return the first `count` readings."""
         return replace(
             self,
             time_s=self.time_s[:count],
@@ -88,14 +88,14 @@ class Data:
         )
 
     def masked(self, bad: BoolArray) -> Data:
-        """The same without some readings."""
+        """Return the same with some readings masked."""
         return replace(self, weight=np.where(bad, 0.0, self.weight))
 
 
 def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArray:
-    """Return by how much rounding shifts the mean of a noisy reading, rad.
+    """Return the mean rounding error of a noisy reading, rad.
 
-    round(x) - x is a sawtooth; Gaussian noise takes its harmonic k down by
+    round(x) - x is a sawtooth; Gaussian noise reduces its harmonic k by the factor
     exp(-2 pi^2 k^2 (noise/step)^2) (Widrow).
     """
     total = np.zeros_like(angle)
@@ -110,19 +110,18 @@ def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArra
 
 
 def with_lattice(data: Data, reading: FloatArray) -> Data:
-    """Find the noise before the rounding, where the rounding's bias is seen in the readings.
+    """Estimate the noise before rounding, if the readings show the mean rounding error.
 
-    This is not the noise that makes the codes likeliest (`analysis.fit.rounding.best_noise`):
-    the model may still be wrong by a part of the step, which smears the bias as noise does.
-    What counts is how much of the sawtooth is left in the residual, and whether it is worth
-    taking off.
+    This is not the maximum-likelihood noise of the codes (`analysis.fit.rounding.best_noise`): the
+    model may still be wrong by part of a step, which smooths the rounding error as noise does.
+    Here the sawtooth that remains in the residual decides.
 
     Parameters
     ----------
     data
         The readings; their step must be known.
     reading
-        A model of them that is good to a small part of the step.
+        A model that fits to a small part of the step.
     """
     if not data.step or data.time_noise:
         return data
@@ -131,8 +130,8 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
         return data
     turn = 2.0 * np.pi * data.values / data.step
     origin = float(np.angle(np.mean(np.exp(1j * turn)))) * data.step / (2.0 * np.pi)
-    best, least = None, len(off) * float(np.log(np.mean(off**2))) - _WORTH
-    for share in _DITHERS:
+    best, least = None, len(off) * float(np.log(np.mean(off**2))) - _NEEDED_GAIN
+    for share in _NOISE_RATIOS:
         bias = rounding_bias((reading - origin)[data.weight > 0.0], data.step, share * data.step)
         cost = len(off) * float(np.log(np.mean((off - bias) ** 2)))
         if cost < least:
@@ -153,7 +152,7 @@ def fast_length(count: int) -> int:
 
 
 def at_even_times(data: Data, time_s: FloatArray) -> Data:
-    """The same readings at an even clock's times; evenly spaced where none is missing."""
+    """Return the readings with the times of a regular clock; evenly spaced if none is missing."""
     interval = float(np.median(np.diff(time_s)))
     even = bool(np.all(np.abs(np.diff(time_s) - interval) < 1e-3 * interval))
     moved = replace(data, time_s=time_s, interval_s=interval, uniform=even)
@@ -171,27 +170,27 @@ def gather(
     noise_rms: float,
     most: int = 4000,
 ) -> Data:
-    """Take the readings, in means of several where there are very many in a cycle.
+    """Collect the readings, averaged where there are very many in a cycle.
 
-    A mean over m readings keeps what is slower than it; 24 in a cycle are left at least.
-    What it takes off the fundamental, the model's readings lose as well (`Model.fold`).
+    At least 24 means are left in a cycle. The averaging reduces the amplitude of the model's
+    readings equally (`Model.fold`).
     """
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
     uniform = bool(np.all(np.abs(intervals - interval) < 0.02 * interval)) and not counts
     fold = 1
     if uniform and len(time_s) > most:
-        fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _LEAST_IN_A_CYCLE)))
+        fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _FEWEST_IN_CYCLE)))
     if fold > 1:
         whole = len(time_s) // fold * fold
         time_s = time_s[:whole].reshape(-1, fold).mean(axis=1)
         values = values[:whole].reshape(-1, fold).mean(axis=1)
         interval *= fold
     if uniform:
-        # The whitening's transforms are ten times slower where the length has a large prime.
+        # Fourier transforms are ten times slower if the length has a large prime factor.
         time_s, values = time_s[: fast_length(len(time_s))], values[: fast_length(len(values))]
     elif len(time_s) > _MOST_UNEVEN * most:
-        # Means of uneven readings would be means of uneven phases: every k-th is taken.
+        # Means of unevenly spaced readings would mix phases: take every k-th reading.
         keep = slice(None, None, len(time_s) // (_MOST_UNEVEN * most) + 1)
         time_s, values = time_s[keep], values[keep]
     return Data(

@@ -1,4 +1,4 @@
-"""Detection: every effect's best score on what a fit leaves, and the global p-value."""
+"""Detection: the best score of every effect on a fit's residual, and the global p-value."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.oscillations import plane_band_hz
 
-_DYING: Final = (0.06, 0.25)
-"""Decay times of the dying tones that are looked for, over the record's duration."""
+_DECAY_TIMES: Final = (0.06, 0.25)
+"""Decay times of the decaying tones in the scan, over the record's duration."""
 
-_PLAINLY: Final = 0.2
-"""Global p-value from which no more draws are made: far above any level that is asked for."""
-_TURNS: Final = 3.0
-"""Cycles in the record that make a tone; what is slower is a drift."""
-_ABOVE: Final = 1.3
-"""Of the motion's frequency: where second modes are looked for."""
+_CLEARLY_CHANCE: Final = 0.2
+"""Global p-value above which no more draws are made: far above any significance level."""
+_FEWEST_CYCLES: Final = 3.0
+"""Fewest cycles of a tone in the record; slower ones are drifts."""
+_LOWEST_MODE: Final = 1.3
+"""Lowest frequency of a decaying second mode, over the motion's."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Lead:
     effect, shape
         The effect, and the shape at which it scores best.
     score
-        chi^2 that it would take off, to first order.
+        Fall of chi^2, to first order.
     p_value
-        How often chance does better over the effect's own shapes.
+        Probability that chance does better over the effect's own shapes.
     """
 
     effect: Effect
@@ -53,16 +53,16 @@ class Lead:
 
 @dataclass(frozen=True)
 class Detection:
-    """What a scan of the whole catalogue has found.
+    """The result of a scan of the whole catalogue.
 
     Parameters
     ----------
     leads
-        One an effect, the best first.
+        One for each effect, the best first.
     p_value
         Global: of the smallest local p-value anywhere.
     chance
-        What chance finds in the catalogue, and with each effect by itself.
+        Trials of the whole catalogue, and of each effect.
     """
 
     leads: tuple[Lead, ...]
@@ -72,7 +72,7 @@ class Detection:
 
 @dataclass(frozen=True)
 class Scanner:
-    """The columns of a catalogue along one fit."""
+    """The derivatives by all effects of a catalogue along one fit."""
 
     bank: Bank
     tones: ToneScans
@@ -81,7 +81,7 @@ class Scanner:
 
 
 def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Scanner:
-    """Work out all columns."""
+    """Compute the derivatives by all effects."""
     spectral = tuple(effect for effect in effects if effect.spectral)
     others = [effect for effect in effects if effect not in spectral]
     bank = build_bank(fit, noise, others)
@@ -89,12 +89,12 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     if spectral and data.uniform:
         duration = float(data.time_s[-1] - data.time_s[0])
         own = fit.value[OMEGA] / (2.0 * math.pi)
-        steady = Band(_TURNS / duration, own, plane_band_hz(fit.at.span))
+        steady = Band(_FEWEST_CYCLES / duration, own, plane_band_hz(fit.at.span))
         scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), steady))
         since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
         scans += [
-            tone_scan(data, noise, bank.basis, np.exp(-since / dying), Band(_ABOVE * own))
-            for dying in _DYING
+            tone_scan(data, noise, bank.basis, np.exp(-since / dying), Band(_LOWEST_MODE * own))
+            for dying in _DECAY_TIMES
         ]
     return Scanner(
         bank, ToneScans(noise, tuple(scans)), spectral, float(data.time_s[-1] - data.time_s[0])
@@ -102,16 +102,16 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
 
 
 def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None) -> Detection:
-    """Score everything.
+    """Score all effects on a fit's residual.
 
     Parameters
     ----------
     scanner, fit
-        The columns, and the fit whose residual is looked at.
+        The derivatives, and the fit.
     seed
         Of the draws that count the trials.
     known
-        An earlier detection on this record: its trials are used again.
+        An earlier detection on this record, whose trials are reused.
     """
     bank = scanner.bank
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
@@ -124,7 +124,7 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
         smallest = min(smallest, math.exp(-0.5 * float(scan.max())))
     few = None if known is None else known.chance
     chance = few or draw_chance(bank, scanner.tones, seed, FEW_DRAWS)
-    if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _PLAINLY:
+    if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _CLEARLY_CHANCE:
         chance = draw_chance(bank, scanner.tones, seed)
     leads = _bank_leads(bank, scores, chance.own)
     leads += _tone_leads(scanner, tones)
@@ -133,7 +133,7 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
 
 
 def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
-    """Score effects that were not scanned, on what a fit leaves."""
+    """Score effects that were not scanned, on a fit's residual."""
     bank = build_bank(fit, noise, effects)
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
     return _bank_leads(bank, bank.scores(residual), {}) if bank.candidates else []
@@ -152,11 +152,13 @@ def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[
 
 
 def _tone_leads(scanner: Scanner, tones: Sequence[FloatArray]) -> list[Lead]:
-    """The strongest tone, steady or dying, for each effect that is one."""
+    """Return the strongest tone, steady or decaying, for each effect that is a tone."""
     leads = []
     for effect in scanner.spectral:
         found = []
-        for scan, dying, scores in zip(scanner.tones.scans, (None, *_DYING), tones, strict=False):
+        for scan, dying, scores in zip(
+            scanner.tones.scans, (None, *_DECAY_TIMES), tones, strict=False
+        ):
             index = int(np.argmax(scores))
             score = float(scores[index])
             decay = math.inf if dying is None else dying * scanner.duration_s

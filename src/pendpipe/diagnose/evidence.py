@@ -1,4 +1,4 @@
-"""What a refitted effect is worth beside others, and how sure that makes its name."""
+"""Evidence of refitted effects, and the probabilities of their names."""
 
 from __future__ import annotations
 
@@ -18,44 +18,43 @@ from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 
 CLASS: Final = 6.0
-"""Twice the logarithm of the likelihood within which effects are of one class."""
-_SHAPE: Final = 2.0
-"""What a fitted shape takes off a gain: that much chance makes of it (Akaike)."""
-_FORM: Final = 3.0
-"""Standard deviation of a difference of evidence for what a law's own form is worth, where
-little is gained: it grows with the gain by `MISSHAPEN`."""
+"""Twice the log-likelihood ratio within which effects are of one class."""
+_SHAPE_CHARGE: Final = 2.0
+"""Charge for a fitted shape (Akaike)."""
+_FORM_SD: Final = 3.0
+"""Standard deviation of a difference of evidence due to the exact form of a law, for small gains;
+for large ones it is `MISSHAPEN` times the gain."""
 MISSHAPEN: Final = 0.03
-"""Part of a gain that a real law leaves to the catalogue's form of it (a flexure's sinh to a cubic
-term, a drag that follows C_D(Re) to a power), or to a curve that is straight between knots."""
-_UNSURE: Final = (4.5, 0.01)
-"""What `_FORM` and `MISSHAPEN` are to classes, to probabilities: with these, stated ones came
-true on opened challenges. Scans and optima add to the spread where little is gained, and most
-laws leave less of a large gain than the worst do."""
-SIZE: Final = 6.0
-"""What a further size takes off a gain too large for p-values."""
+"""Part of a gain by which a real law differs from the catalogue's form of it (a flexure's sinh from
+a cubic term, a drag C_D(Re) from a power), or from a curve that is straight between knots."""
+_PROBABILITY_FORM: Final = (4.5, 0.01)
+"""The same two numbers for probabilities, calibrated on opened challenges: scans and optima add
+scatter to small gains, and most laws differ less from their forms than the worst."""
+SIZE_CHARGE: Final = 6.0
+"""Charge for a further size, for gains too large for p-values."""
 NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
-"""A curve has no shapes to try."""
-_FAR: Final = 100.0
-"""In chi^2: what is known beforehand makes nobody who is so far behind the more probable."""
+"""Of a curve, which has no shapes to scan."""
+_FAR_BEHIND: Final = 100.0
+"""Difference of chi^2 beyond which a prior can't make an effect more probable than a better one."""
 
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect, refitted.
+    """A refitted effect.
 
     Parameters
     ----------
     lead
-        What it was found by.
+        Its score in the scan.
     fit
-        The extended model's.
+        Of the extended model.
     gain
-        Delta chi^2 over the model before it.
+        Delta chi^2 over the model without it.
     evidence
-        chi^2 of one degree of freedom that is as improbable by chance, the effect's own
-        scan counted.
+        chi^2 of one degree of freedom that is as improbable by chance, the trials of the
+        effect's own scan included.
     left
-        chi^2 a reading that the best of its rivals left: `evidence` counts `gain` over it.
+        chi^2 per reading that the best of its rivals leaves: `evidence` uses `gain` over it.
     """
 
     lead: Lead
@@ -65,9 +64,9 @@ class Rival:
     left: float = 1.0
 
     def reaching(self, fit: Fit, gain: float) -> Rival:
-        """Return it refitted where nothing but noise is left, its scan charged as before.
+        """Return it with another fit where only noise is left, with the same charge for its scan.
 
-        A curve has no scan; it is charged for the mixtures that it needs now.
+        A curve has no scan; it is charged for the coefficients that it needs now.
         """
         if isinstance(self.lead.effect, Curve):
             return Rival(self.lead, fit, gain, evidence(self.lead, fit, gain, NO_SCAN))
@@ -86,91 +85,91 @@ class Rival:
 
     @property
     def prior(self) -> float:
-        """Twice the logarithm of how much likelier it is beforehand, its size included."""
+        """Twice the log of its prior probability ratio, with that of its size."""
         return _prior(self.lead.effect, self.fit)
 
     @property
     def drawn(self) -> bool:
-        """Whether it is a curve without a name."""
+        """Whether it is an unnamed curve."""
         return self.lead.effect.kind == "unnamed"
 
 
 def form_spread(best: Rival) -> float:
-    """Standard deviation of a difference of evidence from the best's.
+    """Return the standard deviation of a difference of evidence from the best's.
 
-    The catalogue's forms are not quite those of real laws, and curves have knots.
+    Real laws differ slightly from the catalogue's forms, and curves have knots.
     """
-    return math.hypot(_FORM, MISSHAPEN * max(best.gain, 0.0))
+    return math.hypot(_FORM_SD, MISSHAPEN * max(best.gain, 0.0))
 
 
 def class_width(best: Rival) -> float:
-    """How far behind the best's evidence one may be that the record cannot tell from it."""
-    return CLASS * form_spread(best) / _FORM
+    """Return the difference of evidence within which the record can't distinguish an effect."""
+    return CLASS * form_spread(best) / _FORM_SD
 
 
 def of_one_class(best: Rival, rival: Rival) -> bool:
-    """Whether the record cannot tell two effects apart, or only what is known beforehand can.
+    """Whether the record can't distinguish two effects, or only their priors differ.
 
-    A value that one has more takes 2 off its gain (Akaike).
+    Each additional value is charged 2 (Akaike).
     """
     within = class_width(best)
     more = max(best.lead.effect.count - rival.lead.effect.count, 0)
-    by_record = best.gain - rival.gain - _SHAPE * more < within
+    by_record = best.gain - rival.gain - _SHAPE_CHARGE * more < within
     return by_record or best.evidence - rival.evidence < within
 
 
 def equivalent(p_value: float, score: float) -> float:
-    """chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
+    """Return chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
     if p_value <= 1e-290:
         return score
     return chi2_of_one(p_value)
 
 
 def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
-    """What a gain is worth, beside effects with more or fewer free values and shapes.
+    """Convert a gain to evidence, comparable between effects with more or fewer free values.
 
     Parameters
     ----------
     lead, fit
         The effect, and the model with it.
     gain
-        Delta chi^2, over what is left where that is much.
+        Delta chi^2, divided by the remaining chi^2 per reading where that exceeds 1.
     chance
-        What its own scan amounts to.
+        The trials of its own scan.
     """
-    needless, sizes = _needed_sizes(fit, lead.effect)
-    gain -= needless
+    superfluous, sizes = _needed_sizes(fit, lead.effect)
+    gain -= superfluous
     if gain <= 0.0:
-        # What makes a model worse is worth that much less than nothing: a rival that comes back
-        # under another noise (`Rival.reaching`) must not be credited with it.
+        # A negative gain stays negative: a rival that is refitted with another noise
+        # (`Rival.reaching`) must not be credited with it.
         return gain
     effect = lead.effect
-    if effect.parameter_free:
-        # Its size is predicted: a free one would have had to be found.
+    if effect.switch:
+        # The size is predicted: a free one would be charged.
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(chi2_beyond(gain, sizes))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     if local > 1e-290:
         worth = equivalent(trials.global_p_value(local), gain)
     else:
-        # Too large for p-values: what trials and further sizes take off a large gain.
-        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - SIZE * (sizes - 1)
+        # Too large for p-values: subtract the charges for trials and further sizes.
+        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - SIZE_CHARGE * (sizes - 1)
     fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
-    return worth - _SHAPE * max(fitted, 0) + _prior(effect, fit)
+    return worth - _SHAPE_CHARGE * max(fitted, 0) + _prior(effect, fit)
 
 
 def _prior(effect: Effect, fit: Fit) -> float:
     place = next((place for other, place in fit.model.places() if other is effect), None)
-    # A held parameter that is freed is no part of the model's effects.
-    unlikely = 0.0 if place is None else effect.prior_penalty(fit.value[place], fit.at.span)
+    # A released parameter has no place among the model's effects.
+    unlikely = 0.0 if place is None else effect.improbable(fit.value[place], fit.at.span)
     return effect.prior - unlikely
 
 
 def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
-    """How much of a gain needless sizes make up, and how many of an effect's are needed.
+    """Return the gain of coefficients that are not needed, and how many are needed.
 
-    All are, but of a curve's mixtures: a curve is charged for those that stand out, the
-    first (which the record sees best) being taken by itself before the second, and so on.
+    All sizes of a named effect are needed. A curve is charged for the coefficients that stand
+    out, tested in order of how well the record resolves them.
     """
     if not isinstance(effect, Curve):
         return 0.0, effect.sizes
@@ -180,15 +179,15 @@ def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
     left = own - basis @ (basis.T @ own)
     squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
-    needless = squares < SIZE
-    return float(squares[needless].sum()), max(int(np.count_nonzero(~needless)), 1)
+    superfluous = squares < SIZE_CHARGE
+    return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)
 
 
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
-    """Sort by evidence, names before curves that the record cannot tell from them.
+    """Sort by evidence, with named effects before curves that the record can't distinguish.
 
-    Curves follow any law; and those in time follow anything, so that a curve of the motion or
-    the sensor goes before them.
+    A curve can follow any law, and one in time anything: curves of the motion or the sensor
+    precede it.
     """
     best = max(rivals, key=lambda rival: rival.evidence)
     within = class_width(best)
@@ -203,18 +202,18 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
 
 
 def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
-    """Probability of each rival, with `none` the evidence that it is none of these.
+    """Return the probability of each rival, and last that of "none of these" (evidence `none`).
 
-    Real laws differ a little from the catalogue's forms, so that differences of evidence
-    are uncertain; log odds are averaged over that (MacKay's approximation).
+    Real laws differ slightly from the catalogue's forms, so that differences of evidence are
+    uncertain: log odds are averaged over this uncertainty (MacKay's approximation).
     """
     leader = max(rivals, key=lambda rival: rival.evidence)
-    spread = math.hypot(_UNSURE[0], _UNSURE[1] * max(leader.gain, 0.0))
+    spread = math.hypot(_PROBABILITY_FORM[0], _PROBABILITY_FORM[1] * max(leader.gain, 0.0))
     shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
     prior = np.array([rival.prior for rival in rivals])
     likelihood = np.array([rival.evidence for rival in rivals]) - prior
     best = float(likelihood.max())
-    # A parameter's law is the baseline's own: what it leaves is not a matter of its form.
+    # A released parameter has the baseline's own form, which has no such uncertainty.
     own_form = np.array([rival.lead.effect.kind == "parameter" for rival in rivals])
     worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
     logs = _in_order(0.5 * (worth + prior), rivals)
@@ -224,16 +223,16 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
 
 
 def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
-    """Log probabilities, none above that of a name whose evidence is far better.
+    """Limit each log probability to that of effects with far better evidence.
 
-    Where a gain is large, its differences are worth so little that what is known beforehand
-    would raise whom the readings reject above whom they do not. Curves, which follow any law,
-    keep down none but curves.
+    For large gains the uncertainty of the forms leaves little weight to differences of evidence,
+    and the prior could raise an effect that the readings reject above one that they support.
+    Curves, which can follow any law, limit only curves.
     """
     evidence = np.array([rival.evidence for rival in rivals])
     drawn = np.array([rival.drawn for rival in rivals])
     lowered = []
     for log, rival in zip(logs, rivals, strict=True):
-        better = (evidence > rival.evidence + _FAR) & (rival.drawn | ~drawn)
+        better = (evidence > rival.evidence + _FAR_BEHIND) & (rival.drawn | ~drawn)
         lowered.append(np.min(logs[better], initial=log))
     return np.array(lowered)

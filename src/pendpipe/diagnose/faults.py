@@ -1,7 +1,7 @@
-"""Forensics in the search: what the tests of the measurement find is repaired, and kept.
+"""Faults of the measurement within a search: tested, corrected and reported.
 
-One lost sample outweighs all physics, so what can corrupt the fit is looked for before the
-catalogue; what only fine residuals show, behind it.
+One lost sample changes chi^2 more than most physics. So faults that can corrupt the fit are
+tested before the catalogue, and those that only small residuals reveal after it.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from pendpipe.diagnose.state import Fault, State, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 
-_BEFORE: Final = ("clipping", "glitches")
-_BEHIND: Final = (
+_TESTED_BEFORE: Final = ("clipping", "glitches")
+_TESTED_AFTER: Final = (
     "missing-codes",
     "coarse-quantisation",
     "jitter",
     "coloured-noise",
     "broadband-drive",
 )
-_EACH: Final = TESTS_SHARE / (len(_BEFORE) + len(_BEHIND))
+_SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
-_CLEAN: Final = 1.3
-"""chi^2 per degree of freedom up to which a residual is noise enough for the fine tests."""
+_CLEAN_CHI2: Final = 1.3
+"""Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
-"""Slip in rad up to which residuals tell the stamps' errors."""
-_BEFORE_CURVES: Final = 15.0
-"""By how much random kicks are preferred to a curve in time, which follows any of them."""
+"""Largest phase error in rad at which residuals reveal errors of the time stamps."""
+_CURVE_MARGIN: Final = 15.0
+"""Margin in chi^2 by which random kicks are preferred to a curve in time, which can follow them."""
 
 
 class Forensics:
@@ -52,9 +52,9 @@ class Forensics:
     Parameters
     ----------
     samples
-        The readings as they came.
+        The readings as recorded.
     level
-        Global p-value of an accusation.
+        The significance level (global p-value).
     """
 
     def __init__(self, samples: Samples, level: float) -> None:
@@ -63,47 +63,47 @@ class Forensics:
         self.clock_notes: list[str] = []
 
     def p_value(self, faults: Sequence[Fault]) -> float:
-        """The least global p-value: of the faults that are kept, and of tests that accused none.
+        """Return the smallest global p-value, of the reported faults and of the other tests.
 
-        What a test finds that is no fault (a step that rules, but does no harm) has no say.
+        Properties of the record that do no harm (a coarse step at large amplitude) don't count.
         """
         return min([1.0, *self._quiet.values(), *(fault.p_value for fault in faults)])
 
     def before(self, state: State, progress: Progress) -> None:
-        """Mend what would corrupt the fit: stamps, lost samples, clipping, glitches."""
+        """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""
         self._correct_time_stamps(state, progress)
         self._correct_lost_samples(state, progress)
         if is_gross(state.fit, state.data):
             self._examine("glitches", state, progress, find_in_misfit)
             return
-        for name in _BEFORE:
+        for name in _TESTED_BEFORE:
             for _ in range(_ROUNDS):
                 if not self._examine(name, state, progress):
                     break
 
     def after(self, state: State, progress: Progress) -> None:
-        """Make the tests that need a clean residual; a misfit's squares look like any of them."""
+        """Make the tests that need a clean residual: a misfit could look like any fault."""
         clean = not is_gross(state.fit, state.data)
         tests: tuple[str, ...]
-        if clean and state.fit.chi2 <= _CLEAN * state.data.used:
-            tests = _BEHIND
+        if clean and state.fit.chi2 <= _CLEAN_CHI2 * state.data.used:
+            tests = _TESTED_AFTER
         else:
-            # Bits that do not move show in the codes themselves, whatever the motion's model.
+            # Dead bits show in the codes themselves, whatever the model.
             tests = ("coarse-quantisation",) if self.samples.promised_step is not None else ()
         known = [fault.finding.identifier for fault in state.faults]
         for name in [name for name in tests if name not in known]:
             self._examine(name, state, progress)
 
     def _tested(self, name: str, state: State, test: Test | None = None) -> tuple[Finding, float]:
-        """Make one test; its p-value is that of the test's share of the level."""
+        """Make one test, and convert its p-value to a global one by its share of the level."""
         made = test or TESTS[name]
         finding = made(state.data, state.fit, state.noise, self.samples)
-        return finding, min(finding.p_value / _EACH, 1.0)
+        return finding, min(finding.p_value / _SHARE_OF_EACH, 1.0)
 
     def _examine(
         self, name: str, state: State, progress: Progress, test: Test | None = None
     ) -> bool:
-        """Make one test; keep what it finds; say whether to look again."""
+        """Make one test and keep its finding; return whether to repeat it."""
         finding, p_value = self._tested(name, state, test)
         known = next((each for each in state.faults if each.finding.identifier == name), None)
         if finding.kind != "fault":
@@ -124,10 +124,10 @@ class Forensics:
         return True
 
     def again(self, state: State, progress: Progress) -> bool:
-        """Test anew, in the final model, what has readings left out; say whether some came back.
+        """Repeat, with the final model, the tests that masked readings; return whether some return.
 
-        A misfit of the motion (or a fault that has been named since) bends windows and puts
-        readings off: with the physics in the model they may be as good as any.
+        A misfit of the motion (or another fault) displaces readings in a local fit. With complete
+        physics in the model they may be as good as any.
         """
         before = state.data.weight
         for fault in [fault for fault in state.faults if fault.mask is not None]:
@@ -137,34 +137,34 @@ class Forensics:
         return bool(np.any(state.data.weight > before))
 
     def _test_again(self, fault: Fault, state: State, progress: Progress) -> None:
-        name, place, masked = fault.finding.identifier, _index(fault, state.faults), state.data
+        name, number, masked = fault.finding.identifier, _index(fault, state.faults), state.data
         assert fault.mask is not None
         others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
         whole = replace(masked, weight=np.where(others, 0.0, 1.0))
         noise = replace(state.noise, weight=whole.weight)
         finding = TESTS[name](whole, state.fit, noise, self.samples)
-        p_value = min(finding.p_value / _EACH, 1.0)
+        p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
         if p_value > self.level or finding.mask is None:
-            progress(f"{name}: not needed with the final model")
-            del state.faults[place]
+            progress(f"{name}: no longer needed with the final model")
+            del state.faults[number]
             self._quiet[name] = p_value
             _refit(state, others)
             return
-        state.faults[place] = Fault(finding, p_value, fault.behind, finding.mask)
+        state.faults[number] = Fault(finding, p_value, fault.behind, finding.mask)
         if np.any((others | finding.mask) != (masked.weight == 0.0)):
             _refit(state, others | finding.mask)
 
     def _correct_time_stamps(self, state: State, progress: Progress) -> None:
-        """Take an even clock's times where the readings are evener than their stamps."""
+        """Use the times of a regular clock if the readings agree better with it."""
         if state.fit.max_phase_error_rad > _IN_PHASE or self.clock_notes:
             return
         finding = TESTS["time-stamps"](state.data, state.fit, state.noise, self.samples)
-        if finding.time_s is None or finding.p_value > self.level * _EACH:
+        if finding.time_s is None or finding.p_value > self.level * _SHARE_OF_EACH:
             return
         data = at_even_times(state.data, finding.time_s)
         noise = white_noise(data, state.noise.white_rms)
         model = state.fit.model.at_times(data.time_s)
-        fit = refine(model, data, noise, state.fit.value, held=state.holding)
+        fit = refine(model, data, noise, state.fit.value, held=state.held)
         if fit.chi2 / data.used > state.fit.chi2 / state.data.used:
             return
         progress(finding.summary)
@@ -172,7 +172,7 @@ class Forensics:
         state.settle(fit, data, noise)
 
     def _correct_lost_samples(self, state: State, progress: Progress) -> None:
-        """Put the readings behind lost samples where they belong."""
+        """Correct the times of the readings after lost samples."""
         data = state.data
         interval = data.interval_s / data.fold
         lost = find_lost_samples(data, state.fit, interval)
@@ -184,9 +184,9 @@ class Forensics:
         corrected = replace(data, time_s=time, uniform=False)
         model = state.fit.model.at_times(time)
         try:
-            fit = refine(model, corrected, state.noise, state.fit.value, held=state.holding)
+            fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
         except NoMotionError:
-            return  # so much later the pendulum of this model has come to rest
+            return  # the model comes to rest before the corrected times
         if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
             return
         progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
@@ -200,23 +200,24 @@ class Forensics:
                 "samples": Estimate(float(number), 0.0, ""),
             },
             Location(time_s=(lost[0].time_s, lost[-1].time_s)),
-            summary="at " + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
+            summary="samples were lost at "
+            + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
         state.faults.append(Fault(found, 0.0, len(state.steps)))
         state.settle(fit, corrected)
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
-        """Ask whether random kicks explain more than the best effect of the catalogue does."""
+        """Test whether random kicks explain more than the best effect of the catalogue."""
         name = "broadband-drive"
         finding, p_value = self._tested(name, state)
         if p_value > self.level:
             return False
         worth = equivalent(p_value, finding.delta_chi2)
         if rival.lead.effect.kind == "unnamed":
-            worth += _BEFORE_CURVES
+            worth += _CURVE_MARGIN
             if not state.steps:
-                # A square's chance says little of much, and a curve follows any walk by its knots.
-                worth = max(worth, finding.delta_chi2 + _BEFORE_CURVES)
+                # A large misfit: its p-value is extreme, and a curve can follow any random walk.
+                worth = max(worth, finding.delta_chi2 + _CURVE_MARGIN)
         if worth < rival.evidence:
             return False
         progress(f"{name}: {finding.summary}")
@@ -225,13 +226,13 @@ class Forensics:
 
 
 def _index(fault: Fault, faults: Sequence[Fault]) -> int:
-    """Which of them it is (faults hold arrays, and cannot be compared)."""
-    return next(place for place, each in enumerate(faults) if each is fault)
+    """Return the index by identity (faults hold arrays, and can't be compared)."""
+    return next(number for number, each in enumerate(faults) if each is fault)
 
 
 def _refit(state: State, out: BoolArray) -> None:
-    """Fit without the readings that are `out`, and with all others."""
+    """Refit without the readings that are `out`, and with all others."""
     data = replace(state.data, weight=np.where(out, 0.0, 1.0))
     noise = replace(state.noise, weight=data.weight)
-    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.holding)
+    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
     state.settle(fit, data, noise)

@@ -1,4 +1,4 @@
-"""What a model says of blocks that it was not fitted to."""
+"""Cross-validation: how well a model predicts cycles that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 
-_CYCLES: Final = 10
+_BLOCK_CYCLES: Final = 10
 _FOLDS: Final = 2
 
 
@@ -37,7 +37,7 @@ class HeldOut:
 
     @property
     def gain(self) -> float:
-        """By how much the extended model predicts better."""
+        """Gain in log density of the extended model."""
         return self.after - self.before
 
 
@@ -49,7 +49,7 @@ def held_out(
     held_before: Sequence[int],
     held_after: Sequence[int],
 ) -> HeldOut:
-    """Predict every other block of some ten cycles from the rest, by both models."""
+    """Predict every other block of about ten cycles from the rest, with both models."""
     block = _blocks(improved)
     before = _densities(baseline, data, noise, held_before, block)
     after = _densities(improved, data, noise, held_after, block)
@@ -60,16 +60,16 @@ def held_out(
 
 
 def _blocks(fit: Fit) -> IntArray:
-    """Number of each reading's block: ten cycles, or fewer where there are few."""
+    """Return the number of each reading's block: ten cycles, or fewer in a short record."""
     turns = (fit.at.sampled.phase - fit.at.sampled.phase[0]) / (2.0 * math.pi)
-    size = min(float(_CYCLES), max(float(turns[-1]) / 8.0, 0.5))
+    size = min(float(_BLOCK_CYCLES), max(float(turns[-1]) / 8.0, 0.5))
     return np.asarray(np.maximum(np.floor(turns / size), 0.0).astype(np.int64))
 
 
 def _densities(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], block: IntArray
 ) -> FloatArray:
-    """Log density of each reading, given the other half of the blocks."""
+    """Return the log density of each reading, given the other half of the blocks."""
     variance = np.full(len(data), noise.rms**2) if noise.uniform else noise.variance
     found = np.zeros(len(data))
     for fold in range(_FOLDS):
@@ -82,7 +82,7 @@ def _densities(
         except NoMotionError:
             predicted = fit.at.reading
         wanted = out & (data.weight > 0.0)
-        # A curve may run away where its blocks are missing: no prediction is worse than none.
+        # A curve may diverge where blocks are missing: limit the error to that of no prediction.
         largest = 2.0 * fit.at.span.first_amplitude
         off = np.clip(data.residual(predicted)[wanted], -largest, largest)
         found[wanted] = -0.5 * (

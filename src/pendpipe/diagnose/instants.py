@@ -1,4 +1,4 @@
-"""How well an instant is known: chi^2 has a minimum in each half cycle about it."""
+"""Instants of sudden effects: chi^2 has a minimum in each half cycle about the true one."""
 
 from __future__ import annotations
 
@@ -21,66 +21,73 @@ from pendpipe.effects.catalogue.time_base import DroppedSamples
 from pendpipe.estimate import Estimate
 
 _TAILS: Final = (0.025, 0.975)
-_SD: Final = 1.959963984540054
-_NEAR: Final = 24.0
-"""chi^2 by which the rows of a scan may lie behind, for what is between them to be looked at."""
-_A_CYCLE: Final = 16
-"""Instants in a cycle, where it matters."""
-_MOST: Final = 400
-"""Instants between two rows of a scan, at most."""
-_POINTS: Final = np.array([NormalDist().inv_cdf((k + 0.5) / 41) for k in range(41)])
-"""A normal distribution in points of equal probability."""
+_SD_PER_HALF_WIDTH: Final = 1.959963984540054
+_NEAR_CHI2: Final = 24.0
+"""Largest deficit in chi^2 of scanned instants between which more are computed."""
+_PER_CYCLE: Final = 16
+"""Instants computed in a cycle."""
+_MOST_BETWEEN: Final = 400
+"""Largest number of instants between two of a scan."""
+_NORMAL_POINTS: Final = np.array([NormalDist().inv_cdf((k + 0.5) / 41) for k in range(41)])
+"""Quantiles of a normal distribution, of equal probability."""
 
 
 def with_instants(
-    told: dict[str, Estimate], effect: Effect, without: Fit, noise: Noise, spread: float = 1.0
+    estimates: dict[str, Estimate],
+    effect: Effect,
+    without: Fit,
+    noise: Noise,
+    error_scale: float = 1.0,
 ) -> dict[str, Estimate]:
-    """Widen the intervals of an effect's size and instant over all instants that may be it.
+    """Widen the intervals of an effect's size and instant to all possible instants.
 
     Parameters
     ----------
-    told
-        Estimates by name, from the curvature at the best instant.
+    estimates
+        By name, from the curvature at the best instant.
     effect
-        What happened at an instant: its first parameter is the size, its last the instant.
+        A sudden effect: its first parameter is the size, its last the instant.
     without
-        The model without it, fitted.
+        The fit without it.
     noise
-        The readings'.
-    spread
-        Factor of all standard deviations, for what is left beyond the noise.
+        Of the readings.
+    error_scale
+        Factor on all standard deviations, for a misfit beyond the noise.
 
     Returns
     -------
     dict of str to Estimate
-        With equal-tailed intervals of the posterior over all instants, each as likely
-        beforehand, the size integrated out: p(t) ~ exp(S(t)/2)/|column(t)|, where S is what an
-        effect at t takes off chi^2, to first order in its size. Where they are wider than the
-        curvature's, sd is their half width over 1.96.
+        With equal-tailed intervals of the posterior over all instants, for a uniform prior and
+        with the size integrated out: p(t) ~ exp(S(t)/2)/|column(t)|, where S is the fall of
+        chi^2 by an effect at t, to first order in its size. If they are wider than those of the
+        curvature, sd is their half width over 1.96.
     """
     if not effect.local or len(effect.parameters) != 2 or effect.sizes != 1:
-        return told
-    size, instant = (told[parameter.name] for parameter in effect.parameters)
+        return estimates
+    size, instant = (estimates[parameter.name] for parameter in effect.parameters)
     span = without.at.span
     rows = [*effect.shapes(span), *effect.finer(span, (instant.value,))]
     rough = np.unique([*(float(row[0]) for row in rows), instant.value])
     time_s, spacing = _between(
-        rough, _scored(without, noise, effect, rough).scores, span.period_s / _A_CYCLE, spread
+        rough,
+        _scored(without, noise, effect, rough).scores,
+        span.period_s / _PER_CYCLE,
+        error_scale,
     )
     found = _scored(without, noise, effect, time_s)
-    weight = np.exp(0.5 * (found.scores - found.scores.max()) / spread**2)
+    weight = np.exp(0.5 * (found.scores - found.scores.max()) / error_scale**2)
     weight *= spacing / found.lengths
-    sizes = found.sizes[:, None] + spread / found.lengths[:, None] * _POINTS
-    shared = np.repeat(weight, len(_POINTS))
+    sizes = found.sizes[:, None] + error_scale / found.lengths[:, None] * _NORMAL_POINTS
+    shared = np.repeat(weight, len(_NORMAL_POINTS))
     return {
-        **told,
+        **estimates,
         effect.parameters[0].name: _widened(size, _quantiles(sizes.ravel(), shared)),
         effect.parameters[1].name: _widened(instant, _quantiles(time_s, weight)),
     }
 
 
 class _Scored(NamedTuple):
-    """The best size at each instant, and the length of what a unit of it does."""
+    """The best size at each instant, and the length of the derivative by the size."""
 
     sizes: FloatArray
     lengths: FloatArray
@@ -97,14 +104,14 @@ def _scored(without: Fit, noise: Noise, effect: Effect, time_s: FloatArray) -> _
 
 
 def _between(
-    rough: FloatArray, scores: FloatArray, step: float, spread: float
+    rough: FloatArray, scores: FloatArray, step: float, error_scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Instants between the rows that are near the best, with the time that each stands for."""
-    near = scores > scores.max() - _NEAR * spread**2
+    """Return instants near the best of a scan, with the interval that each represents."""
+    near = scores > scores.max() - _NEAR_CHI2 * error_scale**2
     times, spacings = [], []
-    for place in np.flatnonzero(near[:-1] | near[1:]).tolist():
-        low, high = float(rough[place]), float(rough[place + 1])
-        number = min(max(math.ceil((high - low) / step), 1), _MOST)
+    for position in np.flatnonzero(near[:-1] | near[1:]).tolist():
+        low, high = float(rough[position]), float(rough[position + 1])
+        number = min(max(math.ceil((high - low) / step), 1), _MOST_BETWEEN)
         edges = np.linspace(low, high, number + 1)
         times.append(0.5 * (edges[1:] + edges[:-1]))
         spacings.append(np.diff(edges))
@@ -121,37 +128,40 @@ def _quantiles(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
 
 
 def _widened(estimate: Estimate, interval: tuple[float, float]) -> Estimate:
-    """Take an interval, and the standard deviation with it where it is the wider."""
+    """Return the estimate with this interval, and a larger standard deviation if it is wider."""
     low, high = min(interval[0], estimate.value), max(interval[1], estimate.value)
-    sd = max(estimate.sd, 0.5 * (high - low) / _SD)
+    sd = max(estimate.sd, 0.5 * (high - low) / _SD_PER_HALF_WIDTH)
     return replace(estimate, sd=sd, interval95=(low, high))
 
 
-_WIDTHS: Final = (2.0, 0.125)
-"""How far about an instant is looked, in intervals between readings: then again, closer."""
+_SEARCH_WIDTHS: Final = (2.0, 0.125)
+"""Range about an instant that is searched, in intervals between readings; the second is finer."""
 _SHIFTS: Final = np.linspace(-1.0, 1.0, 33)
-_WORTH: Final = 1.0
-"""By how much chi^2 must be lower beside an instant, for the fit to go on from there."""
+_NEEDED_FALL: Final = 1.0
+"""Fall of chi^2 from which the fit continues from another instant."""
 
 
 def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]) -> Fit:
-    """Try the instants about each loss of samples, and refine from the best.
+    """Try instants about each loss of samples, and refine from the best.
+
+    After lost samples a reading may lie beyond the turning point. How far the jump reaches into
+    the neighbouring interval then has several solutions; Gauss-Newton finds the nearest only.
 
     Parameters
     ----------
     fit
-        A model at its best values, as far as a fit went.
+        A fitted model.
     data, noise
         The readings.
     held
         Indices of what is not fitted.
     """
     fixed = tuple(held)
-    for effect, place in fit.model.places():
+    for effect, position in fit.model.places():
         if not isinstance(effect, DroppedSamples):
-            continue  # others change little from one reading to the next
-        for width in _WIDTHS:
-            start = _best_beside(fit, data, noise, place.stop - 1, width * data.interval_s)
+            continue  # other effects change little from one reading to the next
+        for width in _SEARCH_WIDTHS:
+            start = _best_beside(fit, data, noise, position.stop - 1, width * data.interval_s)
             if start is None:
                 continue
             better = refine(fit.model, data, noise, start, held=fixed)
@@ -162,8 +172,8 @@ def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]
 def _best_beside(
     fit: Fit, data: Data, noise: Noise, instant: int, width_s: float
 ) -> FloatArray | None:
-    """The values with one instant moved to where chi^2 is least; None where it stays."""
-    least, best = fit.chi2 - _WORTH, None
+    """Return the values with one instant moved to the smallest chi^2; None if it stays."""
+    least, best = fit.chi2 - _NEEDED_FALL, None
     for shift in _SHIFTS:
         value = fit.value.copy()
         value[instant] += shift * width_s

@@ -58,7 +58,7 @@ def large_first(beginning: Beginning, state: State, add_one: Callable[[State], b
     before = float(np.sum(state.fit.residual[: len(data)] ** 2))
     if not fit.model.effects or fit.chi2 >= before:
         return
-    state.steps, state.first, state.holding = part.steps, part.first, part.holding
+    state.steps, state.first, state.held = part.steps, part.first, part.held
     # The gross misfit is explained: estimate the noise anew from this model.
     state.settle(fit, data, noise)
 
@@ -82,10 +82,10 @@ def _first_part(beginning: Beginning, state: State, count: int) -> State | None:
     model = beginning.model.at_times(data.time_s)
     noise = first_noise(replace(beginning, data=data, model=model))
     try:
-        fit = refine(model, data, noise, beginning.value, held=state.holding)
+        fit = refine(model, data, noise, beginning.value, held=state.held)
     except NoMotionError:
         return None
-    part = State(fit, data, noise, list(state.holding), state.origin, fit.value)
+    part = State(fit, data, noise, list(state.held), state.origin, fit.value)
     part.settle(fit)
     return part
 
@@ -103,10 +103,10 @@ def _extended(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
                 data,
                 noise.white_rms,
                 part.fit.value,
-                held=part.holding,
+                held=part.held,
                 first=len(part.data),
             )
-            fit = refine(model, data, noise, value, held=part.holding)
+            fit = refine(model, data, noise, value, held=part.held)
         except (NoMotionError, np.linalg.LinAlgError):
             continue
         return fit, data, noise

@@ -188,7 +188,7 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
         clauses.append("in " + " and ".join(parts))
     elif found.frequency_hz:
         clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
-    return ", ".join(clauses)
+    return f"it shows {', '.join(clauses)}" if clauses else ""
 
 
 _CYCLE_BINS: Final = 24

@@ -11,23 +11,23 @@ import numpy as np
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.sampling import Sampled
 
-_FEWEST: Final = 5
-"""Readings in a cycle that three numbers are fitted to."""
+_FEWEST_READINGS: Final = 5
+"""Fewest readings in a cycle for three fitted numbers."""
 _NEIGHBOURS: Final = 9
-"""Cycles over which the usual number of readings is taken: an encoder that writes its counts
-writes fewer, the smaller the swing."""
+"""Cycles over which the median number of readings is taken: an encoder that records its counts
+gives fewer at small amplitudes."""
 
 
 @dataclass(frozen=True)
 class LockIn:
-    """Fits of ``level + r (cosine cos psi + sine sin psi)``; all of shape (k,), one a cycle.
+    """Fits of ``offset + r (cosine cos psi + sine sin psi)`` to each cycle; all of shape (k,).
 
     Parameters
     ----------
     number
-        Which cycle of the model's clock: psi from 2 pi number on.
+        Number of the cycle: psi from 2 pi number on.
     readings
-        How many count.
+        Number of readings that count.
     cosine, sine
         1 and 0 where readings and model agree.
     strength
@@ -45,7 +45,7 @@ class LockIn:
 
     @property
     def phase(self) -> FloatArray:
-        """By how much the readings are ahead of the model, unwrapped from cycle to cycle."""
+        """Phase by which the readings are ahead of the model, unwrapped."""
         return np.unwrap(np.arctan2(-self.sine, self.cosine))
 
 
@@ -55,12 +55,12 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
     Parameters
     ----------
     readings, weight
-        About the equilibrium or not (a level is fitted), and whether each counts, shape (n,).
+        Readings (an offset is fitted), and whether each counts, shape (n,).
     sampled
         The model's motion at the readings. On its clock ``x = r cos psi`` is exact, so that
         a restoring torque that is not linear makes no harmonics here.
     part
-        Of the usual number of readings, which a cycle must have.
+        Part of the median number of readings that a cycle must have.
     """
     number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
     first = int(number.min())
@@ -73,7 +73,7 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
         return sums.astype(np.float64)
 
     size = total(columns[0])
-    good = size >= np.maximum(float(_FEWEST), part * _usual(size))
+    good = size >= np.maximum(float(_FEWEST_READINGS), part * _usual(size))
     normal = np.array([[total(one * other) for one in columns] for other in columns])[..., good]
     right = np.array([total(one * readings) for one in columns])[..., good]
     solved = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
@@ -88,7 +88,7 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
 
 
 def _usual(size: FloatArray) -> FloatArray:
-    """The median over each cycle and its neighbours, those left out that have no readings."""
+    """Return the median over each cycle and its neighbours, without empty cycles."""
     seen = np.flatnonzero(size > 0.0)
     width = min(_NEIGHBOURS, len(seen))
     if not width:

@@ -1,4 +1,4 @@
-"""The noise of the readings, with its colour, from where no misfit of the motion reaches."""
+"""The noise of the readings and its colour, from frequencies free of misfits of the motion."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.numerics import cosines, from_cosines
 
 _HARMONICS: Final = 7
-_WIDTH: Final = 0.08
-"""Of the frequency: the band about each harmonic that a misfit may fill."""
-_FIRST: Final = 1
-"""The lowest cosine that may be noise: the level itself is fitted."""
+_HARMONIC_HALF_WIDTH: Final = 0.08
+"""Half width of the band about each harmonic that a misfit may fill, over the frequency."""
+_FIRST_COSINE: Final = 1
+"""The lowest cosine that is noise: the offset itself is fitted."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Variance of each cosine (DCT-II, orthonormal) of the readings.
+    """The variance of each cosine (DCT-II, orthonormal) of the readings.
 
     Parameters
     ----------
     variance
-        Shape (n,): S_k; where readings are uneven, of each reading itself.
+        Shape (n,): S_k; for unevenly spaced readings, of each reading itself.
     uniform
         Whether `variance` is over cosines (evenly spaced readings) or over readings.
     white_rms
@@ -54,12 +54,12 @@ class Noise:
         scale = 1.0 / np.sqrt(self.variance)
         if not self.coloured:
             return np.asarray((columns.T * (self.weight * scale)).T)
-        # A column at a time stands together in memory: the transform is far quicker so.
+        # The transform is much faster on contiguous memory.
         rows = np.multiply(columns.T, self.weight, order="C")
         return np.asarray((cosines(rows) * scale).T)
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
-        """The transpose of `whiten`: from white numbers back to weights of readings."""
+        """Apply the transpose of `whiten`: from white numbers back to weights of readings."""
         scale = 1.0 / np.sqrt(self.variance)
         if not self.coloured:
             return np.asarray((columns.T * (self.weight * scale)).T)
@@ -68,7 +68,7 @@ class Noise:
 
     @property
     def coloured(self) -> bool:
-        """Whether cosines differ in variance; else a reading is as white as they are."""
+        """Whether cosines differ in variance; else the readings are white too."""
         return self.uniform and bool(self.red or self.memory)
 
     @property
@@ -78,7 +78,7 @@ class Noise:
 
 
 def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Noise:
-    """Noise that is the same for all readings (or follows the speed, for an encoder's counts).
+    """Return white noise, the same for all readings (or proportional to speed, for counts).
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Nois
     rms
         Standard deviation of one.
     slope
-        Where the error is in the time: the readings' speed, to weigh them.
+        If the error is in the time: the speed at each reading.
     """
     variance = np.full(len(data), rms * rms)
     if slope is not None:
@@ -99,20 +99,20 @@ def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Nois
 def estimate_noise(
     data: Data, residual: FloatArray, frequency_hz: float, floor: float, *, red: bool = True
 ) -> Noise:
-    """Estimate the noise from what a model leaves.
+    """Estimate the noise from a residual.
 
-    Bands about the harmonics of the motion and the slowest cosines are left out, since a
-    misfit lies there; the rest is described by white noise, with a red part and a
-    first-order memory where the likelihood (Whittle's) is clearly better for them.
+    Bands about the harmonics of the motion and the slowest cosine are left out, since misfits lie
+    there. The rest is described by white noise, with a red part or a first-order memory if the
+    (Whittle) likelihood is clearly better with it.
 
     Parameters
     ----------
     data, residual
-        The readings and what is left of them, shape (n,).
+        The readings and their residual, shape (n,).
     frequency_hz
         Of the motion.
     floor
-        The rms below which no reading is believed.
+        The smallest rms that is plausible.
     red
         Whether the noise may be red.
     """
@@ -123,10 +123,10 @@ def estimate_noise(
     filled = count / max(data.used, 1)
     power = cosines(residual * data.weight) ** 2 * filled
     frequency = np.arange(count) / (2.0 * count * data.interval_s)
-    quiet = _quiet(frequency, frequency_hz)
-    if np.count_nonzero(quiet) < 40:
-        quiet = np.arange(count) >= _FIRST
-    colour = fit_colour(power[quiet], frequency[quiet], data.interval_s, red=red)
+    noise_only = _noise_only(frequency, frequency_hz)
+    if np.count_nonzero(noise_only) < 40:
+        noise_only = np.arange(count) >= _FIRST_COSINE
+    colour = fit_colour(power[noise_only], frequency[noise_only], data.interval_s, red=red)
     variance = colour.spectrum(frequency, data.interval_s)
     white = math.sqrt(colour.white)
     low = floor * floor / variance.mean()
@@ -139,9 +139,9 @@ def _robust_rms(values: FloatArray) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def _quiet(frequency: FloatArray, motion_hz: float) -> BoolArray:
-    """Cosines in which there is noise alone."""
-    quiet = np.arange(len(frequency)) >= _FIRST
+def _noise_only(frequency: FloatArray, motion_hz: float) -> BoolArray:
+    """Return which cosines contain noise alone."""
+    noise_only = np.arange(len(frequency)) >= _FIRST_COSINE
     for harmonic in range(1, _HARMONICS):
-        quiet &= np.abs(frequency - harmonic * motion_hz) > _WIDTH * motion_hz
-    return np.asarray(quiet)
+        noise_only &= np.abs(frequency - harmonic * motion_hz) > _HARMONIC_HALF_WIDTH * motion_hz
+    return np.asarray(noise_only)

@@ -1,6 +1,6 @@
-"""Linear least squares of a few values within bounds, by active sets (Stark and Parker 1995).
+"""Numerics that would otherwise need scipy, whose import takes as long as a whole fit.
 
-scipy has it; importing its optimisers for this would take as long as a whole fit.
+Bounded linear least squares, the cosine transform, and tails of weighted sums of squares.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from numpy.typing import NDArray
 from pendpipe.arrays import BoolArray, FloatArray
 
 _SLACK = 1e-9
-"""Of the gradient: what is rounding."""
+"""Rounding error of the gradient."""
 
 
 def bounded_least_squares(
     matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
 ) -> FloatArray:
-    """Minimise |matrix x - right| with floor <= x <= ceiling.
+    """Minimise |matrix x - right| with floor <= x <= ceiling, by active sets.
 
-    Values walk from zero (which must lie within) towards the best of those that are free;
-    what meets its bound on the way is held there, and let go where that lowers the sum.
+    The values move from zero (which must be within the bounds) towards the free optimum. A value
+    that meets a bound is held there, and released if that lowers the sum (Stark and Parker 1995).
 
     Parameters
     ----------
     matrix, right
         Shapes (m, n) and (m,).
     floor, ceiling
-        Shape (n,); infinite where there is no bound.
+        Shape (n,); infinite for no bound.
     """
     x = np.clip(np.zeros(len(floor)), floor, ceiling)
     held = np.zeros(len(floor), dtype=bool)
@@ -47,17 +47,17 @@ def bounded_least_squares(
             continue
         pull = matrix.T @ (right - matrix @ x)
         inwards = np.where(x <= floor, pull, -pull) * held
-        freed = int(np.argmax(inwards))
-        if inwards[freed] <= _SLACK * (1.0 + float(np.abs(right).max())):
+        released = int(np.argmax(inwards))
+        if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
             break
-        held[freed] = False
+        held[released] = False
     return x
 
 
 def _first_met(
     x: FloatArray, goal: FloatArray, floor: FloatArray, ceiling: FloatArray, free: BoolArray
 ) -> tuple[int | None, float]:
-    """The first free value that meets its bound on the way, and after what part of it."""
+    """Return the first free value that meets its bound, and the fraction of the way to it."""
     out = free & ((goal < floor) | (goal > ceiling))
     if not out.any():
         return None, 1.0
@@ -74,8 +74,8 @@ _Complex = NDArray[np.complex128]
 def cosines(rows: FloatArray) -> FloatArray:
     """Return c_k = sqrt((2 - [k = 0])/n) sum over j of x_j cos(pi k (2 j + 1)/(2 n)), last axis.
 
-    The even entries followed by the odd ones backwards have a Fourier transform whose phases
-    have only to be turned (Makhoul 1980). Single precision stays single.
+    It is the Fourier transform of the even entries followed by the odd ones backwards, with
+    rotated phases (Makhoul 1980). Single precision stays single.
     """
     count = rows.shape[-1]
     if count < 2:
@@ -114,26 +114,26 @@ def from_cosines(rows: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _turn(count: int) -> _Complex:
-    """sqrt(2/n) e^(-i pi k/(2 n)), the level's own scale included."""
+    """Return sqrt(2/n) e^(-i pi k/(2 n)), with the scale of the constant term."""
     order = np.arange(count // 2 + 1)
     turn = np.sqrt(2.0 / count) * np.exp(-0.5j * np.pi * order / count)
     turn[0] = np.sqrt(1.0 / count)
     return np.asarray(turn)
 
 
-_ROUNDS: Final = 60
+_NEWTON_ROUNDS: Final = 60
 
 
 def tail_of_squares(total: float, weight: FloatArray) -> float:
-    """P(sum of w_i z_i^2 > total), z_i independent and normal.
+    """Return P(sum of w_i z_i^2 > total), z_i independent and normal.
 
     The saddlepoint approximation of Lugannani and Rice (Kuonen, Biometrika 86 (1999) 929),
-    good to a few per cent of the probability however small that is.
+    accurate to a few per cent of the probability, however small.
 
     Parameters
     ----------
     total
-        The sum that was found.
+        The observed sum.
     weight
         w_i, of either sign, shape (n,).
     """
@@ -143,7 +143,7 @@ def tail_of_squares(total: float, weight: FloatArray) -> float:
     mean = float(weight.sum())
     spread = math.sqrt(2.0 * float(np.sum(weight**2)))
     if abs(total - mean) < 1e-3 * spread:
-        # At the mean itself the formula is 0/0; its limit holds the skewness.
+        # At the mean itself the formula is 0/0; its limit contains the skewness.
         skew = 8.0 * float(np.sum(weight**3)) / spread**3
         return 0.5 - skew / (6.0 * math.sqrt(2.0 * math.pi))
     if float(weight.min()) > 0.0 and total <= 0.0:
@@ -162,12 +162,12 @@ def tail_of_squares(total: float, weight: FloatArray) -> float:
 
 
 def _saddlepoint(total: float, weight: FloatArray) -> float:
-    """Where the derivative of the cumulants' generating function is the total."""
+    """Find the saddlepoint: there the cumulant generating function has the derivative `total`."""
     high_weight, low_weight = float(weight.max()), float(weight.min())
     high = 0.5 / high_weight if high_weight > 0.0 else math.inf
     low = 0.5 / low_weight if low_weight < 0.0 else -math.inf
     tilt = 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(_NEWTON_ROUNDS):
         left = 1.0 - 2.0 * tilt * weight
         excess = float(np.sum(weight / left)) - total
         if excess > 0.0:
@@ -177,7 +177,7 @@ def _saddlepoint(total: float, weight: FloatArray) -> float:
         step = excess / (2.0 * float(np.sum((weight / left) ** 2)))
         trial = tilt - step
         if not low < trial < high:
-            # Newton's step leaves what is possible: halve what is.
+            # Newton's step leaves the possible range: bisect it.
             if math.isinf(low) or math.isinf(high):
                 trial = 2.0 * tilt - math.copysign(1.0 / (abs(weight).max()), excess)
             else:
@@ -189,5 +189,5 @@ def _saddlepoint(total: float, weight: FloatArray) -> float:
 
 
 def _upper_tail(z: float) -> float:
-    """P(a standard normal number > z)."""
+    """Return P(a standard normal number > z)."""
     return 0.5 * math.erfc(z / math.sqrt(2.0))

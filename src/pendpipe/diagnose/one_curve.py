@@ -88,9 +88,7 @@ def _needed_beside(step: Step, drawn: Fit, state: State) -> bool:
     place = next(place for other, place in state.fit.model.places() if other is effect)
     start = np.concatenate([drawn.value, state.fit.value[place]])
     try:
-        both = refine(
-            drawn.model.adding(effect), state.data, state.noise, start, held=state.holding
-        )
+        both = refine(drawn.model.adding(effect), state.data, state.noise, start, held=state.held)
     except (NoMotionError, np.linalg.LinAlgError):
         return False
     return cost(drawn) - cost(both) > max(BETTER, _SUDDEN_SHARE * step.winner.gain)
@@ -139,7 +137,7 @@ def _without_names(state: State, kept: Sequence[Step]) -> Fit | None:
             model, value = model.dropping(step.winner.lead.effect, value)
     start = np.concatenate([state.bare, value[len(state.bare) :]])
     try:
-        return refine(model, state.data, state.noise, start, held=state.holding)
+        return refine(model, state.data, state.noise, start, held=state.held)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
 
@@ -154,7 +152,7 @@ def _curves(bare: Fit, state: State) -> list[Curve]:
 def _with_curve(bare: Fit, curve: Curve, state: State) -> Fit | None:
     start: FloatArray = np.concatenate([bare.value, np.zeros(curve.count)])
     try:
-        fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.holding)
+        fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.held)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
     return fit if curve.believable(fit.value[len(bare.value) :]) else None

@@ -1,9 +1,9 @@
-"""What a model leaves beyond the noise: how much, where, and what it makes of a name.
+"""The misfit that remains beyond the noise: how large, where, and its effect on errors.
 
-A sum of squares that stays far above the noise's says that the model is wrong still. The
-rest is then no noise that was drawn anew with each reading, but some function of time that is
-not known, described by a few numbers (its Fourier coefficients that stand out). Against that,
-and not against the noise, names and errors are weighed.
+If chi^2 stays far above the noise, the model is still wrong. The rest is then not noise, which is
+independent from reading to reading, but an unknown function of time, described by a few numbers
+(its significant Fourier coefficients). Names and errors are compared with that function, not with
+the noise.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.numerics import cosines
 from pendpipe.diagnose.refine import Fit
 
-_FLOOR: Final = 1.14
-"""Residual over noise (chi^2 of 1.3 per degree of freedom) from which a model is wrong still,
-whatever has been named: the noise itself is known far better from between the harmonics."""
+_INCOMPLETE: Final = 1.14
+"""Residual over noise (chi^2 of 1.3 per degree of freedom) above which a model is incomplete:
+the noise itself is known much better, from between the harmonics."""
 _HARMONICS: Final = 4
-_STANDS_OUT: Final = 9.0
-"""Squares of unit numbers above which a coefficient is no noise."""
-_FEWEST: Final = 2.0
-_NAMES: Final = ("offset", "amplitude", "phase", "harmonics", "between")
+_SIGNIFICANT_POWER: Final = 9.0
+"""Squared normalised coefficient above which it is not noise."""
+_FEWEST_NUMBERS: Final = 2.0
+_PARTS: Final = ("offset", "amplitude", "phase", "harmonics", "between")
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left.
+    """The misfit that remains.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class Remainder:
     over_noise
         Square root of chi^2 per degree of freedom.
     numbers
-        How many independent numbers describe it.
+        Number of independent numbers that describe it.
     shares
-        Parts of `excess` in the level, the amplitude and the phase of the motion, its higher
+        Parts of `excess` in the offset, the amplitude and the phase of the motion, its higher
         harmonics, and between them.
     """
 
@@ -56,29 +56,28 @@ class Remainder:
 
     @property
     def systematic(self) -> bool:
-        """Whether a model that leaves it is wrong still."""
-        return self.over_noise > _FLOOR
+        """Whether the model is incomplete."""
+        return self.over_noise > _INCOMPLETE
 
     @property
     def error_scale(self) -> float:
-        """Factor by which standard deviations grow: 1 where noise alone is left."""
+        """Factor on standard deviations: 1 if only noise is left."""
         if not self.systematic:
             return 1.0
         return math.sqrt(max(self.excess / self.numbers, self.over_noise**2, 1.0))
 
     def worth(self, gain: float, excess: float | None = None) -> float:
-        """Return what a gain of chi^2 is worth where so much is left.
+        """Return the significance of a gain of chi^2 beside the remaining misfit.
 
-        A function of unknown size that is described by m numbers makes the likelihood
-        (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), and never more than
-        itself.
+        For an unknown function of m numbers and unknown size the likelihood is
+        (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), at most itself.
 
         Parameters
         ----------
         gain
             Delta chi^2.
         excess
-            What is left behind it; by default what is left now.
+            The remaining misfit; by default the present one.
         """
         if not self.systematic:
             return gain
@@ -97,11 +96,11 @@ class Remainder:
 
 
 def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
-    """Take a fit's residual apart: by cycle and harmonic, and by how it changes over cycles."""
+    """Analyse a fit's residual by cycle and harmonic, and by its change over cycles."""
     freedom = max(data.used - len(fit.free), 1)
     excess = max(fit.chi2 - freedom, 0.0)
     over = math.sqrt(fit.chi2 / freedom)
-    if over <= _FLOOR:
+    if over <= _INCOMPLETE:
         return Remainder(excess, over, float(freedom))
     series, rest = by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
     powers = [_powers(row) for row in series.T] + [_powers(rest)]
@@ -111,19 +110,19 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     parts = np.maximum(parts, 0.0)
     shares = parts / max(float(parts.sum()), 1e-300)
     loud = np.concatenate(powers)
-    loud = loud[loud > _STANDS_OUT]
+    loud = loud[loud > _SIGNIFICANT_POWER]
     # Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
     numbers = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
     return Remainder(
         excess,
         over,
-        min(max(numbers, _FEWEST), float(freedom)),
-        dict(zip(_NAMES, shares.tolist(), strict=True)),
+        min(max(numbers, _FEWEST_NUMBERS), float(freedom)),
+        dict(zip(_PARTS, shares.tolist(), strict=True)),
     )
 
 
 def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
-    """The residual in standard deviations of a reading."""
+    """Return the residual in standard deviations of a reading."""
     sd = noise.white_rms if noise.uniform else np.sqrt(noise.variance)
     return np.asarray(data.residual(fit.at.reading) * data.weight / sd)
 
@@ -131,9 +130,10 @@ def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
 def by_cycle(
     residual: FloatArray, phase: FloatArray, harmonics: int = _HARMONICS
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients of level, cosine, sine and harmonics, (cycles, 1 + 2 harmonics); the rest.
+    """Return coefficients of offset, cosine, sine and harmonics in each cycle, and the rest.
 
-    Within a cycle they are orthonormal, so that noise gives each the variance 1.
+    Shape (cycles, 1 + 2 harmonics). Within a cycle the functions are orthonormal, so that noise
+    gives each coefficient the variance 1.
     """
     number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
     ends = np.searchsorted(number, np.arange(number[-1] + 2))

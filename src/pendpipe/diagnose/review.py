@@ -136,7 +136,7 @@ def fit_without(state: State, step: Step) -> Fit | None:
     found = []
     for start in (value, bare):
         try:
-            found.append(refine(model, state.data, state.noise, start, held=state.holding))
+            found.append(refine(model, state.data, state.noise, start, held=state.held))
         except (NoMotionError, np.linalg.LinAlgError):
             continue
         if len(found) == 1 and found[0].converged:
@@ -155,7 +155,7 @@ def describe_rest(state: State, detection: Detection, p_value: float) -> bool:
         state.data,
         state.noise,
         replace(detection, leads=leads),
-        held=state.holding,
+        held=state.held,
         gross=is_gross(state.fit, state.data),
         origin=state.origin,
     )

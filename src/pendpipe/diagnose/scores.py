@@ -1,9 +1,9 @@
-"""All effects' scores at once: one inner product each, projected and whitened.
+"""Score all effects at once: one inner product each, whitened and projected.
 
-Along the fitted motion every effect has a sensitivity: what a little of it would do to the
-readings. What the model's own parameters could do as well is projected off; the score is the
-inner product of the rest, at unit length, with the whitened residual: locally the most
-powerful test there is. Scans over an effect's shape are many such columns.
+Every effect has a derivative of the readings by its size along the fitted motion. The part that
+the model's own parameters can reproduce is projected out; the score is the inner product of the
+rest, at unit length, with the whitened residual: the locally most powerful test. A scan over an
+effect's shape is many such columns.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from pendpipe.effects.curves import Curve
 from pendpipe.effects.derivatives import responses
 from pendpipe.effects.effect import Span
 
-_SEEN = 1e-4
-"""Part of a sensitivity that must be left by the projection for it to be told at all."""
+_VISIBLE = 1e-4
+"""Part of a derivative that must remain after the projection for the effect to be visible."""
 
-_STANDS_OUT = 4.0
-"""Standard deviations by which a curve's combination must be seen to be kept."""
+_RESOLVED_SD = 4.0
+"""Standard deviations at which a coefficient of a curve must be visible to be kept."""
 
 
-_AT_ONCE = 32
+_COLUMNS_AT_ONCE = 32
 
 
 class Candidate(NamedTuple):
-    """An effect of one shape, and where its columns stand."""
+    """An effect of one shape, and the position of its columns."""
 
     effect: Effect
     shape: tuple[float, ...]
@@ -55,10 +55,10 @@ class Bank:
     columns
         Shape (n + 1, k), float32: a candidate's columns are orthonormal among themselves.
     candidates
-        Whose they are.
+        The effects and shapes to which the columns belong.
     lengths
-        Length of each candidate's first column for a unit of its size: how its size is read
-        off its score, shape (candidates,).
+        Length of each candidate's first column for a unit of its size, shape (candidates,):
+        it converts a score to a size.
     """
 
     basis: FloatArray
@@ -67,9 +67,9 @@ class Bank:
     lengths: FloatArray
 
     def scores(self, residual: FloatArray) -> FloatArray:
-        """Sum of squares of each candidate's inner products; shape (candidates, ...).
+        """Return the sum of squares of each candidate's inner products; shape (candidates, ...).
 
-        A size that can't be negative (a friction's) scores with its own sign only.
+        A size that can't be negative (a friction) scores with a positive sign only.
         """
         products = self.columns.T @ residual.astype(np.float32)
         signed = [c.first for c in self.candidates if c.effect.one_sided]
@@ -79,7 +79,7 @@ class Bank:
         return np.asarray(np.add.reduceat(squares, starts, axis=0))
 
     def rows(self) -> dict[str, list[int]]:
-        """Indices of the candidates of each effect, by its key."""
+        """Return the indices of the candidates of each effect, by its key."""
         found: dict[str, list[int]] = {}
         for index, candidate in enumerate(self.candidates):
             found.setdefault(candidate.effect.key, []).append(index)
@@ -92,10 +92,9 @@ class Bank:
 
 
 def tangent_basis(fit: Fit) -> FloatArray:
-    """Orthonormal basis of what the fitted values can do.
+    """Return an orthonormal basis of the derivatives by the fitted values.
 
-    Those at a bound are included, unless the readings pull them far beyond it: then they
-    are known.
+    Values at a bound are included, unless the readings pull them far beyond it.
     """
     known = pulled(fit)
     part = fit.jacobian[:, [index for index in fit.free if index not in known]]
@@ -107,10 +106,10 @@ def tangent_basis(fit: Fit) -> FloatArray:
 
 
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
-    """Work out the columns of all effects along a fitted motion.
+    """Compute the columns of all effects along a fitted motion.
 
-    A few shapes at a time, and kept in single precision: the whole in double precision would
-    be a hundred megabytes for a long record, and memory is what this costs.
+    A few shapes at a time, stored in single precision: in double precision a long record would
+    take hundreds of megabytes.
     """
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
@@ -119,7 +118,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
         if isinstance(effect, ReleasedParameter):
             kept.add(effect, rows, effect.sensitivity(fit)[None])
             continue
-        some = max(_AT_ONCE // effect.sizes, 1)
+        some = max(_COLUMNS_AT_ONCE // effect.sizes, 1)
         for first in range(0, len(rows), some):
             part = rows[first : first + some]
             kept.add(effect, part, _whitened(fit, noise, effect, part))
@@ -135,7 +134,7 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
 def _whitened(
     fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[tuple[float, ...]]
 ) -> FloatArray:
-    """What each size of each shape does to the whitened readings, shape (columns, n + 1)."""
+    """Derivatives of the whitened readings by each size of each shape, shape (columns, n + 1)."""
     small = effect.small(fit.at.span)
     changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
     raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
@@ -147,7 +146,7 @@ def _whitened(
 
 
 class _Kept:
-    """Unit columns that can be told from the model's own, as they are found."""
+    """Collects the unit columns that differ from the model's own."""
 
     def __init__(self, basis: FloatArray, most: int) -> None:
         self.basis = basis
@@ -158,7 +157,7 @@ class _Kept:
         self._lengths: list[float] = []
 
     def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
-        """Project off the model's tangent space, and keep what is left at unit length."""
+        """Project out the model's tangent space, and keep the rest at unit length."""
         if isinstance(effect, Curve):
             self._add_curve(effect, shapes[0], columns)
             return
@@ -166,15 +165,15 @@ class _Kept:
         before[before == 0.0] = np.inf
         unit = (columns / before[:, None]).astype(np.float32)
         length = self._project(unit)
-        # What single precision has left of the basis is small beside what is left at all.
+        # A second projection removes the rounding errors of single precision.
         self._project(unit)
         width = len(columns) // len(shapes)
-        seen = (length > _SEEN).reshape(-1, width).all(axis=1)
+        seen = (length > _VISIBLE).reshape(-1, width).all(axis=1)
         for second in range(1, width):
             for first in range(second):
                 seen &= _orthogonal(unit[first::width], unit[second::width])
         if width > 1:
-            # What two almost parallel rows differ by is small, and the basis in it not.
+            # The difference of two almost parallel rows is small, so that rounding matters again.
             self._project(unit)
         for index in np.flatnonzero(seen).tolist():
             own = slice(index * width, (index + 1) * width)
@@ -182,7 +181,7 @@ class _Kept:
             self._keep(effect, shapes[index], unit[own], size)
 
     def _project(self, unit: NDArray[np.float32]) -> FloatArray:
-        """Take the basis off in place, at unit length again; return what length was left."""
+        """Project out the basis in place and normalise; return the length that remained."""
         unit -= (unit @ self._single) @ self._single.T
         left = np.sqrt(np.einsum("kn,kn->k", unit, unit))
         unit /= np.where(left > 0.0, left, 1.0)[:, None]
@@ -206,18 +205,18 @@ class _Kept:
         self._lengths.append(length)
 
     def bank(self) -> Bank:
-        """Everything that was kept."""
+        """Return everything that was kept."""
         columns = self._rows[: self._filled].T
         return Bank(self.basis, columns, tuple(self._candidates), np.array(self._lengths))
 
 
 def _orthogonal(first: NDArray[np.float32], second: NDArray[np.float32]) -> BoolArray:
-    """Take unit rows off others in place; return where something is left."""
+    """Project unit rows out of others in place; return where something remains."""
     apart = np.ones(len(first), dtype=bool)
     for _ in range(2):
         second -= np.einsum("kn,kn->k", first, second)[:, None] * first
         left = np.sqrt(np.einsum("kn,kn->k", second, second))
-        apart &= left > _SEEN
+        apart &= left > _VISIBLE
         second /= np.where(left > 0.0, left, 1.0)[:, None]
     return apart
 
@@ -232,14 +231,14 @@ def _sizes(
 
 
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
-    """Keep a curve's combinations that would stand out if they were of reasonable size."""
-    combinations, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
-    coefficients = combinations[:, lengths > _STANDS_OUT]
-    return curve.reduced(coefficients), coefficients.T @ part
+    """Keep the combinations of a curve's basis functions that the record resolves."""
+    mixtures, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
+    mixing = mixtures[:, lengths > _RESOLVED_SD]
+    return curve.reduced(mixing), mixing.T @ part
 
 
 def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
-    """How often chance alone does better, of each candidate by itself."""
+    """Return the probability that chance alone does better, for each candidate by itself."""
     found = np.empty_like(scores)
     for width in np.unique(freedom).astype(int).tolist():
         found[freedom == width] = chi2_beyond(scores[freedom == width], width)
@@ -249,10 +248,10 @@ def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
 def finer_shape(
     base: Fit, noise: Noise, effect: Effect, shape: tuple[float, ...]
 ) -> tuple[float, ...]:
-    """Return the shape of highest score among those about a lead's (`Effect.finer`).
+    """Return the shape of highest score among those near a scan's best (`Effect.finer`).
 
-    The effect of a knock, say, depends on the phase at which it comes: chi^2 has a minimum
-    in each half cycle, and the scan's rows are farther apart.
+    A fit alone would end beside it: the response to a knock, say, depends on its phase, so that
+    chi^2 has a minimum in each half cycle, while the scan's shapes are farther apart.
     """
     shapes = [tuple(row) for row in effect.finer(base.at.span, shape)] if shape else []
     if not shapes:
@@ -266,14 +265,14 @@ def finer_shape(
 def products_and_lengths(
     base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Score shapes of an effect's first size on what a fit leaves.
+    """Score shapes of an effect's first size on a fit's residual.
 
     Returns
     -------
     products, lengths
-        Inner products with the residual of what a unit of the size does beyond the model's own
-        values, and the lengths of that; shape (shapes,). The size is product/length^2, and
-        takes (product/length)^2 off chi^2.
+        Inner products of the residual with the derivative by the size, projected, and the
+        lengths of that; shape (shapes,). The size is product/length^2, and lowers chi^2 by
+        (product/length)^2.
     """
     span = base.at.span
     small = effect.small(span)

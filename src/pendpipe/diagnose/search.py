@@ -164,7 +164,7 @@ def search(
         min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
         min(state.now.p_value / CATALOGUE_SHARE, 1.0),
         state.first,
-        tuple(state.holding),
+        tuple(state.held),
         remainder,
         named or Reviewed(state.fit, remainder),
         tuple(forensics.clock_notes),
@@ -213,7 +213,7 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     # Readings at the end may have been left out meanwhile.
     read = beginning.data.first(len(data))
     if np.array_equal(data.time_s, read.time_s):
-        if not state.fit.model.effects and sorted(state.holding) == sorted(beginning.held):
+        if not state.fit.model.effects and sorted(state.held) == sorted(beginning.held):
             return state.fit
     else:
         model = model.at_times(read.time_s)
@@ -253,7 +253,7 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         state.data,
         state.noise,
         found,
-        held=state.holding,
+        held=state.held,
         gross=gross,
         origin=state.origin,
     )
@@ -278,7 +278,7 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         f"adding {winner.name}: the residual falls from {before:.3g} to {after:.3g} {unit} rms"
     )
     if isinstance(winner.lead.effect, ReleasedParameter):
-        state.holding = winner.lead.effect.without(state.holding)
+        state.held = winner.lead.effect.without(state.held)
     state.settle(winner.fit)
     return True
 

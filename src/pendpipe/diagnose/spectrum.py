@@ -1,4 +1,4 @@
-"""Tones of any frequency, steady or dying, in what a model leaves."""
+"""Scans for tones of any frequency, steady or decaying, in a residual."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 
-_FINER: Final = 2
-"""Frequencies in 1/(duration)."""
-_SEEN: Final = 0.02
-"""Part of a tone's square that the model's own parameters must leave."""
+_OVERSAMPLING: Final = 2
+"""Frequencies in an interval of 1/duration."""
+_VISIBLE: Final = 0.02
+"""Part of a tone's power that must remain after the projection."""
 
 
 class Band(NamedTuple):
-    """Which frequencies are looked at: above one, and not about another."""
+    """The scanned frequencies: above one, and not near another."""
 
     above_hz: float
     not_hz: float = 0.0
@@ -27,7 +27,7 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True)
 class ToneScan:
-    """The lines of a scan over frequency, of one envelope.
+    """A scan over frequency with one envelope.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ class ToneScan:
     frequency_hz
         Shape (m,).
     inverse
-        Of the 2x2 matrices of what the projection leaves of cosine and sine, shape (m, 3):
-        entries 11, 12, 22; zero where nothing is left.
+        Of the 2x2 Gram matrices of projected cosine and sine, shape (m, 3): entries 11, 12, 22;
+        zero where nothing remains.
     """
 
     envelope: FloatArray
@@ -46,7 +46,7 @@ class ToneScan:
     size: int
 
     def scores(self, weights: FloatArray) -> FloatArray:
-        """chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
+        """Return chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
 
         `weights` is `Noise.adjoint` of the whitened and projected residual, shape (n, ...).
         """
@@ -60,13 +60,13 @@ class ToneScan:
 
 @dataclass(frozen=True)
 class ToneScans:
-    """Scans of several envelopes on the same noise."""
+    """Scans with several envelopes and the same noise."""
 
     noise: Noise
     scans: tuple[ToneScan, ...] = ()
 
     def scores(self, residual: FloatArray) -> list[FloatArray]:
-        """Each scan's chi^2; `residual` is whitened and projected, with the prior's entry."""
+        """Return each scan's chi^2 of a whitened, projected residual (with the prior's entry)."""
         if not self.scans:
             return []
         weights = self.noise.adjoint(residual[:-1])
@@ -76,13 +76,13 @@ class ToneScans:
 def tone_scan(
     data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, band: Band
 ) -> ToneScan:
-    """Prepare a scan: what the model's tangent space leaves of a tone at each frequency."""
+    """Prepare a scan: project the model's tangent space out of a tone at each frequency."""
     count = len(data)
-    size = int(2 ** np.ceil(np.log2(_FINER * count)))
+    size = int(2 ** np.ceil(np.log2(_OVERSAMPLING * count)))
     frequency = np.asarray(np.fft.rfftfreq(size, data.interval_s)[1:], dtype=np.float64)
     keep = slice(1, len(frequency) + 1)
     variance = _variance_at(noise, frequency, data)
-    # Tones are white noise's own basis: their squares are sums of the envelope's.
+    # Products of tones follow from the Fourier transform of the squared envelope.
     square = noise.weight * envelope**2
     double = np.fft.rfft(square, n=size)
     total = float(np.sum(square))
@@ -100,7 +100,7 @@ def tone_scan(
     h12 = g12 - np.sum(real * imaginary, axis=1)
     determinant = h11 * h22 - h12**2
     seen = (
-        (determinant > (_SEEN * 0.25 * (g11 + g22) ** 2))
+        (determinant > (_VISIBLE * 0.25 * (g11 + g22) ** 2))
         & (frequency > band.above_hz)
         & (np.abs(frequency - band.not_hz) > band.width_hz)
         & (frequency < 0.98 * frequency[-1])

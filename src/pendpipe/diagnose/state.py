@@ -1,4 +1,4 @@
-"""What a search knows so far, and how a fit and its noise are brought into agreement."""
+"""The state of a search, and the joint estimate of a fit and its noise."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from pendpipe.diagnose.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA
 
 GROSS: Final = 2.0
-"""chi^2 per degree of freedom above which scores to first order mean nothing."""
-_SLIP: Final = 0.1
-"""Phase in rad, likewise."""
+"""chi^2 per degree of freedom above which first-order scores are meaningless."""
+_LARGE_PHASE_ERROR: Final = 0.1
+"""Phase error in rad above which they are meaningless too."""
 _MISJUDGED: Final = 1.6
-"""By how much the first guess of the noise may be too small; more is a misfit."""
-_AGAIN: Final = 0.95
-"""Of the noise: where a refit leaves less, it was no noise of the model before."""
+"""Largest factor by which the first estimate of the noise may be too small; more is a misfit."""
+_ESTIMATE_AGAIN: Final = 0.95
+"""Ratio of noise estimates below which the noise is estimated again."""
 _ROUNDS: Final = 3
 _LEAST_STEP: Final = 0.1
-"""Noise over step below which no model of a rounded reading is believed."""
+"""Smallest plausible noise of a rounded reading, over the step."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One effect that was added.
+    """One added effect.
 
     Parameters
     ----------
     rivals
-        All that were refitted, the winner first.
+        All refitted effects, the winner first.
     p_value
         Global, when it was found.
     before
-        The model that it was added to.
+        The model to which it was added.
     """
 
     rivals: tuple[Rival, ...]
@@ -52,16 +52,16 @@ class Step:
 
     @property
     def winner(self) -> Rival:
-        """The effect that was taken."""
+        """The effect that was added."""
         return self.rivals[0]
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A finding of the measurement's tests that counts, and its global p-value.
+    """A significant finding of a test of the measurement, and its global p-value.
 
-    `behind` is how many effects had been added before; `mask`, which readings have been left
-    out for it, in however many rounds; None for none.
+    `behind` is the number of effects added before it; `mask` marks all readings left out for it,
+    None for none.
     """
 
     finding: Finding
@@ -72,24 +72,24 @@ class Fault:
 
 @dataclass
 class State:
-    """What a search knows so far.
+    """The state of a search.
 
     Parameters
     ----------
     fit, data, noise
-        The model as it is, the readings (masked, their times mended), and their noise.
-    holding
-        Indices of what is not fitted.
+        The present model, the readings (masked, with corrected times), and their noise.
+    held
+        Indices of values that are not fitted.
     origin
-        The values that the search started from.
+        The start values of the search.
     bare
-        The baseline's values when it was fitted alone.
+        The values of the baseline fitted alone.
     """
 
     fit: Fit
     data: Data
     noise: Noise
-    holding: list[int]
+    held: list[int]
     origin: FloatArray
     bare: FloatArray
     steps: list[Step] = field(default_factory=list)
@@ -98,21 +98,21 @@ class State:
     now: Detection | None = None
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
-        """Take a new fit, and judge the noise by it."""
+        """Accept a new fit, and estimate the noise from it."""
         data, noise = data or self.data, noise or self.noise
-        fit = with_better_instants(fit, data, noise, self.holding)
-        self.fit, self.data, self.noise = settled(fit, data, noise, self.holding)
+        fit = with_better_instants(fit, data, noise, self.held)
+        self.fit, self.data, self.noise = settled(fit, data, noise, self.held)
         if not fit.model.effects:
             self.bare = self.fit.value
 
 
 def is_gross(fit: Fit, data: Data) -> bool:
-    """Say whether a misfit is so large that sensitivities can't be trusted."""
-    return fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > _SLIP
+    """Return whether a misfit is too large for a linear approximation."""
+    return fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > _LARGE_PHASE_ERROR
 
 
 def first_noise(beginning: Beginning) -> Noise:
-    """White noise, from differences that the motion cannot touch."""
+    """Return white noise, estimated from differences without the motion."""
     data = beginning.data
     slope = None
     if data.time_noise:
@@ -120,8 +120,8 @@ def first_noise(beginning: Beginning) -> Noise:
     return white_noise(data, beginning.noise_rms, slope)
 
 
-def noise_left(fit: Fit, data: Data, *, red: bool = True) -> Noise:
-    """Judge the noise by what a fit leaves."""
+def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
+    """Estimate the noise from a fit's residual."""
     frequency = fit.value[OMEGA] / (2.0 * np.pi)
     residual = data.residual(fit.at.reading)
     return estimate_noise(data, residual, frequency, _LEAST_STEP * data.step, red=red)
@@ -130,21 +130,21 @@ def noise_left(fit: Fit, data: Data, *, red: bool = True) -> Noise:
 def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
-    """Judge the noise anew where the model is near enough, and refit."""
-    if data.time_noise or fit.max_phase_error_rad > _SLIP:
+    """Estimate the noise again if the model is good enough, and refit with it."""
+    if data.time_noise or fit.max_phase_error_rad > _LARGE_PHASE_ERROR:
         return fit, data, noise
     finer = with_lattice(data, fit.at.reading)
-    left = noise_left(fit, finer, red=red)
+    left = noise_of_residual(fit, finer, red=red)
     misjudged = not fit.model.effects and left.white_rms < _MISJUDGED * noise.white_rms
     if is_gross(fit, data) and not misjudged:
         return fit, data, noise
     better = refine(fit.model, finer, left, fit.value, held=held)
-    # What is gross beside the first guess of the noise may be noise: it is if it is so anywhere.
+    # A misfit that is gross for the first estimate of the noise may itself be noise.
     if is_gross(fit, data) and is_gross(better, finer):
         return fit, data, noise
     for _ in range(_ROUNDS):
-        again = noise_left(better, finer, red=red)
-        if again.rms > _AGAIN * left.rms:
+        again = noise_of_residual(better, finer, red=red)
+        if again.rms > _ESTIMATE_AGAIN * left.rms:
             break
         left, better = again, refine(fit.model, finer, again, better.value, held=held)
     return better, finer, left

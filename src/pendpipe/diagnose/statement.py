@@ -25,7 +25,7 @@ _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 _KINDS = {
     "dynamics": "from the model of the pendulum",
     "measurement": "from the model of the measurement",
-    "unnamed": "from the model, and unlike any effect of the catalogue",
+    "unnamed": "from the model, and not in the catalogue",
 }
 _MEANINGS = {
     "circular-error": "the restoring torque follows sin x, not x",
@@ -103,7 +103,7 @@ def statement(
         Properties of the time stamps, a clause each.
     """
     model = _NAMES.get(baseline, baseline)
-    stamps = [f"Note on the time stamps: {'; '.join(notes)}."] if notes else []
+    stamps = [f"Note: {'; '.join(notes)}."] if notes else []
     if not effects:
         nothing = (
             f"{_capital(model)} describes this recording: the residual of"
@@ -118,7 +118,7 @@ def statement(
         f" {_size(before.residual_rms_rad, unit)} rms, {_times(times)} the noise of"
         f" {_size(noise_rms, unit)}.",
         *(_effect(effect) for effect in effects),
-        _improvement(before, after, held, unit),
+        _improvement(len(effects), before, after, held, unit),
         _changes(before.parameters, after.parameters),
         _rest(unexplained, level, remainder),
     ]
@@ -139,7 +139,7 @@ def _effect(effect: FoundEffect) -> str:
     numbers = [f"{name} = {each}" for name, each in effect.parameters.items()]
     lead += f" ({'; '.join([f'probability {_percent(effect.probability)}', *numbers])})"
     if effect.location.summary:
-        lead += f"; it shows {effect.location.summary}"
+        lead += f"; {effect.location.summary}"
     if effect.indistinguishable:
         others = [f"{_rival(name)} ({_percent(share)})" for name, share in effect.indistinguishable]
         lead += f". This recording alone cannot distinguish it from {_listed(others, 'or')}"
@@ -148,10 +148,15 @@ def _effect(effect: FoundEffect) -> str:
     return _ended(f"{lead}. What to measure next: {effect.deciding}")
 
 
-def _improvement(before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str) -> str:
+def _improvement(
+    number: int, before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str
+) -> str:
     """How much of the misfit the effects explain, and whether they predict."""
     old, new = before.residual_rms_rad, after.residual_rms_rad
-    text = f"Including this reduces the residual from {_size(old, unit)} to {_size(new, unit)} rms"
+    this = "this" if number == 1 else "these effects"
+    text = (
+        f"Including {this} reduces the residual from {_size(old, unit)} to {_size(new, unit)} rms"
+    )
     if old > 1.05 * new > 0.0:
         text += (
             f", by a factor of {old / new:.2g}"
@@ -186,7 +191,7 @@ def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate]) -> s
         for name, new in after.items()
         if name in _PARAMETERS and _biased(before[name], new)
     ]
-    text = f"It changes {_listed(parts, 'and')}." if parts else ""
+    text = f"This changes {_listed(parts, 'and')}." if parts else ""
     if moved:
         text += f" Without it the fit was biased: {'; '.join(moved)}."
     return text.strip()
@@ -229,7 +234,7 @@ def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
     return (
         f"The remaining residual is still {_times(remainder.over_noise)} the noise ({where}), so"
         " the model is incomplete: the errors given here are enlarged by a factor of"
-        f" {remainder.error_scale:.2g} for it, and the probabilities are reduced."
+        f" {remainder.error_scale:.2g}, and the probabilities are lowered accordingly."
     )
 
 

@@ -57,7 +57,7 @@ def _first(state: State) -> list[Rival]:
     """Refit the best named effects where only curves had been."""
     assert state.now is not None
     leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
-    return _refitted(state.fit, replace(state.now, leads=leads), state, state.holding, _FIRST_TRIED)
+    return _refitted(state.fit, replace(state.now, leads=leads), state, state.held, _FIRST_TRIED)
 
 
 def _second(state: State, name: Rival, task: Task) -> list[Rival]:
@@ -67,7 +67,7 @@ def _second(state: State, name: Rival, task: Task) -> list[Rival]:
         for effect in applicable(task.catalogue, name.fit, task.baseline, state.data.unit)
         if effect.kind != "unnamed"
     ]
-    held = state.holding
+    held = state.held
     if isinstance(name.lead.effect, ReleasedParameter):
         held = name.lead.effect.without(held)
     released = [entry for entry in task.released if entry not in name.fit.model.effects]

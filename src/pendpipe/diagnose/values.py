@@ -1,4 +1,4 @@
-"""A fit's values as the contract's parameters, with errors."""
+"""The fitted values as parameters and curves in their own units, with errors."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from pendpipe.effects.curves import Curve, DampingCurve, DriveCurve
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.estimate import Estimate
 
-_CYCLES: Final = 4.0
-_FEWEST: Final = 16
-_STEP: Final = 1e-3
-"""Of a standard deviation, for derivatives of what is derived from the values."""
+_FIRST_CYCLES: Final = 4.0
+_FEWEST_READINGS: Final = 16
+_DERIVATIVE_STEP: Final = 1e-3
+"""Step of numerical derivatives, in standard deviations."""
 
 
 def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
-    """Return a, b, c, frequency, amplitude, phase and offset (see contract: fit.json).
+    """Return a, b, c, frequency, amplitude, phase and offset, as in ``fit.json``.
 
-    The amplitude is that of the first turning point in the readings, by the model; the phase
-    that at the first reading.
+    The amplitude is the model's at the first turning point in the readings, the phase that at the
+    first reading.
     """
     covariance = fit.covariance()
     numbers = _numbers(fit.model, fit.at)
@@ -39,8 +39,8 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))
         if sd == 0.0 or index in (A, B, C, OFFSET):
             continue
-        jacobian[:, index] = _slope(fit, early, index, _STEP * sd / fit.error_scale)
-    spread = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
+        jacobian[:, index] = _slope(fit, early, index, _DERIVATIVE_STEP * sd / fit.error_scale)
+    errors = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
     intervals = _intervals(fit)
     dress = units(unit)
     found = {}
@@ -50,21 +50,21 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     frequency = float(fit.value[OMEGA]) * hertz
     sd = math.sqrt(max(float(covariance[OMEGA, OMEGA]), 0.0)) * hertz
     found["frequency"] = Estimate(frequency, sd, dress["frequency"])
-    found["amplitude"] = Estimate(float(numbers[0]), float(spread[0]), dress["amplitude"])
+    found["amplitude"] = Estimate(float(numbers[0]), float(errors[0]), dress["amplitude"])
     phase = math.remainder(float(numbers[1]), 2.0 * math.pi)
-    found["phase"] = Estimate(phase, float(spread[1]), dress["phase"])
+    found["phase"] = Estimate(phase, float(errors[1]), dress["phase"])
     return {name: found[name] for name in PARAMETERS}
 
 
 def _early(fit: Fit) -> Model:
-    """The model of the first few cycles' readings, which is all that derivatives ask for."""
+    """Return the model of the first few cycles, which suffices for the derivatives."""
     time = fit.model.time_s
-    last = max(time[0], float(fit.value[TIME])) + _CYCLES * fit.at.span.period_s
-    return fit.model.at_times(time[: max(int(np.searchsorted(time, last)), _FEWEST)])
+    last = max(time[0], float(fit.value[TIME])) + _FIRST_CYCLES * fit.at.span.period_s
+    return fit.model.at_times(time[: max(int(np.searchsorted(time, last)), _FEWEST_READINGS)])
 
 
 def _numbers(model: Model, at: Evaluated) -> FloatArray:
-    """Amplitude of the first turning point in the readings, and phase of the first reading."""
+    """Return the amplitude of the first turning point, and the phase of the first reading."""
     motion, sampled = at.tangent.motion, at.sampled
     first = int(np.searchsorted(motion.time_s[:, 0], model.time_s[0] - 1e-9))
     first = min(first, len(motion.time_s) - 1)
@@ -73,7 +73,7 @@ def _numbers(model: Model, at: Evaluated) -> FloatArray:
 
 
 def _slope(fit: Fit, early: Model, index: int, step: float) -> FloatArray:
-    """Derivatives by one value; backwards where more of it stops the pendulum too early."""
+    """Return derivatives by one value; backwards if increasing it stops the pendulum too early."""
     numbers = _numbers(early, early.evaluate(fit.value))
     for signed in (step, -step):
         moved = fit.value.copy()
@@ -87,7 +87,7 @@ def _slope(fit: Fit, early: Model, index: int, step: float) -> FloatArray:
 
 
 def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
-    """95 % intervals that are honest at a bound."""
+    """Return 95 % intervals that are valid at a bound."""
     low, high = fit.model.bounds()
     held = [index for index in range(len(fit.value)) if index not in fit.free]
     normal = fit.jacobian.T @ fit.jacobian
@@ -109,12 +109,12 @@ def _estimate(
 
 def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, Estimate]:
     """Return an effect's own parameters, by name; displacements are in `unit`."""
-    place = next((here for other, here in fit.model.places() if other is effect), None)
-    if place is None:
+    position = next((here for other, here in fit.model.places() if other is effect), None)
+    if position is None:
         return {}
     covariance = fit.covariance()
     found = {}
-    first = place.start + effect.parameter_free
+    first = position.start + effect.switch
     for offset, parameter in enumerate(effect.parameters):
         index = first + offset
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))
@@ -125,11 +125,11 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
     return found
 
 
-_POINTS: Final = 61
+_CURVE_POINTS: Final = 61
 
 
 def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
-    """Return a fitted curve with its band.
+    """Return a fitted curve with its error band.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
     effect
         The curve.
     unit
-        Of the readings: ``"rad"``, or ``"m"`` for what is no pendulum.
+        Of the readings: ``"rad"``, or ``"m"`` for a displacement.
 
     Returns
     -------
@@ -147,11 +147,11 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
         and ``sd``, shape (k,). A drive has ``quadrature`` and ``quadrature_sd`` besides; a
         loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
     """
-    place = next(place for other, place in fit.model.places() if other is effect)
+    position = next(position for other, position in fit.model.places() if other is effect)
     covariance = fit.covariance()
     knots = effect.knots
     spaced = np.geomspace if isinstance(effect, DampingCurve) else np.linspace
-    at = np.asarray(spaced(knots[0], knots[-1], _POINTS))
+    at = np.asarray(spaced(knots[0], knots[-1], _CURVE_POINTS))
     scale = effect.scale(fit.model.pendulum(fit.value))
     found: dict[str, Any] = {
         "argument": effect.argument.replace("rad", unit)
@@ -163,17 +163,17 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
     for name, drawn in _parts(effect).items():
         columns = np.stack([drawn(one, at) for one in np.eye(effect.sizes)], axis=1)
         prefix = f"{name}_" if name != "value" else ""
-        found[name] = scale * columns @ fit.value[place]
-        own = covariance[place, place]
+        found[name] = scale * columns @ fit.value[position]
+        own = covariance[position, position]
         variance = np.einsum("ij,jk,ik->i", columns, own, columns)
         found[f"{prefix}sd"] = abs(scale) * np.sqrt(np.maximum(variance, 0.0))
     if isinstance(effect, DampingCurve):
-        found |= _local_exponent(fit, effect, place, at, covariance)
+        found |= _local_exponent(fit, effect, position, at, covariance)
     return found
 
 
 def _parts(effect: Curve) -> dict[str, Any]:
-    """The curves that an effect consists of, each a function of values and arguments."""
+    """Return the curves of an effect, each a function of values and arguments."""
     if not isinstance(effect, DriveCurve):
         return {"value": effect.curve}
     count = len(effect.knots)
@@ -189,18 +189,18 @@ def _parts(effect: Curve) -> dict[str, Any]:
 
 
 def _local_exponent(
-    fit: Fit, effect: DampingCurve, place: slice, at: FloatArray, covariance: FloatArray
+    fit: Fit, effect: DampingCurve, position: slice, at: FloatArray, covariance: FloatArray
 ) -> dict[str, FloatArray]:
-    """The power n of the velocity that the whole loss follows: n = 1 + d ln(loss rate)/d ln y.
+    """Return the exponent n of the total loss: n = 1 + d ln(loss rate)/d ln y.
 
-    A loss |v|^n takes -dy/dt in proportion to y^n, that is a rate y^(n - 1) (Eq. 13: a, b, c
+    A loss |v|^n gives -dy/dt proportional to y^n, that is, a rate y^(n - 1) (Eq. 13: a, b, c
     are n = 2, 1, 0). The error is propagated from all fitted values.
     """
 
     def exponent(value: FloatArray) -> FloatArray:
         pendulum = fit.model.pendulum(value)
         rate = pendulum.quadratic * at + pendulum.linear + pendulum.coulomb / at
-        rate = rate + effect.scale(pendulum) * effect.curve(value[place], at)
+        rate = rate + effect.scale(pendulum) * effect.curve(value[position], at)
         safe = np.maximum(rate, 1e-6 * float(np.max(np.abs(rate))))
         return 1.0 + np.gradient(np.log(safe), np.log(at))
 

@@ -1,4 +1,4 @@
-"""What is said of each effect in the end: its rivals with all the others in the model."""
+"""Final probabilities of each effect and its rivals, beside all other effects."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.model import Model
 
-_CLEAN: Final = 5.0
-"""What a model that leaves nothing takes off the evidence (in chi^2) that it is none of the
-class's: one lone name in thirteen is wrong then, as on opened challenges."""
-_LISTED: Final = 0.05
-"""Probability from which a curve without a name is listed beside names."""
-_OF_THE_REST: Final = ("jitter", "broadband-drive", "coloured-noise")
-"""Faults that are seen in what a model leaves: a curve's own misfit looks like any of them."""
-_SAME: Final = 0.02
-"""Part by which a gain may change in the end for its rivals not to be refitted."""
+_CLEAN_CHARGE: Final = 5.0
+"""Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
+without rivals in thirteen is wrong, as on opened challenges."""
+_LISTED_FROM: Final = 0.05
+"""Probability from which an unnamed curve is listed among the rivals."""
+_SEEN_IN_RESIDUAL: Final = ("jitter", "broadband-drive", "coloured-noise")
+"""Faults detected in a residual: the misfit of a curve can look like any of them."""
+_SAME_GAIN: Final = 0.02
+"""Relative change of a gain below which the rivals are not refitted."""
 
 
 class Weighed(NamedTuple):
-    """An effect and its rivals, with all the others in the model.
+    """An effect and its rivals, beside all other effects.
 
     Parameters
     ----------
     without
-        The model without it, fitted.
+        The fit without it.
     gain
-        Delta chi^2 of the effect beside all others.
+        Its Delta chi^2.
     mates
-        What the recording cannot tell from it, the best of each identifier.
+        The effects that the recording cannot distinguish from it, the best of each identifier.
     weights
         Probabilities of the effect, of its mates, and of none of them.
     """
@@ -61,7 +61,7 @@ class Weighed(NamedTuple):
 
 
 def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
-    """Weigh one effect against its rivals with all the others in the model."""
+    """Compare one effect with its rivals, beside all other effects."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
     without, rivals = _rivalry(found, beginning, step)
@@ -74,10 +74,10 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
         if rival.identifier != effect.identifier
     ]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
-    # What every pendulum has is likelier than its rivals beforehand, and than none of them.
-    # Of a curve that follows whatever has happened it says little that it leaves nothing.
+    # An effect that every pendulum has gets its prior against rivals and against "none of these".
+    # A curve that can follow anything gets no credit for leaving only noise.
     follows = isinstance(effect, Curve) and effect.of_anything
-    none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _misfit(found))
+    none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _clean_charge(found))
     weights = probabilities([own, *mates], none)
     if not stands_apart(effect, found.improved):
         weights = weights * _explained(found, effect, gain)
@@ -85,15 +85,15 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
 
 
 def beside(found: Search, effect: Effect) -> Search:
-    """What has been found, as an effect is judged beside it."""
+    """Return the search in which an effect is assessed: without a curve, unless it is one."""
     if effect.kind == "unnamed":
         return found
-    # A curve drawn over what the names leave could imitate any of them.
+    # A curve added to the named effects could imitate any of them.
     return replace(found, improved=found.named.fit, remainder=found.named.remainder)
 
 
 def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
-    """One effect, with what is said of it in the end."""
+    """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
     without, gain, mates, weights = weighed
@@ -115,7 +115,7 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
         tuple(
             (mate.identifier, float(weight))
             for mate, weight in zip(mates, weights[1:], strict=False)
-            if weight > _LISTED or not mate.drawn
+            if weight > _LISTED_FROM or not mate.drawn
         ),
         effect.discriminating_test,
         locate(without, found.improved, found.data, effect),
@@ -126,7 +126,7 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
 
 
 def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
-    """One of each identifier, the best first: several curves may draw what has no name."""
+    """Return the best of each identifier, the best first (several curves share one)."""
     best: dict[str, Rival] = {}
     for rival in sorted(rivals, key=lambda rival: -rival.evidence):
         best.setdefault(rival.identifier, rival)
@@ -134,20 +134,20 @@ def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
 
 
 def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
-    """A rival as its gain counts beside the best, where much is left that no model explains."""
+    """Return a rival with the evidence of its gain beside a remaining misfit."""
     if not found.remainder.systematic:
         return rival
-    # Relative to what the best leaves: m ln(excess) counts, for m independent numbers. As much
-    # as real laws leave to the catalogue's forms is no distance either.
+    # m ln(excess) counts, for m independent numbers of the remaining misfit; differences within
+    # the tolerance of the catalogue's forms don't count.
     behind, left = max(best - gain, 0.0), found.remainder.excess + MISSHAPEN * max(best, 0.0)
     worth = -found.remainder.numbers * math.log1p(behind / max(left, 1.0))
     return replace(rival, gain=worth, evidence=worth + rival.prior)
 
 
 def _explained(found: Search, effect: Effect, gain: float) -> float:
-    """The part of the misfit that an effect explains: it is believed no more than that.
+    """Return the part of the misfit that an effect explains, an upper limit of its probability.
 
-    What a curve without a name describes beside it is not explained.
+    What an unnamed curve describes beside it is not explained.
     """
     curves = [step.winner for step in found.steps if step.winner.drawn]
     open_still = sum(each.gain for each in curves if each.lead.effect is not effect)
@@ -157,15 +157,15 @@ def _explained(found: Search, effect: Effect, gain: float) -> float:
 
 
 def fault_named(found: Search, fault: Fault) -> FoundEffect:
-    """A fault of the measurement that a test of its own has found."""
+    """Return a fault of the measurement found by its own test."""
     from pendpipe.effects.catalogue import by_identifier
 
     finding = fault.finding
     effect = by_identifier(finding.identifier)
-    doubt = math.exp(-0.5 * _misfit(found))
-    # What would have given the very same codes is as likely.
+    doubt = math.exp(-0.5 * _clean_charge(found))
+    # Effects that give exactly the same codes are equally probable.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
-    if finding.identifier in _OF_THE_REST:
+    if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
     return FoundEffect(
         effect.identifier,
@@ -182,13 +182,13 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
     )
 
 
-def _misfit(found: Search) -> float:
-    """How much of the doubt a model that leaves nothing takes away."""
-    return _CLEAN if found.unexplained > 0.01 else 0.0
+def _clean_charge(found: Search) -> float:
+    """Return the charge against "none of these" if the model leaves only noise."""
+    return _CLEAN_CHARGE if found.unexplained > 0.01 else 0.0
 
 
 def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
-    """The model without one effect, and who else could take its place in it."""
+    """Return the fit without one effect, and the rivals that could replace it."""
     effect = step.winner.lead.effect
     held = list(found.held)
     model, value = found.improved.model.dropping(effect, found.improved.value)
@@ -198,11 +198,10 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
     without = _refined(model, found, held, value, bare, step.before.value) or step.before
     gain = without.chi2 - found.improved.chi2
-    same = abs(gain - step.winner.gain) < _SAME * gain
+    same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
-    # Even whom the search left far behind: how far that is depends on the noise and on the other
-    # effects, and both were others then.
+    # Refit even rivals that were far behind in the search: noise and other effects have changed.
     useful = without.chi2
     if not found.remainder.systematic:
         useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
@@ -222,7 +221,7 @@ def _refined(
     *starts: FloatArray,
     useful: float = math.inf,
 ) -> Fit | None:
-    """The best fit of a model from several starts; None if it can't move from any."""
+    """Return the best fit of a model from several starts; None if it has no motion from any."""
     fits = []
     for start in starts:
         if len(start) != model.size:
@@ -239,7 +238,7 @@ def _refined(
 def refitted(
     without: Fit, found: Search, held: Sequence[int], rival: Rival, useful: float = math.inf
 ) -> Fit | None:
-    """Refit a rival in the final model, from where it ended before, as far as it is of use."""
+    """Refit a rival in the final model, from its earlier result, as far as it is useful."""
     effect = rival.lead.effect
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pendpipe.diagnose.evidence import SIZE, Rival
+from pendpipe.diagnose.evidence import SIZE_CHARGE, Rival
 from pendpipe.diagnose.naming import refit_leads
 from pendpipe.diagnose.one_curve import BETTER
 from pendpipe.diagnose.refine import Fit, refine
@@ -73,7 +73,7 @@ def reconsider_curve(state: State, task: Task) -> bool:
         state.data,
         state.noise,
         replace(before.now, leads=leads),
-        held=state.holding,
+        held=state.held,
         gross=False,
         origin=state.origin,
     )
@@ -82,7 +82,7 @@ def reconsider_curve(state: State, task: Task) -> bool:
         return False
     task.progress(f"{rivals[0].identifier} and a named effect do as well as the curve")
     state.steps[:] = [*before.steps, Step(tuple(rivals), drawn.p_value, without)]
-    state.holding = rivals[0].lead.effect.without(state.holding)
+    state.held = rivals[0].lead.effect.without(state.held)
     state.settle(rivals[0].fit)
     return True
 
@@ -93,7 +93,7 @@ def _fewest(state: State, released: Sequence[Rival], most: Fit) -> tuple[Sequenc
         tried = [(some, _together(state, some)) for some in combinations(released, number)]
         fits = [(some, fit) for some, fit in tried if fit is not None]
         some, best = min(fits, key=lambda each: each[1].chi2, default=(released, most))
-        if best.chi2 - most.chi2 < SIZE * released[0].left * (len(released) - number):
+        if best.chi2 - most.chi2 < SIZE_CHARGE * released[0].left * (len(released) - number):
             return some, best
     return released, most
 
@@ -102,7 +102,7 @@ def _together(state: State, released: Sequence[Rival]) -> Fit | None:
     """Fit the model with some held parameters released."""
     if len(released) == 1:
         return released[0].fit
-    model, held = state.fit.model, list(state.holding)
+    model, held = state.fit.model, list(state.held)
     for rival in released:
         effect = rival.lead.effect
         assert isinstance(effect, ReleasedParameter)
@@ -121,7 +121,9 @@ def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequenc
     well alone, by the margin that two effects need.
     """
     one, more = needed[0], len(needed) - 1
-    worth = (state.fit.chi2 - fit.chi2) / one.left - SIZE * more + (0.0 if more else one.prior)
+    worth = (
+        (state.fit.chi2 - fit.chi2) / one.left - SIZE_CHARGE * more + (0.0 if more else one.prior)
+    )
     return all(
         worth >= rival.evidence + (BETTER if more and not rival.drawn else 0.0)
         for rival in rivals

@@ -1,4 +1,4 @@
-"""Faults of the measurement that have no smooth shape in time, one small file each.
+"""Tests for faults of the measurement without a smooth signature in time, a file for each.
 
 Every module has ``find(data, fit, noise, samples) -> Finding``.
 """
@@ -28,8 +28,7 @@ from pendpipe.diagnose.refine import Fit
 Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
 TESTS: Final[dict[str, Test]] = {
-    "gaps": time_stamps.find_gaps,
-    "time-stamps": time_stamps.find_uneven,
+    "time-stamps": time_stamps.find_irregular,
     "clipping": clipping.find,
     "glitches": glitches.find,
     "missing-codes": missing_codes.find,
@@ -38,7 +37,7 @@ TESTS: Final[dict[str, Test]] = {
     "coloured-noise": coloured_noise.find,
     "broadband-drive": broadband_drive.find,
 }
-"""In their order: what is masked by one is not seen by those behind it."""
+"""In order: readings masked by one test are not used by those after it."""
 
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""A pendulum that is shaken at random: amplitude and phase wander."""
+"""Random torques: amplitude and phase perform a random walk."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from pendpipe.estimate import Estimate
 
 _KICKS: Final = 64
 _SIZES: Final = np.geomspace(1e-4, 1e6, 101)
-"""Variance of a kick times the largest eigenvalue: where the likelihood is looked at."""
-_SEEN: Final = 1e-3
-"""Of the largest eigenvalue: rougher shapes say nothing of a wandering."""
-_SLIP: Final = 0.15
-"""Phase between readings and model, rad, above which the law of motion comes first."""
-_ALIKE: Final = 4.0
-"""Ratio of S_a from slow and from fast wandering that a random walk may show."""
-_SMOOTHER: Final = 6.0
-"""Gain in -2 ln L, with eigenvalues squared, from which it is no random walk."""
-_SHOWN: Final = 0.05
-_BOTH: Final = 2.5
-"""The whole gain counts as no more than this times that of the quadrature that has less."""
+"""Variances of a kick, times the largest eigenvalue, at which the likelihood is computed."""
+_SMALLEST_EIGENVALUE: Final = 1e-3
+"""Smallest eigenvalue used, over the largest: rougher shapes contain no information."""
+_LARGEST_PHASE_ERROR: Final = 0.15
+"""Phase error of the model in rad above which the test makes no sense."""
+_LARGEST_RATIO: Final = 4.0
+"""Ratio of S_a from slow and fast fluctuations that a random walk may have."""
+_SMOOTH_GAIN: Final = 6.0
+"""Gain in -2 ln L with squared eigenvalues from which it is not a random walk."""
+_SUSPECT: Final = 0.05
+_LARGEST_IMBALANCE: Final = 2.5
+"""Largest ratio of the total gain to that of the quadrature with the smaller one."""
 
 
 class Shapes(NamedTuple):
-    """Independent shapes of the wandering, the smoothest first.
+    """Independent shapes of the fluctuations, the smoothest first.
 
     Parameters
     ----------
     weight
         Variance of each shape's square for kicks of unit variance; shape (k,).
     square
-        Squares found, of mean 1 + s weight for kicks of variance s; shape (k,).
+        Observed squares, of mean 1 + s weight for kicks of variance s; shape (k,).
     """
 
     weight: FloatArray
@@ -51,7 +51,7 @@ class Shapes(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """How often noise alone fills them as much."""
+        """Probability that noise alone gives such squares."""
         return tail_of_squares(float(self.weight @ self.square), self.weight)
 
 
@@ -60,18 +60,18 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
     In a time dt it adds to both quadratures of the angle independent steps of variance
     S_a dt/(4 omega^2), which then decay with the motion: the residual has the covariance
-    sigma^2 1 + S_a F F', with a column of F for the response behind each instant. The score
-    for S_a at zero, |F' r|^2 after the model's own freedom is projected off, is a weighted
-    sum of squares. It must be there in amplitude and in phase alike, which a term left out
-    of the law of motion seldom is: p = max(p_amplitude, p_phase)^2.
+    sigma^2 1 + S_a F F', with a column of F for the response after each instant. The score
+    for S_a at zero, |F' r|^2 with the model's own freedom projected out, is a weighted
+    sum of squares. It must show in amplitude and in phase, which a missing term of the law of
+    motion seldom does: p = max(p_amplitude, p_phase)^2.
     """
-    if data.used < 100 or fit.max_phase_error_rad > _SLIP:
+    if data.used < 100 or fit.max_phase_error_rad > _LARGEST_PHASE_ERROR:
         return nothing("broadband-drive")
-    amplitude, phase, per_kick = _wandering(data, fit, noise)
+    amplitude, phase, per_kick = _fluctuations(data, fit, noise)
     if min(len(amplitude.weight), len(phase.weight)) < 5:
         return nothing("broadband-drive")
     if not (_may_walk(amplitude) and _may_walk(phase)):
-        # A term left out of the motion's law, or a tone: no random walk.
+        # A missing term of the law of motion, or a tone: not a random walk.
         return nothing("broadband-drive")
     p_value = max(amplitude.chance, phase.chance) ** 2
     both = Shapes(
@@ -79,12 +79,12 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     )
     size, sd, gain = _likelihood(both)
     less = min(_likelihood(amplitude)[2], _likelihood(phase)[2])
-    gain = min(gain, _BOTH * less) if p_value < _SHOWN else 0.0
+    gain = min(gain, _LARGEST_IMBALANCE * less) if p_value < _SUSPECT else 0.0
     return _described(data, fit, p_value, size / per_kick, sd / per_kick, gain)
 
 
-def _wandering(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, float]:
-    """The shapes in amplitude and in phase, and the variance of a kick for S_a = 1."""
+def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, float]:
+    """Return the shapes in amplitude and in phase, and the variance of a kick for S_a = 1."""
     sampled, time = fit.at.sampled, data.time_s
     edges = np.linspace(time[0], time[-1], _KICKS + 1)
     spacing = float(edges[1] - edges[0])
@@ -112,13 +112,13 @@ def _wandering(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, floa
 
 def _shapes(columns: FloatArray, residual: FloatArray) -> Shapes:
     weight, vectors = np.linalg.eigh(columns.T @ columns)
-    keep = weight > _SEEN * weight[-1]
+    keep = weight > _SMALLEST_EIGENVALUE * weight[-1]
     weight, vectors = weight[keep][::-1], vectors[:, keep][:, ::-1]
     return Shapes(weight, (vectors.T @ (columns.T @ residual)) ** 2 / weight)
 
 
 def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
-    """Variance of a kick, its standard deviation, and twice the gain in log-likelihood."""
+    """Return the variance of a kick, its error, and twice the gain in log-likelihood."""
     sizes = np.append(0.0, _SIZES) / shapes.weight.max()
     twice = _twice(shapes, sizes)
     best = int(np.argmin(twice))
@@ -132,9 +132,9 @@ def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
 
 
 def _may_walk(shapes: Shapes) -> bool:
-    """Whether what is there may be a random walk: no smoother, and alike at all scales."""
+    """Whether it may be a random walk: no smoother than one, and of one strength at all scales."""
     smoother = Shapes(shapes.weight**2, shapes.square)
-    if _likelihood(smoother)[2] > _likelihood(shapes)[2] + _SMOOTHER:
+    if _likelihood(smoother)[2] > _likelihood(shapes)[2] + _SMOOTH_GAIN:
         return False
     half = len(shapes.weight) // 2
     slow = Shapes(shapes.weight[:half], shapes.square[:half])
@@ -142,11 +142,11 @@ def _may_walk(shapes: Shapes) -> bool:
     logs, sds = [], []
     for part in (slow, fast):
         size, sd, gain = _likelihood(part)
-        if gain < _SMOOTHER:
+        if gain < _SMOOTH_GAIN:
             return True
         logs.append(math.log(size))
         sds.append(sd / size)
-    return abs(logs[0] - logs[1]) < math.log(_ALIKE) + 3.0 * math.hypot(*sds)
+    return abs(logs[0] - logs[1]) < math.log(_LARGEST_RATIO) + 3.0 * math.hypot(*sds)
 
 
 def _twice(shapes: Shapes, sizes: FloatArray) -> FloatArray:
@@ -173,6 +173,6 @@ def _described(
             (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
             frequency_hz=(omega / (2.0 * math.pi),),
         ),
-        summary="amplitude and phase wander as if a random torque shook the pendulum"
-        f" ({best:.2g} (rad/s^2)^2/Hz; it would keep an rms of {floor:.2g} {data.unit} alive)",
+        summary="amplitude and phase fluctuate as under a random torque"
+        f" ({best:.2g} (rad/s^2)^2/Hz; it would sustain {floor:.2g} {data.unit} rms)",
     )

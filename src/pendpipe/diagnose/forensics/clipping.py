@@ -1,4 +1,4 @@
-"""A range that ends below the motion."""
+"""Clipping: a range smaller than the motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pendpipe.analysis.distributions import log_normal_below
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.forensics.codes import Raw, place_of, raw_readings
+from pendpipe.diagnose.forensics.codes import Raw, nearest_datum, raw_readings
 from pendpipe.diagnose.forensics.finding import Finding, nothing
 from pendpipe.diagnose.forensics.lattice import (
     Lattice,
@@ -25,13 +25,13 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_FEWEST: Final = 2
-"""Readings at the very end of the range that make a flat top."""
-_SHARED: Final = 0.1
-"""Error in steps of the true angle that a window's readings share, where rounding is coarse."""
-_ROUNDED: Final = 0.5
-"""Rms in steps up to which errors may be alike because of rounding alone."""
-_MASKED: Final = 1e-2
+_FEWEST_AT_END: Final = 2
+"""Readings exactly at the end of the range that make a flat top."""
+_SHARED_ERROR: Final = 0.1
+"""Error in steps of the true angle that a window's readings share if rounding is coarse."""
+_ROUNDING_RMS: Final = 0.5
+"""Rms in steps up to which errors may be correlated by rounding alone."""
+_MASK_BELOW: Final = 1e-2
 
 Side = Literal["upper", "lower"]
 
@@ -42,7 +42,7 @@ class End(NamedTuple):
     side: Side
     level: float
     at: BoolArray
-    """Which readings are there; shape (m,) of `Raw`."""
+    """Readings at this end; shape (m,) of `Raw`."""
     p_value: float
     delta_chi2: float
 
@@ -50,13 +50,13 @@ class End(NamedTuple):
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the largest (smallest) reading is smaller than the motion's.
 
-    With the true angles x_j from the rest of each window (readings at the end itself have
-    no say), the chance that no reading passes the level m is
+    With the true angles x_j from the rest of each window (without readings at the end), the
+    probability that no reading exceeds the level m is
 
         p = product over j of Phi((m + q/2 - x_j)/sigma_j),
 
-    the distribution of the largest reading. It counts only where two readings or more
-    are the very same, as at the end of a converter's range.
+    the distribution of the largest reading. It is tested only if two readings or more are
+    equal, as at the end of a converter's range.
     """
     if data.time_noise or samples.counts or data.used < 60:
         return nothing("clipping")
@@ -65,14 +65,14 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     sides: tuple[Side, Side] = ("upper", "lower")
     ends = [_end(raw, lattice, side, noise.memory) for side in sides]
     p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))
-    clipped = [end for end in ends if end.p_value < _MASKED]
+    clipped = [end for end in ends if end.p_value < _MASK_BELOW]
     if not clipped:
-        return Finding("clipping", p_value, summary="the largest readings are as the motion's")
+        return Finding("clipping", p_value, summary="the largest readings agree with the motion")
     return _described(data, fit, samples, lattice, clipped, p_value)
 
 
 def _at_end(raw: Raw, slack: float, sign: float) -> BoolArray:
-    """Readings at the very end of what was read."""
+    """Return the readings at the end of the observed range."""
     level = float((sign * raw.values[raw.used]).max())
     return np.asarray(raw.used & (sign * raw.values >= level - slack))
 
@@ -83,11 +83,11 @@ def _end(raw: Raw, lattice: Lattice | None, side: Side, memory: float) -> End:
     slack = 0.5 * step if step else 1e-9 * float(np.ptp(raw.values[raw.used]))
     at, other = _at_end(raw, slack, sign), _at_end(raw, slack, -sign)
     level = float((sign * raw.values[at]).max())
-    if np.count_nonzero(at) < _FEWEST:
+    if np.count_nonzero(at) < _FEWEST_AT_END:
         return End(side, sign * level, at, 1.0, 0.0)
     local = local_residual(raw.phase, raw.residual, raw.used, leave_out=at | other)
-    if local.smooth(memory) and local.rms > _ROUNDED * step:
-        # A misfit of the motion is left: what it should have reached is not known.
+    if local.smooth(memory) and local.rms > _ROUNDING_RMS * step:
+        # The motion is not fitted well enough: its true extremes are unknown.
         return End(side, sign * level, at, 1.0, 0.0)
     true = sign * (raw.values - local.left)
     before = _noise(local, step)
@@ -103,14 +103,14 @@ def _noise(local: Local, step: float) -> float:
 
 
 def _common(before: float, step: float) -> float:
-    """Error of the true angle that rounding leaves, common to readings at one level."""
+    """Error of the true angle due to rounding, common to readings of one code."""
     if not step:
         return 0.0
-    return _SHARED * step * math.exp(-2.0 * math.pi**2 * min((before / step) ** 2, 30.0))
+    return _SHARED_ERROR * step * math.exp(-2.0 * math.pi**2 * min((before / step) ** 2, 30.0))
 
 
 def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
-    """Chance that no reading goes beyond, its common error averaged over."""
+    """Probability that no reading goes beyond, averaged over the common error."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
     shifted = (room[:, None] + common * nodes) / spread[:, None]
     chance = np.exp(np.sum(log_normal_below(shifted), axis=0))
@@ -118,12 +118,12 @@ def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
 
 
 def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tuple[int, BoolArray]:
-    """How many samples stand at the ends, and which of the data hold some; shape (n,)."""
+    """Return how many samples are at the ends, and which readings contain some; shape (n,)."""
     part = whole_readings(data, samples)
     if part is None:
         inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
         index = np.flatnonzero(inside)
-        place = place_of(data, samples.time_s[index])
+        place = nearest_datum(data, samples.time_s[index])
     else:
         index, place = np.arange(part.start, part.stop), np.arange(len(data))
     clipped = np.zeros(len(index), dtype=bool)
@@ -171,6 +171,6 @@ def _described(
             adc_codes=tuple(codes),
         ),
         mask=mask,
-        summary=f"{number} readings stand at the {sides} end of the range ({levels}"
-        f" {data.unit}), which the motion passes, until {when[-1]:.4g} s",
+        summary=f"{number} readings lie at the {sides} end of the range ({levels}"
+        f" {data.unit}), which the motion exceeds, until {when[-1]:.4g} s",
     )

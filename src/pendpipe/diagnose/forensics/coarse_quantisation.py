@@ -1,4 +1,4 @@
-"""A step that rules: the readings' errors follow their place between two codes."""
+"""Coarse quantisation: the errors depend on the angle's position between two codes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_WELL_BELOW: Final = 0.25
-"""Noise before rounding, in steps, above which the step does not rule."""
-_WHOLE: Final = 1e-9
-"""Part of the converter's step by which a spacing of whole bits may seem to be off."""
-_RANDOM: Final = 20.0
-"""Amplitude in steps above which rounding errors are as good as random."""
+_HARMLESS_NOISE: Final = 0.25
+"""Noise before rounding, in steps, above which rounding is harmless."""
+_WHOLE_WITHIN: Final = 1e-9
+"""Tolerance of a spacing of whole bits, over the converter's step."""
+_RANDOM_AMPLITUDE: Final = 20.0
+"""Amplitude in steps above which rounding errors are effectively random."""
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Test whether the errors follow the angle's place between two codes.
+    """Test whether the errors depend on the angle's position between two codes.
 
     Rounding an angle x with noise s to steps q shifts the mean reading by
 
         (q/pi) sum over m of (-1)^m exp(-2 (pi m s/q)^2) sin(2 pi m x/q)/m,
 
-    which is nothing from s = q/2 on. The size of its first term is measured by the errors'
-    inner product with it, and held against what a noise of a quarter step would leave: the
-    null is any noise above that. Where the amplitude stays above twenty steps the errors are
-    pseudo-random, do the fit no harm, and are a property of the record.
+    which vanishes from s = q/2 on. The size of its first term is the errors' inner product with
+    it; the null is any noise above a quarter step. If the amplitude stays above twenty steps, the
+    errors are pseudo-random and do no harm: a property of the record.
 
-    Where the codes that come are several of the converter's steps apart, its lowest bits do not
-    move, or something before it has a coarser step, and nothing need be measured.
+    If the observed codes are several of the converter's steps apart, its lowest bits are dead or
+    an earlier stage has a coarser step, and no estimate is needed.
     """
     if samples.promised_step is not None:
         return _dead_bits(data, fit, samples)
@@ -49,7 +48,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     error = coded.error - coded.error.mean()
     size = float(wave @ error) / float(wave @ wave)
     sd = math.sqrt(float(np.mean(error**2)) / float(wave @ wave))
-    allowed = math.exp(-2.0 * (math.pi * _WELL_BELOW) ** 2) / math.pi
+    allowed = math.exp(-2.0 * (math.pi * _HARMLESS_NOISE) ** 2) / math.pi
     p_value = 0.5 * math.erfc((size - allowed) / sd / math.sqrt(2.0))
     step, end = coded.lattice.step, float(fit.at.sampled.amplitude[-1])
     amplitude = fit.at.sampled.amplitude
@@ -67,25 +66,25 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
             (float(amplitude.min()), float(amplitude.max())),
         ),
         summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
-        f" that errors follow the codes; the amplitude ends at {end / step:.2g} steps",
-        kind="fault" if end < _RANDOM * step else "property",
+        f" that errors depend on the codes; the final amplitude is {end / step:.2g} steps",
+        kind="fault" if end < _RANDOM_AMPLITUDE * step else "property",
     )
 
 
 def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
-    """Codes that all lie on a coarser lattice; by chance one more would be with 1/times.
+    """Report codes that all lie on a coarser lattice; by chance each would with 1/times.
 
-    With a noise of more than half the converter's step every code is as likely as its
-    neighbours, so that each reading tells ln(times) of likelihood. A lattice's place is read
-    off the codes themselves, and its spacing too where that is no whole number.
+    With noise above half the converter's step every code is as probable as its neighbours, so
+    that each reading contributes ln(times) to the log-likelihood. The lattice's origin is
+    estimated from the codes, and so is its spacing if that is not a whole number.
     """
     assert samples.step is not None
     assert samples.promised_step is not None
     times = samples.step / samples.promised_step
-    whole = abs(times - round(times)) < _WHOLE
+    whole = abs(times - round(times)) < _WHOLE_WITHIN
     free = len(np.unique(samples.values)) - (1 if whole else 2)
     amplitude = fit.at.sampled.amplitude
-    steps = f"the step is {samples.step:.3g} {data.unit}, where the converter's bits promise"
+    steps = f"the step is {samples.step:.3g} {data.unit}, but the converter's bits give"
     steps += f" {samples.promised_step:.3g}"
     parameters = {
         "step": Estimate(samples.step, 0.0, data.unit),
@@ -102,8 +101,8 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
             (float(data.time_s[0]), float(data.time_s[-1])),
             (float(amplitude.min()), float(amplitude.max())),
         ),
-        summary=f"only one code in {times:.0f} comes: {steps}"
+        summary=f"only one code in {times:.0f} occurs: {steps}"
         if whole
-        else f"the codes that come are {times:.4g} apart, rounded to whole ones: {steps}",
+        else f"the codes that occur are {times:.4g} apart, rounded to whole ones: {steps}",
         also=("missing-codes",) if whole and round(times) == 2 else (),
     )

@@ -1,4 +1,4 @@
-"""Codes of the converter beside the angles that the motion must have had."""
+"""Codes of the converter, and the angles that the motion had."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from pendpipe.diagnose.forensics.local import error_of, local_residual
 from pendpipe.diagnose.refine import Fit
 from pendpipe.dynamics.sampling import lagrange
 
-_MOST: Final = 12000
-"""Readings that are looked at: of more, every second, third, ..."""
-_MISFIT: Final = 0.15
-"""Misfit of the model in steps from which the angles are taken from the readings' windows."""
+_MOST_READINGS: Final = 12000
+"""Largest number of readings used: of more, every second, third, ..."""
+_GOOD_MODEL: Final = 0.15
+"""Misfit of the model in steps from which the angles come from local fits."""
 
 
 @dataclass(frozen=True)
 class Coded:
-    """Readings as codes; only those that count, and far-off ones left out.
+    """Readings as codes, without masked and outlying ones.
 
     Parameters
     ----------
     lattice
-        Step and origin (its codes are those of all readings).
+        Step and origin (with the codes of all readings).
     code
         Of each reading, shape (m,).
     position
@@ -44,7 +44,7 @@ class Coded:
     ratio
         Noise before rounding, in steps.
     index
-        Which reading of the samples each is; shape (m,).
+        Index among the samples; shape (m,).
     """
 
     lattice: Lattice
@@ -62,16 +62,16 @@ class Coded:
 
 @dataclass(frozen=True)
 class Raw:
-    """Readings as they were taken, where the data may be means of several; shape (m,).
+    """Original readings, where the data may be means of several; shape (m,).
 
     Parameters
     ----------
     values, residual, phase, used
-        Readings, readings less model, the motion's phase, and which count.
+        Readings, readings minus model, phase of the motion, and whether each counts.
     index
-        Which of the samples each is.
-    place
-        Which of the data each belongs to.
+        Index among the samples.
+    datum
+        Index of the datum to which each belongs.
     """
 
     values: FloatArray
@@ -79,11 +79,11 @@ class Raw:
     phase: FloatArray
     used: BoolArray
     index: IntArray
-    place: IntArray
+    datum: IntArray
 
 
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
-    """Take the readings behind the data; of very many every second, third, ..."""
+    """Return the original readings of the data; of very many every second, third, ..."""
     sampled, reading = fit.at.sampled, fit.at.reading
     part = whole_readings(data, samples)
     if part is not None:
@@ -98,7 +98,7 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
         )
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
     last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
-    index = np.arange(first, last, max(1, (last - first) // _MOST))
+    index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
     when, values = samples.time_s[index], samples.values[index]
     return Raw(
         values,
@@ -106,21 +106,21 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
         np.interp(when, data.time_s, sampled.phase),
         np.interp(when, data.time_s, data.weight) > 0.99,
         index,
-        place_of(data, when),
+        nearest_datum(data, when),
     )
 
 
-def place_of(data: Data, time_s: FloatArray) -> IntArray:
-    """Which of the data lies nearest to each time."""
+def nearest_datum(data: Data, time_s: FloatArray) -> IntArray:
+    """Return the index of the datum nearest to each time."""
     middle = 0.5 * (data.time_s[1:] + data.time_s[:-1])
     return np.asarray(np.searchsorted(middle, time_s))
 
 
 def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
-    """Set codes and angles side by side; None where the readings have no step.
+    """Return codes and angles; None if the readings have no step.
 
-    The angles are the fitted model's while it is good to a small part of a step, else the
-    local fit's to the readings themselves.
+    The angles are those of the model if it fits to a small part of a step, else those of local
+    fits to the readings.
     """
     if samples.counts or samples.step is None:
         return None
@@ -136,7 +136,7 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     misfit = math.sqrt(max(taken - noise, 0.0)) / step
     good = used & (np.abs(local.scaled) < 6.0)
     ratio = noise_before_rounding(local, step) / step
-    if misfit < _MISFIT:
+    if misfit < _GOOD_MODEL:
         true, blur = values - residual, min(0.5 * misfit, 0.05)
     else:
         true = values - local.left
@@ -146,7 +146,7 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
 
 
 def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:
-    """Polynomials through six neighbouring values each."""
+    """Interpolate by polynomials through six neighbouring values."""
     first = np.clip(np.searchsorted(time, when) - 3, 0, len(time) - 6)
     weights = lagrange(time, first, when)
     near = np.stack([values[first + point] for point in range(len(weights))])

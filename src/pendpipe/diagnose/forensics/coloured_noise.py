@@ -1,4 +1,4 @@
-"""Noise whose density about the pendulum's frequency is not the mean one."""
+"""Coloured noise: a density near the pendulum's frequency that differs from the mean."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_MATTERS: Final = 1.5
-"""Ratio of densities below which a colour changes no conclusion."""
-_WIDTH: Final = 0.15
-"""Of the frequency: what is left out about each harmonic, where a misfit may lie."""
+_HARMLESS_RATIO: Final = 1.5
+"""Ratio of densities below which the colour changes no conclusion."""
+_HARMONIC_HALF_WIDTH: Final = 0.15
+"""Half width left out about each harmonic, over the frequency: a misfit may lie there."""
 _HARMONICS: Final = 7
-_LOW: Final = 0.1
-"""Of the frequency: slower noise is a drift, which every model of the noise allows for."""
-_NEAR: Final = (0.3, 3.0)
-_HANN: Final = 35.0 / 18.0
-"""Neighbouring lines of a Hann window's spectrum that count as one."""
+_LOWEST: Final = 0.1
+"""Lowest frequency used, over the motion's: slower noise is a drift, allowed for elsewhere."""
+_NEAR_BAND: Final = (0.3, 3.0)
+_LINES_PER_HANN: Final = 35.0 / 18.0
+"""Lines of a Hann window's spectrum per independent line."""
 
 
 class Spectrum(NamedTuple):
@@ -38,29 +38,29 @@ class Spectrum(NamedTuple):
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Test whether the density near the pendulum's frequency is 1.5 times the mean, or less.
+    """Test whether the density near the pendulum's frequency differs from the mean by over 1.5.
 
     ln(S_near/S_mean) from a Hann-windowed spectrum, bands about the harmonics left out; its
     error is that of means of exponentially distributed lines. The null is composite: any
-    ratio between 1/1.5 and 1.5. Noise that is red only below a tenth of the frequency is a
-    nuisance and no finding.
+    ratio between 1/1.5 and 1.5. Noise that is red only below a tenth of the frequency is not
+    reported.
     """
     if not data.uniform or data.time_noise or data.used < 200:
         return nothing("coloured-noise")
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
     spectrum = _spectrum(data, residual_of(data, fit), frequency_hz)
-    lines = np.count_nonzero(spectrum.near) / _HANN
-    others = np.count_nonzero(~spectrum.near) / _HANN
+    lines = np.count_nonzero(spectrum.near) / _LINES_PER_HANN
+    others = np.count_nonzero(~spectrum.near) / _LINES_PER_HANN
     if lines < 10.0 or others < 10.0:
         return nothing("coloured-noise")
     near, rest = _mean(spectrum.power[spectrum.near]), _mean(spectrum.power[~spectrum.near])
     share = lines / (lines + others)
     whole = share * near + (1.0 - share) * rest
     log_ratio = math.log(near / whole)
-    # Of near/(share near + rest): the part that near has in the whole takes error off.
+    # The lines near the frequency are part of the mean, which reduces the error.
     part = 1.0 - share * near / whole
     sd = part * math.sqrt(1.0 / lines + 1.0 / others)
-    score = (abs(log_ratio) - math.log(_MATTERS)) / max(sd, 1e-9)
+    score = (abs(log_ratio) - math.log(_HARMLESS_RATIO)) / max(sd, 1e-9)
     p_value = 0.5 * math.erfc(score / math.sqrt(2.0))
     ratio = math.exp(log_ratio)
     gain = 2.0 * (lines + others) * math.log(whole)
@@ -78,7 +78,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         parameters,
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
-            frequency_hz=(_NEAR[0] * frequency_hz, _NEAR[1] * frequency_hz),
+            frequency_hz=(_NEAR_BAND[0] * frequency_hz, _NEAR_BAND[1] * frequency_hz),
         ),
         summary=f"the noise about the pendulum's frequency is {max(ratio, 1.0 / ratio):.2g} times"
         f" {word} in power than on average: it is coloured (power as f^{-slope:.2g} there)",
@@ -90,17 +90,17 @@ def _spectrum(data: Data, residual: FloatArray, frequency_hz: float) -> Spectrum
     window = 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
     power = np.asarray(np.abs(np.fft.rfft(residual * window)) ** 2, dtype=np.float64)
     frequency: FloatArray = np.asarray(np.fft.rfftfreq(count, data.interval_s), dtype=np.float64)
-    kept = (frequency > _LOW * frequency_hz) & (frequency > 0.05)
+    kept = (frequency > _LOWEST * frequency_hz) & (frequency > 0.05)
     kept &= np.arange(len(frequency)) < len(frequency) - 2
     for harmonic in range(1, _HARMONICS + 1):
-        kept &= np.abs(frequency - harmonic * frequency_hz) > _WIDTH * frequency_hz
+        kept &= np.abs(frequency - harmonic * frequency_hz) > _HARMONIC_HALF_WIDTH * frequency_hz
     frequency, power = frequency[kept], power[kept]
-    near = (frequency > _NEAR[0] * frequency_hz) & (frequency < _NEAR[1] * frequency_hz)
+    near = (frequency > _NEAR_BAND[0] * frequency_hz) & (frequency < _NEAR_BAND[1] * frequency_hz)
     return Spectrum(frequency, power, near)
 
 
 def _mean(power: FloatArray) -> float:
-    """Mean of exponentially distributed lines, tones and the like taken down."""
+    """Mean of exponentially distributed lines, clipped against tones."""
     mean = float(np.median(power)) / math.log(2.0)
     for _ in range(4):
         mean = float(np.mean(np.minimum(power, 8.0 * mean)))
@@ -114,4 +114,4 @@ def _slope(spectrum: Spectrum) -> tuple[float, float]:
     x = x - x.mean()
     size = float(x @ x)
     # ln of an exponential number has the variance pi^2/6.
-    return -float(x @ y) / size, math.pi / math.sqrt(6.0 * size / _HANN)
+    return -float(x @ y) / size, math.pi / math.sqrt(6.0 * size / _LINES_PER_HANN)

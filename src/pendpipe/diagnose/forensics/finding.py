@@ -1,4 +1,4 @@
-"""What a test of the measurement says."""
+"""The result of a test of the measurement."""
 
 from __future__ import annotations
 
@@ -13,34 +13,32 @@ from pendpipe.estimate import Estimate
 
 @dataclass(frozen=True)
 class Finding:
-    """The outcome of one test, whether it found anything or not.
+    """The result of one test, whether it found anything or not.
 
     Parameters
     ----------
     identifier
         Of the effect.
     p_value
-        How often chance alone does as well in this test, its own look-elsewhere included;
-        uniform under the null, or larger.
+        Probability that chance alone does as well in this test, its own trials included;
+        uniform for the null, or larger.
     delta_chi2
         Twice the gain in log-likelihood.
     parameters
-        What was measured.
+        Measured quantities.
     location
-        Where.
+        Where it shows.
     mask
         Readings to leave out, shape (n,); None for none.
-    variance
-        Factor by which each reading's variance is larger, shape (n,); None for 1.
     time_s
-        Better times of the readings, shape (n,); None where the stamps are as good.
+        Better times of the readings, shape (n,); None if the time stamps are as good.
     summary
-        One clause of English.
+        One clause.
     kind
-        ``"fault"``: counts as missing physics where it is significant. ``"property"``: said
-        and repaired, and nothing that a model could have left out (a gap in the stamps).
+        ``"fault"``: reported as an effect if it is significant. ``"property"``: reported as a
+        property of the record that does no harm.
     also
-        Identifiers of what would have given the very same codes.
+        Identifiers of effects that would give exactly the same codes.
     """
 
     identifier: str
@@ -49,7 +47,6 @@ class Finding:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     location: Location = field(default_factory=Location)
     mask: BoolArray | None = None
-    variance: FloatArray | None = None
     time_s: FloatArray | None = None
     summary: str = ""
     kind: Literal["fault", "property"] = "fault"
@@ -57,5 +54,5 @@ class Finding:
 
 
 def nothing(identifier: str) -> Finding:
-    """Where a test can't be made, or has nothing to look at."""
-    return Finding(identifier, 1.0, summary="nothing to be seen")
+    """Return the result of a test that can't be made."""
+    return Finding(identifier, 1.0, summary="not tested")

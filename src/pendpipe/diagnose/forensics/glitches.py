@@ -1,4 +1,4 @@
-"""Single readings that are wrong."""
+"""Glitches: single wrong readings."""
 
 from __future__ import annotations
 
@@ -25,33 +25,33 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
-_SURELY: Final = 4.5
-_LARGE: Final = 3.0
-_SHARED: Final = 0.35
-"""Part of an error that its neighbours may have as well, if it is to be one reading's own."""
+_GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
+_CERTAIN_SD: Final = 4.5
+_LARGE_SD: Final = 3.0
+_SHARED_ERROR: Final = 0.35
+"""Largest part of an error that its neighbours may share if it belongs to a single reading."""
 _ROUNDS: Final = 4
-_NEAR: Final = 4
+_NEIGHBOURS: Final = 4
 _BLOCK: Final = 50
 _MOST_ROUNDS: Final = 20
-_FAR_OFF: Final = 8.0
+_FAR_SD: Final = 8.0
 _WINDOW_RAD: Final = 4.0 * math.pi
-_NO_CHANCE: Final = 1e-3
-_EXPECTED: Final = 0.05
-"""A reading is left out where chance would make fewer than this in the whole record."""
+_NOT_RANDOM: Final = 1e-3
+_EXPECTED_BY_CHANCE: Final = 0.05
+"""A reading is left out if chance would give fewer than this in the whole record."""
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Look for readings that neither normal nor heavy-tailed noise explains.
+    """Test for readings that neither normal nor heavy-tailed noise explains.
 
     Each error is compared with its window and its neighbours. For k = 1, 2, 3, 5, 10 ... the
-    noise's tail (Student's distribution, its nu averaged over what the record allows) is
-    fitted with the k largest unknown, and the k-th largest of n judged by it:
+    tail of the noise (Student's distribution, averaged over the posterior of nu) is fitted with
+    the k largest errors censored, and the k-th largest of n is tested:
 
         p_k = P(at least k of n beyond the k-th largest).
 
-    The smallest p_k, half of the chance given to k = 1, is the test. Readings that fall
-    behind at the very ends of the motion are left to what bends the ends.
+    The test uses the smallest p_k, with half of the probability given to k = 1. Readings that
+    are too small at the extremes of the motion are left to the tests for saturation.
     """
     if data.used < 60:
         return nothing("glitches")
@@ -60,14 +60,14 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     error = own_error(local)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
     ordered = np.sort(error[used])
-    p_value, tail = _smallest(ordered, step), _others(ordered, step)
+    p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
     mask = np.zeros(len(data), dtype=bool)
     size = np.zeros(len(data))
     for _ in range(_ROUNDS):
-        beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED)
-        beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED
+        beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
+        beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED_BY_CHANCE
         if smeared:
-            # The filter spreads a wrong reading over its neighbours: the largest goes first.
+            # The filter spreads a wrong reading over its neighbours: take the largest first.
             beyond &= error == _largest_about(error)
         if not beyond.any():
             break
@@ -80,19 +80,19 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
         mask &= ~ends
-        p_value = _smallest(np.sort(error[used & ~ends]), step)
-    if not mask.any() or p_value > _EXPECTED:
-        quiet = "no reading stands out of the noise"
-        return Finding("glitches", max(p_value, _EXPECTED), summary=quiet)
+        p_value = _smallest_p_value(np.sort(error[used & ~ends]), step)
+    if not mask.any() or p_value > _EXPECTED_BY_CHANCE:
+        quiet = "no reading exceeds the noise"
+        return Finding("glitches", max(p_value, _EXPECTED_BY_CHANCE), summary=quiet)
     return _described(data, fit, residual, size, mask, p_value, tail)
 
 
 def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Look for single readings far off, where the model itself is far off.
+    """Test for single wrong readings where the model itself is wrong.
 
-    No model is needed for that: the readings are freed, window by window, of what is smooth
-    from cycle to cycle. Only what is eight standard deviations off counts, and only where no
-    neighbour is off as well: lost samples, a jump, or a corner of the motion displace several.
+    This needs no model: the smooth motion is subtracted window by window. Only deviations of eight
+    standard deviations count, and only without deviating neighbours: lost samples, a jump or a
+    corner of the motion displace several readings.
     """
     if data.used < 60 or data.time_noise:
         return nothing("glitches")
@@ -100,15 +100,15 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     values = data.values - float(np.median(data.values[used]))
     mask = np.zeros(len(data), dtype=bool)
     for _ in range(_MOST_ROUNDS):
-        # A wrong reading bends its window: the largest goes first.
+        # A wrong reading biases its window: take the largest first.
         local = local_residual(phase, values, used, leave_out=mask)
         error = np.where(mask | ~used, 0.0, np.abs(local.scaled))
-        beyond = (error > _FAR_OFF) & (error == _largest_about(error))
+        beyond = (error > _FAR_SD) & (error == _largest_about(error))
         if not beyond.any():
             break
         mask |= beyond
-    single = mask & (_largest_beside(np.abs(local.scaled)) < _LARGE)
-    # What displaces several bends its window, and makes further ones seem wrong.
+    single = mask & (_largest_beside(np.abs(local.scaled)) < _LARGE_SD)
+    # Several displaced readings bias their window, so that others there seem wrong.
     bent = phase[mask & ~single]
     single[single] = [np.all(np.abs(bent - at) > _WINDOW_RAD) for at in phase[single]]
     single &= ~bent_ends(values - local.left, local.scaled, single, used)
@@ -116,23 +116,23 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
         return nothing("glitches")
     ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
     step = _rounding_in(data, local.rms)
-    p_value, tail = _smallest(ordered, step), _others(ordered, step)
+    p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
     return _described(data, fit, values, local.scaled, single, p_value, tail)
 
 
 def _largest_beside(error: FloatArray) -> FloatArray:
-    """The largest of each reading's neighbours, two to each side."""
+    """Return the largest of each reading's neighbours, two on each side."""
     left = np.pad(error, (2, 0))
     right = np.pad(error, (0, 2))
     return np.asarray(np.max([left[:-2], left[1:-1], right[1:-1], right[2:]], axis=0))
 
 
 def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolArray) -> BoolArray:
-    """Which wrong readings lie so near an end of the motion that no chance put them there.
+    """Return which wrong readings lie too near an extreme of the motion to be random.
 
-    Of m readings at random places, k or more would all lie above a level, beyond which there
-    is the part f of all readings, with at most C(m, k) f^k. A sensor that saturates makes
-    its errors there, and inwards.
+    Of m readings at random, k or more all lie above a threshold exceeded by the fraction f of all
+    readings with a probability of at most C(m, k) f^k. A saturating sensor makes its errors
+    there, and towards the middle.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolAr
         chances = [
             math.comb(int(np.count_nonzero(mask)), k) * part**k for k, part in enumerate(share, 1)
         ]
-        if chances and min(chances) < _NO_CHANCE:
+        if chances and min(chances) < _NOT_RANDOM:
             found[wrong[: int(np.argmin(chances)) + 1]] = True
     return found
 
@@ -157,10 +157,10 @@ def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolAr
 def _errors(
     data: Data, fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray
 ) -> tuple[Local, bool]:
-    """Each reading's error, and whether a filter has spread it over its neighbours.
+    """Return each reading's error, and whether a filter has spread it over its neighbours.
 
-    Where a misfit of the motion is left in the windows, each reading is compared with the
-    cubic through its four neighbours instead.
+    If a misfit of the motion remains in the windows, each reading is compared with the cubic
+    through its four neighbours instead.
     """
     phase = fit.at.sampled.phase
     rest = np.where(out, 0.0, residual)
@@ -170,12 +170,12 @@ def _errors(
     filled = np.interp(phase, phase[~out], residual[~out])
     padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")
     between = (4.0 * (padded[1:-3] + padded[3:-1]) - padded[:-4] - padded[4:]) / 6.0
-    error = (filled - between) / _unrest(filled - between)
+    error = (filled - between) / _local_scale(filled - between)
     return local_residual(phase, np.where(out, 0.0, error), ~out), True
 
 
-def _unrest(error: FloatArray) -> FloatArray:
-    """Usual |error| about each reading, where a misfit makes it differ along the record."""
+def _local_scale(error: FloatArray) -> FloatArray:
+    """Return the local median of |error|, which a misfit makes vary along the record."""
     count = max(len(error) // _BLOCK, 1)
     ends = np.linspace(0, len(error), count + 1).astype(np.int64)
     usual = [np.median(np.abs(error[i:j])) for i, j in pairwise(ends)]
@@ -184,36 +184,38 @@ def _unrest(error: FloatArray) -> FloatArray:
 
 
 def own_error(local: Local) -> FloatArray:
-    """|error| of each reading in standard deviations, less what its neighbours share."""
+    """Return |error| in standard deviations, less the part that neighbours share."""
     scaled = local.scaled
     around = np.zeros(len(scaled))
     around[1:-1] = 0.5 * (scaled[:-2] + scaled[2:])
     around[0], around[-1] = scaled[1], scaled[-2]
-    # Only where it matters: the bulk of the errors must stay as the noise made them.
-    shared = (np.abs(around) > _SHARED * np.abs(scaled)) & (np.abs(scaled) > _LARGE)
+    # Only for large errors: the distribution of the others must not change.
+    shared = (np.abs(around) > _SHARED_ERROR * np.abs(scaled)) & (np.abs(scaled) > _LARGE_SD)
     alone = np.abs(scaled - around) * math.sqrt(2.0 / 3.0)
     return np.asarray(np.where(shared, np.minimum(np.abs(scaled), alone), np.abs(scaled)))
 
 
 def _largest_about(error: FloatArray) -> FloatArray:
-    """The largest of each reading and its neighbours."""
-    padded = np.pad(error, _NEAR)
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1).max(axis=1))
+    """Return the largest of each reading and its neighbours."""
+    padded = np.pad(error, _NEIGHBOURS)
+    return np.asarray(
+        np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1).max(axis=1)
+    )
 
 
 def _rounding_in(data: Data, error_rms: float) -> float:
-    """The readings' step in standard deviations of an error; means of readings round less."""
+    """Return the step in standard deviations of an error (smaller for means of readings)."""
     return data.step / math.sqrt(data.fold) / error_rms
 
 
-def _smallest(sorted_error: FloatArray, step: float) -> float:
-    """The p-value over all numbers of glitches."""
+def _smallest_p_value(sorted_error: FloatArray, step: float) -> float:
+    """Return the p-value over all numbers of glitches."""
     count = len(sorted_error)
-    numbers = [k for k in _NUMBERS if k <= count // 30]
+    numbers = [k for k in _GLITCH_NUMBERS if k <= count // 30]
     best = 1.0
     for k in numbers:
-        if sorted_error[count - k] < _LARGE:
-            break  # so many are no larger than noise is
+        if sorted_error[count - k] < _LARGE_SD:
+            break  # not larger than noise
         tail = fit_tail(sorted_error, k, step=step)
         chance = float(tail.beyond(sorted_error[count - k]))
         p_value = binomial_at_least(k, count, min(chance, 1.0))
@@ -222,9 +224,9 @@ def _smallest(sorted_error: FloatArray, step: float) -> float:
     return best
 
 
-def _others(sorted_error: FloatArray, step: float) -> Tail:
-    """The noise's tail where the largest errors are glitches."""
-    foreign = int(np.count_nonzero(sorted_error > _SURELY))
+def _noise_tail(sorted_error: FloatArray, step: float) -> Tail:
+    """Fit the tail of the noise where the largest errors are glitches."""
+    foreign = int(np.count_nonzero(sorted_error > _CERTAIN_SD))
     most = min(max(foreign, 1), len(sorted_error) // 10)
     return fit_tail(sorted_error, most, foreign=True, step=step)
 
@@ -266,7 +268,9 @@ def _described(
             f" by up to {abs(reading[largest]):.3g} {data.unit}"
         )
     if tail.inverse_freedom > 0.03:
-        summary += f" (the other readings' tails: Student, nu = {1.0 / tail.inverse_freedom:.2g})"
+        summary += (
+            f" (the noise of the others has Student tails, nu = {1.0 / tail.inverse_freedom:.2g})"
+        )
     return Finding(
         "glitches",
         p_value,

@@ -1,4 +1,4 @@
-"""Readings taken at uncertain moments: noise that follows the speed."""
+"""Jitter: uncertain sampling times, and so noise proportional to the speed."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.numerics import tail_of_squares
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, rounded
 
-_FAR: Final = 3.0
-"""Standard deviations beyond which an error counts as if it were only that large."""
-_STEADY: Final = 1e-3
-"""Relative scatter of v^2's mean over a cycle below which it is the same all along."""
-_AGREE: Final = 2.6
-"""Standard deviations by which the part at twice the frequency may fall short."""
+_CLIP_SD: Final = 3.0
+"""Standard deviations at which errors are clipped."""
+_CONSTANT: Final = 1e-3
+"""Relative variation of the mean of v^2 over a cycle below which it counts as constant."""
+_AGREE_SD: Final = 2.6
+"""Standard deviations by which the part at twice the frequency may be too small."""
 _DITHERED: Final = 0.7
-"""Noise before rounding, in steps, from which rounding is part of the noise."""
+"""Noise before rounding, in steps, from which rounding simply adds to the noise."""
 _ROUNDS: Final = 6
-_STEP: Final = 0.05
-_BLURRED: Final = 0.15
-"""Error of the angles in steps above which rounding's errors are not known."""
+_RELATIVE_STEP: Final = 0.05
+_LARGEST_BLUR: Final = 0.15
+"""Error of the angles in steps above which the rounding errors are unknown."""
 
 
 class Squares(NamedTuple):
@@ -40,21 +40,20 @@ class Squares(NamedTuple):
     Parameters
     ----------
     square
-        In units of the usual variance `unit`.
+        In units of the variance `unit`.
     expected, variance
-        What they are, and vary by, without jitter.
+        Their mean and variance without jitter.
     gain
-        By how much `expected` grows with the variance before rounding (1 where dithered).
+        Derivative of `expected` by the variance before rounding (1 where dithered).
     mean, double
-        The parts of v^2 that follow the amplitude, (omega A)^2/2, and twice the frequency,
-        -(omega A)^2 cos(2 psi)/2; in units of `speed`.
+        The parts of v^2 that vary with the amplitude, (omega A)^2/2, and at twice the
+        frequency, -(omega A)^2 cos(2 psi)/2; in units of `speed`.
     unit
         Variance of one reading, rad^2.
     speed
         Mean of v^2, (rad/s)^2.
     shared
-        Part of the freedom that the local fits have taken: by it fewer squares are
-        independent.
+        Part of the degrees of freedom used by the local fits.
     """
 
     square: FloatArray
@@ -69,18 +68,18 @@ class Squares(NamedTuple):
 
     @property
     def inverse(self) -> FloatArray:
-        """Weight of each square; those that rounding fixes are not believed exactly."""
+        """Weight of each square, limited for those that rounding fixes."""
         return 1.0 / np.maximum(self.variance, 0.05 * float(np.mean(self.variance)))
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
 
-    The score for sigma_t^2 at zero is a weighted sum of squared errors, the weights v^2 less
-    their mean; its chance is that of a weighted sum of squares, stretched where tails are
-    heavier than normal. Where the step is not dithered, each square is compared with what
-    rounding makes of it at that angle. The part of v^2 at twice the frequency must say the
-    same as the whole, or it alone counts: a noise that dies with the amplitude is no jitter.
+    The score for sigma_t^2 at zero is a sum of squared errors, weighted by v^2 minus its mean; its
+    p-value is that of a weighted sum of squares, scaled for heavier tails than normal. If
+    rounding is not dithered, each square is compared with its expectation at that angle. The part
+    of v^2 at twice the frequency must agree with the whole, or it alone counts: noise that decays
+    with the amplitude is not jitter.
     """
     if data.time_noise or data.used < 60:
         return nothing("jitter")
@@ -91,18 +90,18 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         squares = _dithered(data, fit, noise)
     if squares is None or len(squares.square) < 50:
         return nothing("jitter")
-    p_value = _chance(squares, squares.mean + squares.double)
-    # Where the amplitude hardly falls, the mean of v^2 can't be told from the level of the noise.
-    if float(np.std(squares.mean)) > _STEADY * float(np.mean(squares.mean)):
+    p_value = _p_value(squares, squares.mean + squares.double)
+    # At constant amplitude the mean of v^2 can't be distinguished from the variance of the noise.
+    if float(np.std(squares.mean)) > _CONSTANT * float(np.mean(squares.mean)):
         size, covariance = _fitted(squares, [squares.mean, squares.double])
         spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
-        if size[2] - size[1] < -_AGREE * spread:
-            p_value = max(p_value, _chance(squares, squares.double, beside=squares.mean))
+        if size[2] - size[1] < -_AGREE_SD * spread:
+            p_value = max(p_value, _p_value(squares, squares.double, beside=squares.mean))
     return _described(data, fit, squares, p_value)
 
 
 def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
-    """Squares of normal errors; None where a misfit of the motion is left in them."""
+    """Return squares of normal errors; None if a misfit of the motion remains in them."""
     sampled, used = fit.at.sampled, data.weight > 0.0
     residual = residual_of(data, fit)
     white = whitened_in_time(residual, noise)
@@ -118,19 +117,19 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
 
 
 def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
-    """Squares of errors that are rounding's at that angle; None where that is not known well."""
+    """Return squares of rounding errors; None if the angles are not known well enough."""
     part = whole_readings(data, samples)
-    if part is None or coded.blur > _BLURRED:
+    if part is None or coded.blur > _LARGEST_BLUR:
         return None
     index = coded.index - part.start
-    # At rest within a step the errors are all the same: they say nothing of noise.
+    # At rest within a step all errors are equal: they contain no information on noise.
     moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
     if np.count_nonzero(moving) < 50:
         moving[:] = True
     place = coded.position[moving] - np.round(coded.position[moving])
     before = math.hypot(coded.ratio, coded.blur)
     expected, variance = rounding_moments(place, before)
-    more, less = (1.0 + _STEP) * before, (1.0 - _STEP) * before
+    more, less = (1.0 + _RELATIVE_STEP) * before, (1.0 - _RELATIVE_STEP) * before
     gain = rounding_moments(place, more)[0] - rounding_moments(place, less)[0]
     gain /= more**2 - less**2
     square = coded.error[moving] ** 2
@@ -157,11 +156,11 @@ def _speeds(fit: Fit, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
     return top / speed, double / speed, speed
 
 
-def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
-    """Chance of a weighted sum of squares as large, the noise's own level unknown."""
-    capped = np.minimum(squares.square, _FAR**2 * squares.expected.mean())
+def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
+    """Return the probability of a weighted sum as large, the variance of the noise unknown."""
+    capped = np.minimum(squares.square, _CLIP_SD**2 * squares.expected.mean())
     columns = [squares.gain] if beside is None else [squares.gain, squares.gain * beside]
-    # What the level (and what stands beside) can do is taken off, by least squares.
+    # Project out the variance (and `beside`), by least squares.
     basis, inverse = np.stack(columns, axis=1), squares.inverse
     wanted = squares.gain * weight
     solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * wanted))
@@ -170,7 +169,7 @@ def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = No
     level = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
     off = off - level * squares.gain
     weights = rest * squares.expected
-    # How much wider or narrower than independent squares of normal numbers.
+    # Scatter relative to independent squares of normal numbers.
     share = (
         float(np.mean(off**2 * squares.inverse))
         / float(np.mean(squares.variance * squares.inverse))
@@ -184,7 +183,7 @@ def _chance(squares: Squares, weight: FloatArray, beside: FloatArray | None = No
 
 
 def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Fit what adds to the variance: a level, and parts; sizes and their covariance."""
+    """Fit a constant and parts to the variance; return sizes and their covariance."""
     columns = squares.gain[:, None] * np.stack([np.ones(len(squares.gain)), *parts], axis=1)
     size = np.zeros(columns.shape[1])
     matrix: FloatArray = np.eye(columns.shape[1])
@@ -209,11 +208,10 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
     share = max(float(size[1]), 0.0)
     seconds = math.sqrt(share * to_seconds)
     sd = math.sqrt(covariance[1, 1])
-    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the square root's own size.
+    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the size of the square root itself.
     error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
     sampled = fit.at.sampled
     omega = sampled.motion.angular_frequency
-    factor = 1.0 + share / max(1.0 + float(size[0]), 0.1) * sampled.velocity**2 / squares.speed
     return Finding(
         "jitter",
         p_value,
@@ -225,7 +223,6 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
             (0.25 * math.pi, 0.75 * math.pi),
             (omega / math.pi,),
         ),
-        variance=factor,
-        summary=f"the noise is largest where the motion is fastest, as if the moments of"
-        f" reading were uncertain by {seconds:.2g} s",
+        summary="the noise is largest where the motion is fastest, as if the sampling times"
+        f" were uncertain by {rounded(seconds, error, 's')}",
     )

@@ -1,4 +1,4 @@
-"""The converter's codes, and how rounding to them distributes a reading."""
+"""The lattice of a converter's codes, and the distribution of rounded readings."""
 
 from __future__ import annotations
 
@@ -15,23 +15,38 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.forensics.local import Local
 
-_RATIOS: Final = (0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56)
-"""Noise before rounding, in steps."""
-_PLAINLY: Final = 0.6
-"""Rms of the readings' errors in steps, from which rounding is plainly dithered."""
-_LOOK: Final = 256
-_LEVELS: Final = 16
-"""Different codes from which chance (2^-16 at most) puts no more on a coarser lattice."""
+_NOISE_RATIOS: Final = (
+    0.03,
+    0.05,
+    0.07,
+    0.1,
+    0.13,
+    0.16,
+    0.2,
+    0.24,
+    0.28,
+    0.33,
+    0.38,
+    0.44,
+    0.5,
+    0.56,
+)
+"""Noise before rounding, in steps, at which the likelihood is computed."""
+_DITHERED: Final = 0.6
+"""Rms of the errors in steps from which rounding is dithered."""
+_FIRST_CODES: Final = 256
+_FEWEST_CODES: Final = 16
+"""Number of different codes that lie on a coarser lattice by chance with 2^-16 at most."""
 _ROUNDS: Final = 4
-_OFF: Final = 0.05
-"""Part of a step by which readings may be off their codes."""
-_ROUNDED: Final = 0.6
-"""Steps of the converter by which it moves a coarser step's readings: half of one, and a bit."""
+_TOLERANCE: Final = 0.05
+"""Tolerance of readings about their codes, in steps."""
+_LARGEST_ROUNDING: Final = 0.6
+"""Largest rounding of a coarser step's readings, in steps of the converter (half, and a margin)."""
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """Readings as whole multiples of a step.
+    """Readings as integer multiples of a step.
 
     Parameters
     ----------
@@ -52,10 +67,12 @@ class Lattice:
         return np.asarray((value - self.origin) / self.step)
 
 
-def find_lattice(values: FloatArray, step: float | None, slack: float = _OFF) -> Lattice | None:
-    """Number the codes of readings; None where they lie on no lattice, but for a `slack`.
+def find_lattice(
+    values: FloatArray, step: float | None, slack: float = _TOLERANCE
+) -> Lattice | None:
+    """Number the codes of readings; None if they lie on no lattice within a tolerance `slack`.
 
-    The step is refined over the whole range, so that codes far from zero are counted right.
+    The step is refined over the whole range, so that codes far from zero are numbered right.
     """
     if step is None or not step > 0.0:
         return None
@@ -78,31 +95,31 @@ def find_lattice(values: FloatArray, step: float | None, slack: float = _OFF) ->
 def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
     """Number the codes of a recording's readings (or some of them), as `find_lattice`.
 
-    A coarser step that something has before the converter is rounded to the converter's own.
+    The coarser step of an earlier stage is rounded to the converter's own.
     """
     if samples.step is None or samples.promised_step is None:
         return find_lattice(values, samples.step)
-    rounded = _ROUNDED * samples.promised_step / samples.step
-    return find_lattice(values, samples.step, max(rounded, _OFF))
+    rounded = _LARGEST_ROUNDING * samples.promised_step / samples.step
+    return find_lattice(values, samples.step, max(rounded, _TOLERANCE))
 
 
 def with_true_step(samples: Samples) -> Samples:
-    """Take the step of the codes that come, where it is larger than the converter's.
+    """Use the step of the observed codes if it is larger than the converter's.
 
-    A converter whose lowest k bits do not move gives every 2^k-th code: its step is 2^k
-    times what its bits promise. Where something before it has a step of its own, of any size,
-    the codes that come are that step's multiples, each rounded to the nearest code.
+    A converter with k dead bits gives every 2^k-th code: its step is 2^k times its nominal one.
+    If an earlier stage has a step of its own, of any size, the observed codes are multiples of
+    it, each rounded to the nearest code.
     """
     if samples.counts or samples.step is None:
         return samples
     codes = (samples.values - samples.values[0]) / samples.step
     whole = np.rint(codes)
-    if np.max(np.abs(codes[:_LOOK] - whole[:_LOOK])) > _OFF:
+    if np.max(np.abs(codes[:_FIRST_CODES] - whole[:_FIRST_CODES])) > _TOLERANCE:
         return samples
-    if np.diff(np.unique(whole[:_LOOK])).min(initial=np.inf) < 2.0:
+    if np.diff(np.unique(whole[:_FIRST_CODES])).min(initial=np.inf) < 2.0:
         return samples
     levels = np.unique(whole)
-    times = spacing_of(levels) if len(levels) >= _LEVELS else None
+    times = spacing_of(levels) if len(levels) >= _FEWEST_CODES else None
     if times is None:
         return samples
     step = times * samples.step
@@ -111,18 +128,18 @@ def with_true_step(samples: Samples) -> Samples:
 
 
 def spacing_of(levels: FloatArray) -> float | None:
-    """How many steps the codes that come lie apart; None where they may lie anywhere.
+    """Return the spacing of the observed codes in steps; None if they have none.
 
     Parameters
     ----------
     levels
-        Codes (whole numbers) that came, rising.
+        Observed codes (whole numbers), rising.
 
     Returns
     -------
     float or None
-        Whole where all codes are its multiples (from one of them on); else the spacing of a
-        lattice of which they are the roundings.
+        Whole if all codes are its multiples (from one of them on); else the spacing of a lattice
+        of which they are the roundings.
     """
     gaps = np.diff(levels)
     if len(gaps) < 2 or gaps.min() < 2.0:
@@ -130,24 +147,24 @@ def spacing_of(levels: FloatArray) -> float | None:
     common = int(np.gcd.reduce(gaps.astype(np.int64)))
     if common > 1:
         return float(common)
-    # One spacing between neighbours, rounded down or up; further on two, three, ...
+    # Neighbours are one spacing apart, rounded down or up; others two, three, ...
     spacing = float(np.mean(gaps[gaps <= 1.5 * gaps.min()]))
     number = np.append(0.0, np.cumsum(np.round(gaps / spacing)))
     for _ in range(_ROUNDS):
         centred = number - number.mean()
         spacing = float(centred @ levels / (centred @ centred))
         off = levels - spacing * number
-        if float(np.ptp(off)) < 2.0 * _ROUNDED:
+        if float(np.ptp(off)) < 2.0 * _LARGEST_ROUNDING:
             return spacing
-        # A gap may have been counted wrong: the line through all of them counts better.
+        # A gap may have been counted wrong: recount by the line through all of them.
         number = np.round((levels - off.mean()) / spacing)
     return None
 
 
 def whole_readings(data: Data, samples: Samples) -> slice | None:
-    """Find which of the samples the data are; None where they are means of several.
+    """Return the samples that the data are; None if the data are means of several.
 
-    They have the samples' times, or, where the clock has been mended, their values.
+    They have the samples' times, or their values if the times have been corrected.
     """
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
     part = slice(first, first + len(data))
@@ -160,20 +177,20 @@ def whole_readings(data: Data, samples: Samples) -> slice | None:
 
 
 def noise_before_rounding(local: Local, step: float) -> float:
-    """Maximum likelihood of the noise that was there before rounding, from P(code).
+    """Estimate the noise before rounding by maximum likelihood, from P(code).
 
-    The likelihood is that of `analysis.fit.rounding`, but here the true angle is no model's:
-    it is drawn through the neighbours, whose own noise it carries. So each reading has a
-    spread of its own, and those that are no noise at all (glitches) have no say.
+    The likelihood is that of `analysis.fit.rounding`, but the true angle comes from local fits and
+    has their noise. So each reading has its own standard deviation, and outliers (glitches) are
+    left out.
 
     Parameters
     ----------
     local
-        Readings less what is smooth; the smooth part stands for the true angle.
+        Readings minus their smooth part, which is taken as the true angle.
     step
         Of the readings.
     """
-    if local.rms > _PLAINLY * step:
+    if local.rms > _DITHERED * step:
         # Rounding is dithered: variances add.
         return math.sqrt(local.rms**2 - step**2 / 12.0)
     left = local.left[local.used] / step
@@ -181,7 +198,7 @@ def noise_before_rounding(local: Local, step: float) -> float:
     left = left[near]
     extra = np.maximum(local.leverage[local.used][near], -0.9)
     best, most = 0.0, -np.inf
-    for ratio in _RATIOS:
+    for ratio in _NOISE_RATIOS:
         spread = ratio * np.sqrt(1.0 + extra)
         chance = normal_below((left + 0.5) / spread) - normal_below((left - 0.5) / spread)
         likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
@@ -191,12 +208,12 @@ def noise_before_rounding(local: Local, step: float) -> float:
 
 
 def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
-    """Mean square, and its variance, of what rounding and noise add to a value.
+    """Return mean and variance of the squared error due to rounding and noise.
 
     Parameters
     ----------
     fraction
-        The value's place between codes, in steps: 0 at a code; shape (n,).
+        Position of the value between codes, in steps: 0 at a code; shape (n,).
     ratio
         Noise before rounding, in steps.
 

@@ -1,9 +1,9 @@
-"""What is left of the readings when all that is smooth from cycle to cycle is taken off.
+"""Local residuals: the readings minus everything that varies smoothly from cycle to cycle.
 
-The tests of the measurement come before the physics is complete. So they look at what no
-motion of the pendulum, however wrong its model, could do: in windows of a few cycles the
-residual is freed of a level and of the fundamental, both quadratures, with their slopes (and
-of the second and third harmonic where these are there).
+The tests of the measurement run before the physics is complete. They use what no motion of the
+pendulum can produce, however wrong its model: in windows of a few cycles an offset and both
+quadratures of the fundamental with their slopes are fitted and subtracted (and the second and
+third harmonic where these are significant).
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from pendpipe.diagnose.numerics import cosines, from_cosines
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.unwrapped import unwrapped
 
-_CYCLES: Final = 2
-_READINGS: Final = 40
-_FAR: Final = 5.0
-"""Standard deviations beyond which a reading has no say in its window's fit."""
-_SMOOTH: Final = 0.1
-"""Correlation of neighbouring errors that noise may have."""
-_ROUGH: Final = 5.0
-"""Standard deviations by which the harmonics must be there to be taken off."""
+_WINDOW_CYCLES: Final = 2
+_WINDOW_READINGS: Final = 40
+_OUTLIER_SD: Final = 5.0
+"""Standard deviations beyond which a reading is left out of its window's fit."""
+_CHANCE_CORRELATION: Final = 0.1
+"""Correlation of neighbouring errors that noise may have by chance."""
+_HARMONICS_SD: Final = 5.0
+"""Standard deviations at which the harmonics are significant."""
 
 
 @dataclass(frozen=True)
 class Local:
-    """Readings less all that is smooth.
+    """Readings minus their smooth part.
 
     Parameters
     ----------
     left
-        What is left, shape (n,); 0 where a reading is masked.
+        The difference, shape (n,); 0 where a reading is masked.
     rms
         Standard deviation of one reading's noise, in the unit of `left`.
     leverage
-        ``left`` has the variance rms^2 (1 + leverage); negative where the reading itself
-        took part in the fit. Shape (n,).
+        ``left`` has the variance rms^2 (1 + leverage); negative where the reading took part in
+        the fit. Shape (n,).
     used
         Which readings count; shape (n,).
     """
@@ -59,7 +59,7 @@ class Local:
         return np.asarray(self.rms * np.sqrt(np.maximum(1.0 + self.leverage, 0.05)))
 
     def smooth(self, memory: float = 0.0) -> bool:
-        """Say whether what is left is smoother than the noise, so that it is a misfit.
+        """Return whether it is smoother than the noise, and so contains a misfit.
 
         `memory` is the correlation of neighbouring errors that the noise is known to have.
         """
@@ -67,7 +67,7 @@ class Local:
         scaled = np.where(fitted, np.clip(self.scaled, -4.0, 4.0), 0.0)
         size = float(scaled @ scaled)
         correlation = float(scaled[1:] @ scaled[:-1]) / max(size, 1e-300)
-        return correlation > 1.2 * max(memory, 0.0) + _SMOOTH + 4.0 / math.sqrt(
+        return correlation > 1.2 * max(memory, 0.0) + _CHANCE_CORRELATION + 4.0 / math.sqrt(
             max(int(np.count_nonzero(self.used)), 1)
         )
 
@@ -78,25 +78,25 @@ class Local:
 
 
 def residual_of(data: Data, fit: Fit) -> FloatArray:
-    """Readings minus model, along the motion where they are out of phase; 0 where masked."""
+    """Return readings minus model, along the motion if out of phase; 0 where masked."""
     return np.asarray(unwrapped(data, fit.at)[0] * (data.weight > 0.0))
 
 
 def error_of(data: Data, fit: Fit) -> FloatArray:
-    """Readings minus the motion itself, the rounding's error with them; 0 where masked.
+    """Return readings minus the motion, rounding errors included; 0 where masked.
 
-    What rounds a reading is bounded by half a step, and is reckoned with by whoever asks for
-    codes or tails: taking its mean off first (`Data.residual`) would move a reading on the other
-    side of a code's edge by a whole step, and the motion to the middle of the code.
+    The tests of codes and tails treat rounding errors themselves. Subtracting their mean first
+    (`Data.residual`) would move a reading beyond a code's edge by a whole step, and the motion to
+    the middle of the code.
     """
     return residual_of(replace(data, lattice=None), fit)
 
 
 def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
-    """S^-1 r in units of its own standard deviation: noise of any colour made comparable.
+    """Return S^-1 r in units of its standard deviation, for noise of any colour.
 
-    That is the best estimate of one reading's error from all the others (unit variance).
-    White noise is only divided by its standard deviation.
+    This compares each reading with its best prediction from all others (unit variance). White
+    noise is simply divided by its standard deviation.
     """
     if not noise.uniform:
         return np.asarray(residual / np.sqrt(noise.variance))
@@ -115,7 +115,7 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
 def local_residual(
     phase: FloatArray, values: FloatArray, used: BoolArray, *, leave_out: BoolArray | None = None
 ) -> Local:
-    """Take what is smooth off a residual.
+    """Subtract the smooth part of a residual.
 
     Parameters
     ----------
@@ -132,30 +132,30 @@ def local_residual(
     window = _windows(phase)
     columns = _columns(phase, window, harmonics=1)
     local = _fitted(columns, window, values, part, used)
-    far = np.abs(local.scaled) > _FAR
+    far = np.abs(local.scaled) > _OUTLIER_SD
     if far.any():
         local = _fitted(columns, window, values, part & ~far, used)
-    if _harmonics_are_there(phase, window, local, part & ~far):
+    if _has_harmonics(phase, window, local, part & ~far):
         columns = _columns(phase, window, harmonics=3)
         local = _fitted(columns, window, values, part & ~far, used)
-        again = np.abs(local.scaled) > _FAR
+        again = np.abs(local.scaled) > _OUTLIER_SD
         if np.any(again != far):
             local = _fitted(columns, window, values, part & ~again, used)
     return local
 
 
 def _windows(phase: FloatArray) -> IntArray:
-    """Number of the window of each reading: whole cycles, with readings enough."""
+    """Return each reading's window: whole cycles, with enough readings."""
     turns = (phase[-1] - phase[0]) / (2.0 * math.pi)
-    cycles = max(_CYCLES, math.ceil(_READINGS * turns / len(phase)))
+    cycles = max(_WINDOW_CYCLES, math.ceil(_WINDOW_READINGS * turns / len(phase)))
     number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles)).astype(np.int64)
-    # A rest at the end joins the window before it.
+    # An incomplete window at the end joins the one before.
     last = max(int(turns / cycles + 0.25), 1) - 1
     return np.asarray(np.minimum(number, last))
 
 
 def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
-    """What is smooth: level, fundamental and its slope, further harmonics; shape (n, p)."""
+    """Return the smooth functions: offset, fundamental and its slope, harmonics; shape (n, p)."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
     ends = np.append(starts[1:], len(phase)) - 1
     middle = 0.5 * (phase[starts] + phase[ends])
@@ -176,7 +176,7 @@ def _fitted(
     kept = columns * part[:, None]
     size = columns.shape[1]
     matrix = np.add.reduceat(kept[:, :, None] * columns[:, None, :], starts)
-    # A window with few readings: what they can't tell apart stays small.
+    # Regularised for windows with few readings.
     matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
     right = np.add.reduceat(kept * values[:, None], starts)
     inverse = np.linalg.inv(matrix)
@@ -190,7 +190,7 @@ def _fitted(
 
 
 def _rms(left: FloatArray, freedom: float) -> float:
-    """Root mean square, with what is far off taken as only just far off."""
+    """Return the root mean square, with outliers clipped."""
     scale = math.sqrt(len(left) / freedom)
     rms = 1.4826 * float(np.median(np.abs(left))) * scale
     if rms == 0.0:
@@ -201,10 +201,8 @@ def _rms(left: FloatArray, freedom: float) -> float:
     return max(rms, 1e-300)
 
 
-def _harmonics_are_there(
-    phase: FloatArray, window: IntArray, local: Local, part: BoolArray
-) -> bool:
-    """Whether windows hold more of the second or third harmonic than noise would."""
+def _has_harmonics(phase: FloatArray, window: IntArray, local: Local, part: BoolArray) -> bool:
+    """Whether windows contain more of the second or third harmonic than noise would."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
     total, number = 0.0, 0
     for harmonic in (2, 3):
@@ -215,4 +213,4 @@ def _harmonics_are_there(
             good = norm > 4.0
             total += float(np.sum(np.minimum(size[good] ** 2 / norm[good] / local.rms**2, 50.0)))
             number += int(np.count_nonzero(good))
-    return total > number + _ROUGH * math.sqrt(2.0 * max(number, 1))
+    return total > number + _HARMONICS_SD * math.sqrt(2.0 * max(number, 1))

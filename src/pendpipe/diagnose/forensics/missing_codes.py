@@ -1,4 +1,4 @@
-"""Codes that the converter avoids, and bits that are stuck."""
+"""Missing codes of the converter, and stuck bits."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_LEAST: Final = 6.0
-"""Readings expected of a code, from which it is looked at."""
-_BITS: Final = 7
-_DOUBT: Final = 0.05
-"""Error in steps that the angles may have for all readings alike, beside their blur."""
-_FEW: Final = 1e-3
-_SHOWN: Final = 32
+_FEWEST_EXPECTED: Final = 6.0
+"""Expected readings of a code (or a residue) from which it is tested."""
+_MOST_BITS: Final = 7
+_COMMON_ERROR: Final = 0.05
+"""Common error of the angles in steps, beside their individual error."""
+_SIGNIFICANT: Final = 1e-3
+_MOST_LISTED: Final = 32
 
 
 class Occupation(NamedTuple):
-    """How often codes came, and should have come; shape (k,)."""
+    """Observed and expected numbers of codes; shape (k,)."""
 
     code: IntArray
     found: FloatArray
@@ -38,12 +38,12 @@ class Occupation(NamedTuple):
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Compare how often each code came with what motion and noise make of it.
+    """Compare how often each code occurs with what motion and noise predict.
 
-    Each code's number is held against Poisson's distribution about its expectation (readings
-    are spread less than that, so the chance is never underestimated), which may lie anywhere
-    within what a small common error of the angles allows. Single codes, whole bits, and codes
-    that are equal modulo a power of two are looked at; the chance counts how many.
+    Each number is tested against a Poisson distribution (readings scatter less, so the p-value is
+    never underestimated) whose mean may lie anywhere within a small common error of the angles.
+    Single codes, whole bits, and codes that are equal modulo a power of two are tested; the
+    p-value counts all of them.
     """
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 100:
@@ -52,23 +52,23 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     occupation = occupied(coded, expected)
     comb = worst_comb(coded.code, expected)
     chance = _chances(occupation)
-    looked = len(chance)
-    single = min(1.0, looked * float(chance.min())) if looked else 1.0
+    tested = len(chance)
+    single = min(1.0, tested * float(chance.min())) if tested else 1.0
     bit, bits = _stuck_bits(coded, expected)
     p_value = min(1.0, 3.0 * min(single, bits, comb.p_value))
     if p_value > 0.01:
-        return Finding("missing-codes", p_value, summary="codes come as often as they should")
+        return Finding("missing-codes", p_value, summary="codes occur as often as expected")
     if comb.p_value < min(single, bits):
         return _described_comb(data, coded, comb, p_value)
-    bad = np.minimum(chance * looked, 1.0) < _FEW
+    bad = np.minimum(chance * tested, 1.0) < _SIGNIFICANT
     return _described(data, coded, occupation, bad, bit if bits <= single else None, p_value)
 
 
 def _expectations(coded: Coded) -> FloatArray:
-    """How often each code is due, for angles too small, right and too large, (3, codes)."""
+    """Return expected numbers of each code for shifted and unshifted angles, (3, codes)."""
     first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
     spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
-    shift = _DOUBT + 2.0 * coded.blur
+    shift = _COMMON_ERROR + 2.0 * coded.blur
     size = last - first + 1
     return np.stack(
         [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
@@ -76,7 +76,7 @@ def _expectations(coded: Coded) -> FloatArray:
 
 
 def occupied(coded: Coded, expected: FloatArray) -> Occupation:
-    """Count each code beside how often it should have come."""
+    """Return observed and expected numbers of each code."""
     first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
     found = np.bincount(coded.code - first, minlength=last - first + 1).astype(np.float64)
     inside = slice(2, -2)
@@ -86,14 +86,14 @@ def occupied(coded: Coded, expected: FloatArray) -> Occupation:
 
 
 def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
-    """Sum over readings of P(code), by a fine histogram of the angles."""
+    """Sum P(code) over readings, by a fine histogram of the angles."""
     fine = 10 if spread < 1.0 else 4
     cells = np.bincount(
         np.clip(((position - first + 0.5) * fine).astype(np.int64), 0, size * fine - 1),
         minlength=size * fine,
     ).astype(np.float64)
     reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
-    # A code's expectation: its chance about its middle, summed over the cells.
+    # Expectation of a code: its probability about its middle, summed over the cells.
     offset = (np.arange(-reach, reach) + 0.5) / fine
     kernel = normal_below((offset + 0.5) / spread) - normal_below((offset - 0.5) / spread)
     length = 2 ** math.ceil(math.log2(len(cells) + 2 * reach))
@@ -103,36 +103,36 @@ def _expected(position: FloatArray, first: int, size: int, spread: float) -> Flo
 
 
 def _chances(occupation: Occupation) -> FloatArray:
-    """Two-sided chance of each code's number; shape (codes that are looked at,)."""
-    looked = occupation.low > _LEAST
+    """Return the two-sided p-value of each code's number; shape (k,)."""
+    tested = occupation.low > _FEWEST_EXPECTED
     found = occupation.found
     # P(N <= found) at the smallest expectation, P(N >= found) at the largest.
     fewer = poisson_up_to(found, occupation.low)
     more = poisson_from(found, occupation.high)
-    chance = np.where(looked, 2.0 * np.minimum(fewer, more), 1.0)
-    return np.asarray(np.minimum(chance, 1.0)) if looked.any() else np.zeros(0)
+    chance = np.where(tested, 2.0 * np.minimum(fewer, more), 1.0)
+    return np.asarray(np.minimum(chance, 1.0)) if tested.any() else np.zeros(0)
 
 
 def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[tuple[int, float], float]:
-    """The bit that is set far too often or seldom, and the chance of that.
+    """Return the bit that is set too often or too seldom, and its p-value.
 
-    Where code 0 of the converter lies is not known: a bit of weight 2^b splits the codes
-    into runs of 2^b, and every place of the runs is tried. What is due is worked out with the
-    noise: where the motion turns, many readings lie about one code.
+    The converter's code 0 is unknown: a bit of weight 2^b divides the codes into runs of 2^b, and
+    every origin of the runs is tried. Expectations include the noise: near a turning point many
+    readings lie about one code.
     """
     best, chance, tried = (0, 0.5), 1.0, 0
     span = int(np.ptp(coded.code))
     codes = np.arange(expected.shape[1]) + int(coded.code.min()) - 1
-    for bit in range(_BITS):
+    for bit in range(_MOST_BITS):
         run = 2**bit
         if 4 * run > span:
             break
         residue = np.bincount(coded.code % (2 * run), minlength=2 * run).astype(np.float64)
         found = _halves(residue, run)
-        due = np.stack([_halves(_residues(codes, row, run), run) for row in expected])
-        should = np.clip(found, due.min(axis=0), due.max(axis=0)).clip(0.05, 0.95)
+        predicted = np.stack([_halves(_residues(codes, row, run), run) for row in expected])
+        should = np.clip(found, predicted.min(axis=0), predicted.max(axis=0)).clip(0.05, 0.95)
         tried += 2 * run
-        # Neighbouring readings share their half: as if there were fewer.
+        # Neighbouring readings are in the same half, so that fewer are independent.
         effective = len(coded.code) / max(1.0, _in_a_half(coded, run))
         excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
         worst = int(np.argmax(excess))
@@ -143,18 +143,18 @@ def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[tuple[int, float], 
 
 
 def _residues(codes: IntArray, numbers: FloatArray, run: int) -> FloatArray:
-    """Sum numbers of codes over what is left when they are divided by two runs."""
+    """Sum numbers of codes by their residue modulo two runs."""
     return np.asarray(np.bincount(codes % (2 * run), numbers, 2 * run), dtype=np.float64)
 
 
 def _halves(residue: FloatArray, run: int) -> FloatArray:
-    """Share of the readings in each half of the residues, for each place of the half."""
+    """Return the share of readings in half of the residues, for each origin of the half."""
     ring = np.concatenate([[0.0], np.cumsum(np.tile(residue, 2))])
     return np.asarray((ring[run : 3 * run] - ring[: 2 * run]) / residue.sum())
 
 
 def _in_a_half(coded: Coded, run: int) -> float:
-    """How many readings in a row are in the same half."""
+    """Return the mean number of successive readings in the same half."""
     changes = int(np.count_nonzero(np.diff(np.floor(coded.position / run))))
     return len(coded.position) / max(changes, 1)
 
@@ -173,30 +173,34 @@ def _described(
     gain = 2.0 * float(np.sum(likely - found + expected))
     fewer = found < expected
     seldom = occupation.code[bad][fewer]
-    due, came = float(expected[fewer].sum()), float(found[fewer].sum())
+    predicted, came = float(expected[fewer].sum()), float(found[fewer].sum())
     readings = len(coded.code)
     parameters = {
-        "share": Estimate((due - came) / readings, math.sqrt(max(due, 1.0)) / readings, ""),
+        "share": Estimate(
+            (predicted - came) / readings, math.sqrt(max(predicted, 1.0)) / readings, ""
+        ),
         "number": Estimate(float(len(seldom)), 0.0, ""),
         "found": Estimate(came, math.sqrt(max(came, 1.0)), ""),
-        "expected": Estimate(due, 0.0, ""),
+        "expected": Estimate(predicted, 0.0, ""),
     }
     if bit is not None:
         parameters["bit"] = Estimate(float(bit[0]), 0.0, "")
         parameters["share"] = Estimate(0.5, 0.5 / math.sqrt(readings), "")
         gain = max(gain, -2.0 * math.log(max(p_value, 1e-300)))
-        summary = f"bit {bit[0]} of the converter is stuck or sticky: {100 * bit[1]:.0f} % of the"
+        summary = (
+            f"bit {bit[0]} of the converter is stuck or unreliable: {100 * bit[1]:.0f} % of the"
+        )
         summary += " readings lie in one half of its codes"
     else:
         named = ", ".join(str(code) for code in seldom[:5]) + (", ..." if len(seldom) > 5 else "")
-        summary = f"{len(seldom)} code(s) ({named}, in steps of {step:.4g} {data.unit}) came"
-        summary += f" {came:.0f} times where {due:.0f} were due"
+        summary = f"{len(seldom)} code(s) ({named}, in steps of {step:.4g} {data.unit}) occurred"
+        summary += f" {came:.0f} times where {predicted:.0f} were expected"
     return Finding(
         "missing-codes",
         p_value,
         gain,
         parameters,
-        Location(adc_codes=tuple(int(code) for code in seldom[:_SHOWN])),
+        Location(adc_codes=tuple(int(code) for code in seldom[:_MOST_LISTED])),
         summary=summary,
     )
 
@@ -205,22 +209,24 @@ def _described_comb(data: Data, coded: Coded, comb: Comb, p_value: float) -> Fin
     readings = len(coded.code)
     codes = np.arange(int(coded.code.min()), int(coded.code.max()) + 1)
     codes = codes[comb.holds(codes)]
-    due = max(comb.expected, 1.0)
+    predicted = max(comb.expected, 1.0)
     return Finding(
         "missing-codes",
         p_value,
         comb.gain,
         {
-            "share": Estimate((due - comb.found) / readings, math.sqrt(due) / readings, ""),
+            "share": Estimate(
+                (predicted - comb.found) / readings, math.sqrt(predicted) / readings, ""
+            ),
             "number": Estimate(float(len(codes)), 0.0, ""),
             "found": Estimate(comb.found, math.sqrt(max(comb.found, 1.0)), ""),
             "expected": Estimate(comb.expected, 0.0, ""),
             "period": Estimate(float(comb.period), 0.0, ""),
         },
-        Location(adc_codes=tuple(int(code) for code in codes[:_SHOWN])),
+        Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
         summary=f"every {comb.period}th code (from {codes[0]}, in steps of"
-        f" {coded.lattice.step:.4g} {data.unit}) came {comb.found:.0f} times where"
-        f" {comb.expected:.0f} were due",
+        f" {coded.lattice.step:.4g} {data.unit}) occurred {comb.found:.0f} times where"
+        f" {comb.expected:.0f} were expected",
     )
 
 
@@ -230,11 +236,11 @@ class Comb(NamedTuple):
     Parameters
     ----------
     period, residue
-        Which: code = residue (mod period).
+        Code = residue (mod period).
     found, expected
-        Readings that have them, and that should.
+        Observed and expected number of readings.
     p_value
-        All periods and residues that were looked at counted.
+        With all periods and residues that were tested.
     """
 
     period: int
@@ -244,7 +250,7 @@ class Comb(NamedTuple):
     p_value: float
 
     def holds(self, code: IntArray) -> BoolArray:
-        """Which codes are in it."""
+        """Return which codes belong to it."""
         return np.asarray(code % self.period == self.residue)
 
     @property
@@ -255,39 +261,39 @@ class Comb(NamedTuple):
 
 
 def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
-    """Pool the codes by their residues, and find the one that is the most improbable.
+    """Sum the codes by residue, and return the least probable residue.
 
-    A converter whose bit fails at one of its states loses every code of one residue modulo a
-    power of two. Each alone may be due too seldom to be missed; together they are not.
+    A converter with a faulty bit loses every code of one residue modulo a power of two. Each code
+    alone may be expected too seldom to be missed; together they are not.
 
     Parameters
     ----------
     code
         Of each reading.
     expected
-        How often each code from ``code.min() - 1`` on is due, a row for each error that all
-        angles may have in common; shape (errors, codes), the middle row without.
+        Expected number of each code from ``code.min() - 1`` on, a row for each common error of
+        the angles; shape (errors, codes), the middle row without error.
     """
     first, size = int(code.min()) - 1, expected.shape[1]
     codes = np.arange(first, first + size)
     best, tried = Comb(1, 0, 0.0, 0.0, 1.0), 0
-    for bit in range(1, _BITS + 1):
+    for bit in range(1, _MOST_BITS + 1):
         period = 2**bit
         if 2 * period > size - 2:
             break
-        due = np.stack([np.bincount(codes % period, row, period) for row in expected])
-        low, high = due.min(axis=0), due.max(axis=0)
+        predicted = np.stack([np.bincount(codes % period, row, period) for row in expected])
+        low, high = predicted.min(axis=0), predicted.max(axis=0)
         found = np.bincount(code % period, minlength=period).astype(np.float64)
-        looked = low > _LEAST
-        tried += int(np.count_nonzero(looked))
-        # What is within two sigma is by no count of residues improbable.
-        odd = looked & ((found < low - 2.0 * np.sqrt(low)) | (found > high + 2.0 * np.sqrt(high)))
+        tested = low > _FEWEST_EXPECTED
+        tried += int(np.count_nonzero(tested))
+        # Residues within two sigma are not improbable, whatever their number.
+        odd = tested & ((found < low - 2.0 * np.sqrt(low)) | (found > high + 2.0 * np.sqrt(high)))
         chance = np.ones(period)
         if odd.any():
             fewer, more = poisson_up_to(found[odd], low[odd]), poisson_from(found[odd], high[odd])
             chance[odd] = 2.0 * np.minimum(fewer, more)
         at = int(np.argmin(chance))
         if chance[at] < best.p_value:
-            middle = float(due[len(expected) // 2, at])
+            middle = float(predicted[len(expected) // 2, at])
             best = Comb(period, at, float(found[at]), middle, float(chance[at]))
     return best._replace(p_value=min(1.0, tried * best.p_value))

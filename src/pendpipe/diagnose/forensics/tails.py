@@ -1,4 +1,4 @@
-"""Tails of the noise: Student's distribution fitted to all but the largest errors."""
+"""Tails of the noise: Student's distribution, fitted to all but the largest errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.distributions import each, student_beyond
 from pendpipe.arrays import FloatArray
 
-_INVERSE_FREEDOM: Final = (
+_INVERSE_NU: Final = (
     1e-4,
     0.01,
     0.02,
@@ -26,31 +26,30 @@ _INVERSE_FREEDOM: Final = (
     0.42,
     0.55,
 )
-"""1/nu: from a normal distribution (but for 1 % of what is beyond 5 sigma) to tails as heavy
-as any."""
+"""1/nu: from a normal distribution (to 1 % at 5 sigma) to very heavy tails."""
 _BINS: Final = 200
 _COARSE_BINS: Final = 80
-"""Of errors that a step's width smooths."""
+"""Bins for errors smoothed by coarse rounding."""
 _ROUNDS: Final = 8
-_ROUNDED: Final = 1.0
-"""Step of the readings, in errors' standard deviations, up to which its square root of a twelfth
-is but a part of the scale."""
+_COARSE_STEP: Final = 1.0
+"""Step of the readings, in standard deviations of the errors, up to which rounding only widens
+the distribution."""
 _NODES: Final = 9
-"""Of the rounding error's distribution (Gauss and Legendre)."""
-_LEAST: Final = 0.05
-"""Part of the errors' variance that is the noise's before the rounding, at least, to begin with."""
+"""Gauss-Legendre nodes for the rounding error."""
+_LEAST_NOISE: Final = 0.05
+"""Least part of the variance that the noise before rounding has at the start."""
 
 
 @dataclass(frozen=True)
 class Tail:
-    """Distributions that the noise may have, with their weights.
+    """Possible distributions of the noise, with posterior weights.
 
     Parameters
     ----------
     freedom, scale, weight
         nu, the scale in the unit of the errors, and the posterior weight; shape (k,).
     step
-        Of the readings, in the same unit: rounding adds an error that is even over it.
+        Of the readings, in the same unit: rounding errors are uniform over it.
     """
 
     freedom: FloatArray
@@ -59,7 +58,7 @@ class Tail:
     step: float = 0.0
 
     def beyond(self, size: FloatArray) -> FloatArray:
-        """Return how often chance gives |error| > size, above half a step; shape of `size`."""
+        """Return P(|error| > size), for sizes above half a step; shape of `size`."""
         rounding, share = _rounding(self.step)
         ratio = (np.asarray(size)[..., None, None] - rounding[:, None]) / self.scale
         return np.asarray(share @ student_beyond(self.freedom, ratio) @ self.weight)
@@ -71,19 +70,19 @@ class Tail:
 
 
 def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False, step: float = 0.0) -> Tail:
-    """Fit Student's distribution, the `largest` errors counted but their sizes unknown.
+    """Fit Student's distribution with the `largest` errors censored.
 
-    Where readings are coarse the rounding's error, even over a step, is added to it: it
-    fills the bulk and leaves the tails, so that the bulk alone would promise thin ones.
+    For coarse readings the rounding error, uniform over a step, is added: it widens the bulk but
+    not the tails, so that the bulk alone would suggest thin tails.
 
     Parameters
     ----------
     size
         |errors|, sorted, shape (n,).
     largest
-        How many may be something else.
+        How many may be glitches.
     foreign
-        Whether they are: then not even their number says anything of the noise.
+        Whether they are glitches: then even their number contains no information on the noise.
     step
         Of the readings, in the unit of the errors.
     """
@@ -93,12 +92,12 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False, step: flo
     bins = _BINS if len(share) == 1 else _COARSE_BINS
     counts, edges = np.histogram(bulk, bins=bins, range=(0.0, edge))
     middle = 0.5 * (edges[1:] + edges[:-1])
-    freedom = 1.0 / np.array(_INVERSE_FREEDOM)[:, None]
-    # A reading beyond the edge counts as one on it: far more is unlikely.
+    freedom = 1.0 / np.array(_INVERSE_NU)[:, None]
+    # A reading beyond the edge counts as one at the edge.
     number = np.append(counts, 0 if foreign else largest)[None, :]
     squares = (np.append(middle, edge)[:, None] - rounding) ** 2
     usual = (1.4826 * float(np.median(size))) ** 2
-    first = math.sqrt(max(usual - float(share @ rounding**2), _LEAST * usual)) + 1e-300
+    first = math.sqrt(max(usual - float(share @ rounding**2), _LEAST_NOISE * usual)) + 1e-300
     scale = _scale(freedom, number, squares, share, first)
     density = np.log(np.maximum(_density(freedom, scale, squares[:-1]) @ share, 1e-300))
     likelihood = np.sum(counts * density, axis=1)
@@ -115,9 +114,9 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False, step: flo
 def _scale(
     freedom: FloatArray, number: FloatArray, squares: FloatArray, share: FloatArray, first: float
 ) -> FloatArray:
-    """The likeliest scale for each nu, shape (k, 1): expectation and maximisation.
+    """Return the maximum-likelihood scale for each nu, shape (k, 1), by the EM algorithm.
 
-    `squares` are those of the noise before each rounding, shape (bins, nodes).
+    `squares` are those of the noise before each rounding error, shape (bins, nodes).
     """
     scale = np.full((len(freedom), 1), first)
     for _ in range(_ROUNDS):
@@ -139,7 +138,7 @@ def _density(freedom: FloatArray, scale: FloatArray, squares: FloatArray) -> Flo
 
 def _rounding(step: float) -> tuple[FloatArray, FloatArray]:
     """Rounding errors and their shares, shape (nodes,)."""
-    if step < _ROUNDED:
+    if step < _COARSE_STEP:
         return np.zeros(1), np.ones(1)
     node, share = np.polynomial.legendre.leggauss(_NODES)
     return 0.5 * step * node, 0.5 * share
@@ -156,8 +155,8 @@ def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
 
 
 def _prior() -> FloatArray:
-    """Nine tenths for normal noise, the rest evenly over 1/nu."""
-    inverse = np.array(_INVERSE_FREEDOM)
+    """Return the prior: nine tenths for normal noise, the rest uniform in 1/nu."""
+    inverse = np.array(_INVERSE_NU)
     width = np.gradient(inverse)
     width[0] = 0.0
     return np.asarray(np.append(0.9, 0.1 * width[1:] / width[1:].sum()))

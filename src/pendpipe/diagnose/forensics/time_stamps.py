@@ -1,4 +1,4 @@
-"""Time stamps with gaps, or that are coarser or less even than the readings."""
+"""Time stamps with gaps, or less regular than the readings themselves."""
 
 from __future__ import annotations
 
@@ -17,68 +17,29 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
 from pendpipe.estimate import Estimate
 
-_EVEN: Final = 0.25
-"""Part of an interval within which stamps belong to an even clock."""
-_SEEN: Final = 1e-4
-"""Part of an interval from which stamps are uneven at all."""
-_GAP: Final = 1.5
-"""Intervals (half periods for an encoder's counts) from which it is a gap."""
+_LARGEST_DEVIATION: Final = 0.25
+"""Largest deviation from a regular clock, in intervals."""
+_IRREGULAR: Final = 1e-4
+"""Deviation in intervals from which time stamps count as irregular."""
+_GAP_LENGTH: Final = 1.5
+"""Length of a gap, in intervals (half periods for an encoder's counts)."""
 
 
 class Stamps(NamedTuple):
-    """Stamps against an even clock; shape (n,)."""
+    """Time stamps and a regular clock; shape (n,)."""
 
     even_s: FloatArray
     off_s: FloatArray
     interval_s: float
 
 
-def find_gaps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Say where the stamps show that samples are missing.
-
-    That is no fault of the motion, and needs no repair: the model is read at the stamps
-    that there are.
-    """
-    inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
-    time = samples.time_s[inside]
-    gaps = _gaps(time, math.pi / fit.at.sampled.motion.angular_frequency, samples.counts)
-    if not gaps.any():
-        return Finding("dropped-samples", 1.0, summary="the stamps have no gap", kind="property")
-    intervals = np.diff(time)
-    usual = float(np.median(intervals))
-    missing = intervals[gaps] - usual
-    longest = int(np.argmax(missing))
-    begin, end = time[:-1][gaps], time[1:][gaps]
-    number = int(np.count_nonzero(gaps))
-    parameters = {
-        "gaps": Estimate(float(number), 0.0, ""),
-        "longest": Estimate(float(intervals[gaps][longest]), 0.0, "s"),
-        "missing_time": Estimate(float(missing.sum()), 0.0, "s"),
-    }
-    if not samples.counts:
-        parameters["missing_samples"] = Estimate(float(np.round(missing / usual).sum()), 0.0, "")
-    amplitude = np.interp(begin, data.time_s, fit.at.sampled.amplitude)
-    return Finding(
-        "dropped-samples",
-        0.0,
-        0.0,
-        parameters,
-        Location(
-            (float(begin[0]), float(end[-1])), (float(amplitude.min()), float(amplitude.max()))
-        ),
-        summary=f"{number} gap(s) in the time stamps, the longest of"
-        f" {intervals[gaps][longest]:.4g} s at {begin[longest]:.5g} s",
-        kind="property",
-    )
-
-
 def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
-    """Say in a line where stamps leave a gap; None where they don't.
+    """Describe the gaps of the time stamps in one line; None if there are none.
 
     Parameters
     ----------
     time_s
-        All stamps of a recording, whether the motion there is analysed or not.
+        All time stamps of a recording, whether the motion there is analysed or not.
     half_period_s
         Of the motion.
     counts
@@ -91,34 +52,34 @@ def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | No
     longest = int(np.argmax(lasts))
     first = float(time_s[found[longest]])
     many = "a gap" if len(found) == 1 else f"{len(found)} gaps, the longest"
-    note = f"the time stamps have {many} of {lasts[longest]:.4g} s behind {first:.5g} s"
+    note = f"the time stamps have {many} of {lasts[longest]:.4g} s after {first:.5g} s"
     return f"{note} (an encoder that writes its counts is silent at rest)" if counts else note
 
 
 def _gaps(time: FloatArray, half_period_s: float, counts: bool) -> BoolArray:
     intervals = np.diff(time)
     if counts:
-        return np.asarray(intervals > _GAP * half_period_s)
+        return np.asarray(intervals > _GAP_LENGTH * half_period_s)
     usual = float(np.percentile(intervals, 90))
     if usual > 1.2 * float(np.percentile(intervals, 10)):
-        # A clock that runs unevenly by itself.
+        # An irregular clock.
         return np.asarray(intervals > max(4.0 * usual, 0.5 * half_period_s))
-    return np.asarray(intervals > _GAP * usual)
+    return np.asarray(intervals > _GAP_LENGTH * usual)
 
 
-def find_uneven(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
-    """Test whether the readings are evener in time than their stamps.
+def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test whether the readings were taken more regularly than their time stamps say.
 
-    Stamps that are rounded, or written late, differ by d_j from an even clock. Were the
-    readings taken by the clock, the residual would hold -v d_j:
+    Time stamps that are rounded or written late differ by d_j from a regular clock. If the
+    readings were taken by that clock, the residual contains -v d_j:
 
         r_j = -k v_j d_j + noise,
 
-    k = 1 for false stamps, 0 for true ones. The score is that of k; the even times are
-    handed back where they are the better ones.
+    with k = 1 for wrong time stamps and 0 for true ones. The regular times are returned if they
+    are better.
     """
     identifier = "time-stamps"
-    stamps = None if data.time_noise else against_even_clock(data.time_s)
+    stamps = None if data.time_noise else regular_clock(data.time_s)
     if stamps is None or data.used < 60:
         return nothing(identifier)
     sampled, used = fit.at.sampled, data.weight > 0.0
@@ -146,13 +107,13 @@ def find_uneven(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
             (0.25 * math.pi, 0.75 * math.pi),
         ),
         time_s=stamps.even_s if share > 3.0 * sd and share > 0.5 else None,
-        summary=f"the time stamps are uneven by {rms:.2g} s and the readings are not: they were"
+        summary=f"the time stamps are irregular by {rms:.2g} s and the readings are not: they were"
         f" taken every {stamps.interval_s:.6g} s",
     )
 
 
-def against_even_clock(time_s: FloatArray) -> Stamps | None:
-    """Lay an even clock through stamps; None where there is none, or no difference."""
+def regular_clock(time_s: FloatArray) -> Stamps | None:
+    """Fit a regular clock to time stamps; None if there is none, or no difference."""
     intervals = np.diff(time_s)
     usual = float(np.median(intervals))
     if usual <= 0.0:
@@ -164,6 +125,9 @@ def against_even_clock(time_s: FloatArray) -> Stamps | None:
     if np.any(np.diff(number) < 1.0):
         return None
     off = time_s - (start + slope * number)
-    if float(np.mean(np.abs(off) > _EVEN * slope)) > 0.05 or float(np.std(off)) < _SEEN * slope:
+    if (
+        float(np.mean(np.abs(off) > _LARGEST_DEVIATION * slope)) > 0.05
+        or float(np.std(off)) < _IRREGULAR * slope
+    ):
         return None
     return Stamps(np.asarray(start + slope * number), np.asarray(off), float(slope))
