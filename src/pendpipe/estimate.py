@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +29,8 @@ class Estimate:
     >>> period = Estimate(2.006, 0.002, "s")
     >>> period.bounds95
     (2.00208007203..., 2.00991992796...)
+    >>> print(period)
+    (2.0060 ± 0.0020) s
     """
 
     value: float
@@ -58,36 +59,6 @@ class Estimate:
         }
 
     def __str__(self) -> str:
-        return rounded(self.value, self.sd, self.unit)
+        from pendpipe.quantities import with_error
 
-
-def rounded(value: float, sd: float | None = None, unit: str = "") -> str:
-    """Return a value and its standard deviation, rounded to two digits of the latter.
-
-    Parameters
-    ----------
-    value, sd
-        In `unit`. Without a standard deviation (None, 0 or NaN) four digits are given.
-    unit
-        Printed behind the numbers.
-
-    Examples
-    --------
-    >>> rounded(1.7573525e-05, 1.4961e-05, "1/s")
-    '1.8e-05 +- 1.5e-05 1/s'
-    >>> rounded(0.4978623, 0.0000131, "Hz")
-    '0.497862 +- 0.000013 Hz'
-    >>> rounded(6412.7, 310.2), rounded(9.80665)
-    ('6410 +- 310', '9.807')
-    """
-    behind = f" {unit}" if unit else ""
-    if sd is None or not (math.isfinite(sd) and sd > 0.0) or not math.isfinite(value):
-        return f"{value:.4g}{behind}"
-    last = math.floor(math.log10(float(f"{sd:.1e}"))) - 1
-    size = max(abs(value), sd)
-    if 1e-4 <= size < 1e6:
-        places = max(-last, 0)
-        return f"{round(value, -last):.{places}f} +- {round(sd, -last):.{places}f}{behind}"
-    digits = max(math.floor(math.log10(size)) - last, 0)
-    number = f"{value:.{digits}e}" if abs(value) >= 0.5 * 10.0**last else "0"
-    return f"{number} +- {sd:.1e}{behind}"
+        return with_error(self.value, self.sd, self.unit)

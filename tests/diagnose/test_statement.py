@@ -54,13 +54,13 @@ def test_it_answers_in_the_order_in_which_a_student_asks() -> None:
     text = paragraph(named("circular-error"))
     order = [
         "Eq. 8 does not describe this recording (p < 1e-12)",
-        "0.0002 rad rms, 2 times the noise of 0.0001 rad",
+        "200 µrad rms, 2 times the noise of 100 µrad",
         "Missing from the model of the pendulum: circular error",
         "sin x",
         "probability 90 %",
         "What to measure next: release it again with half the amplitude",
-        "from 0.0002 rad to 0.0001 rad rms, by a factor of 2",
-        "small-angle period from 1.111111 to 1.098901 +- 0.000028 s",
+        "from 200 µrad to 100 µrad rms, by a factor of 2",
+        "small-angle period from 1.111111 to (1.098901 ± 0.000028) s",
         "The remaining residual is consistent with noise (p = 0.5)",
     ]
     places = [text.find(part) for part in order]
@@ -71,9 +71,9 @@ def test_it_answers_in_the_order_in_which_a_student_asks() -> None:
 def test_numbers_are_rounded_to_their_errors() -> None:
     """Two digits of the error: 1/0.91 Hz is known to 28 us, Q = pi f/b to 2 %."""
     text = paragraph(named("impulse", dv=Estimate(1.7573525e-05, 1.4961e-05, "rad/s")))
-    assert "dv = 1.8e-05 +- 1.5e-05 rad/s" in text
-    assert "from 1.111111 to 1.098901 +- 0.000028 s" in text
-    assert "Q limit (pi f/b) by less than its error (232.4 +- 3.8)" in text
+    assert "dv = (1.8 ± 1.5) × 10⁻⁵ rad/s" in text
+    assert "from 1.111111 to (1.098901 ± 0.000028) s" in text
+    assert "Q limit (pi f/b) by less than its error (232.4 ± 3.8)" in text
 
 
 def test_a_doubtful_name_is_only_possibly_missing() -> None:
@@ -98,9 +98,9 @@ def test_a_model_that_predicts_worse_fails_this_test() -> None:
     """A gain below zero is a loss: the effect failed on cycles left out of the fit."""
     step = named("equilibrium-step", J=Estimate(1e-3, 1e-5, "rad"))
     better, worse = paragraph(step, 50.0), paragraph(step, -50.0)
-    assert "predicted better (log-likelihood up 50.0 +- 5.0)" in better
+    assert "predicted better (log-likelihood up 50.0 ± 5.0)" in better
     assert "fails this test" not in better
-    assert "predicted worse (log-likelihood lower by 50.0 +- 5.0)" in worse
+    assert "predicted worse (log-likelihood lower by 50.0 ± 5.0)" in worse
     assert "fails this test" in worse
     assert "better" not in worse
 
@@ -108,8 +108,11 @@ def test_a_model_that_predicts_worse_fails_this_test() -> None:
 def test_a_question_ends_as_one() -> None:
     """What decides may be asked: "what touched it?"."""
     rival = replace(named("amplitude-step"), indistinguishable=(("impulse", 0.2),))
-    assert rival.deciding.endswith("?")
-    assert f"impulse (20 %). What to measure next: {rival.deciding} Including" in paragraph(rival)
+    assert rival.discriminating_test.endswith("?")
+    assert (
+        f"impulse (20 %). What to measure next: {rival.discriminating_test} Including"
+        in paragraph(rival)
+    )
 
 
 def test_a_pure_number_has_no_unit() -> None:
@@ -119,7 +122,7 @@ def test_a_pure_number_has_no_unit() -> None:
     for parameter in numbers:
         assert parameter.unit_in("rad") == ""
     unit = by_identifier("amplitude-step").parameters[0].unit_in("m")
-    assert "s = 0.0100 +- 0.0010)" in paragraph(
+    assert "s = 0.0100 ± 0.0010)" in paragraph(
         named("amplitude-step", s=Estimate(0.01, 0.001, unit))
     )
 

@@ -1,15 +1,15 @@
-"""Where a model and a recording differ, and what was left out.
+"""Where a model and a recording differ, and what is missing.
 
 >>> from pendpipe.diagnose import diagnose_recording
 >>> from pendpipe.formats import read
->>> outcome = diagnose_recording(read("run7.csv"))      # doctest: +SKIP
->>> print(outcome.diagnosis.statement)                  # doctest: +SKIP
->>> outcome.diagnosis.as_json()["effects"][0]["id"]     # doctest: +SKIP
-'circular-error'
+>>> outcome = diagnose_recording(read("examples/string-pendulum.csv"))
+>>> outcome.verdict, outcome.effects[0].identifier
+('missing-physics', 'circular-error')
+>>> outcome.to_dict()["effects"][0]["kind"]
+'dynamics'
 
-``outcome.diagnosis`` is what ``pendpipe diagnose`` writes as ``diagnosis.json``; ``search``
-and ``beginning`` hold the fits and readings behind it. Nothing is imported before it is
-used.
+``print(outcome)`` gives one paragraph. ``outcome.diagnosis`` holds the answer, ``search`` and
+``beginning`` the fits and readings behind it. Nothing is imported before it is used.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ def silent(line: str) -> None:
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for."""
+    """Import the module of a public name when it is first used."""
     if name not in __all__:
         raise AttributeError(f"module 'pendpipe.diagnose' has no attribute {name!r}")
     import importlib
 
-    place = "result" if name == "Diagnosis" else "run"
-    return getattr(importlib.import_module(f"pendpipe.diagnose.{place}"), name)
+    module = "result" if name == "Diagnosis" else "run"
+    return getattr(importlib.import_module(f"pendpipe.diagnose.{module}"), name)

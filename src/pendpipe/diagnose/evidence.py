@@ -144,7 +144,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
         # (`Rival.reaching`) must not be credited with it.
         return gain
     effect = lead.effect
-    if effect.switch:
+    if effect.parameter_free:
         # The size is predicted: a free one would be charged.
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(chi2_beyond(gain, sizes))
@@ -161,7 +161,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
 def _prior(effect: Effect, fit: Fit) -> float:
     place = next((place for other, place in fit.model.places() if other is effect), None)
     # A released parameter has no place among the model's effects.
-    unlikely = 0.0 if place is None else effect.improbable(fit.value[place], fit.at.span)
+    unlikely = 0.0 if place is None else effect.prior_penalty(fit.value[place], fit.at.span)
     return effect.prior - unlikely
 
 

@@ -14,8 +14,8 @@ from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.remainder import by_cycle
 from pendpipe.diagnose.result import Location
 from pendpipe.effects import Effect
-from pendpipe.effects.tones import PlaneCoupling
-from pendpipe.estimate import rounded
+from pendpipe.effects.catalogue.oscillations import PlaneCoupling
+from pendpipe.quantities import with_error
 
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
@@ -168,7 +168,7 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
     if found.time_s is not None:
         width = found.time_s[1] - found.time_s[0]
         if width < 0.02 * span:
-            clauses.append(f"at {rounded(0.5 * sum(found.time_s), 0.5 * width / 1.96, 's')}")
+            clauses.append(f"at {with_error(0.5 * sum(found.time_s), 0.5 * width / 1.96, 's')}")
         elif width < 0.8 * span:
             clauses.append(f"between {found.time_s[0]:.4g} and {found.time_s[1]:.4g} s")
         else:

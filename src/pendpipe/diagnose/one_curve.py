@@ -144,7 +144,7 @@ def _without_names(state: State, kept: Sequence[Step]) -> Fit | None:
 
 def _curves(bare: Fit, state: State) -> list[Curve]:
     """Return the curves with the coefficients that the recording resolves; none against time."""
-    drawn = [curve(bare.at.span) for curve in (*CURVES, *CLOSER_CURVES) if not curve.in_time]
+    drawn = [curve(bare.at.span) for curve in (*CURVES, *FOLLOW_UP_CURVES) if not curve.in_time]
     seen = build_bank(bare, state.noise, drawn).candidates
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 

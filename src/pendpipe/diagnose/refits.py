@@ -116,7 +116,7 @@ def _started(
 
 def _sizes(effect: Effect) -> FloatArray:
     """Start sizes: 1 for an effect without a free size, else 0."""
-    return np.ones(1) if effect.switch else np.zeros(min(effect.sizes, effect.count))
+    return np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
 
 
 def _finished(refit: Refining, useful: float) -> Fit | None:

@@ -68,8 +68,8 @@ class ReleasedParameter(Effect):
         if self.index is not None:
             return fit.jacobian[:, self.index]
         value, parts = fit.value, fit.model.held_parts()
-        others = [part for part in parts if part != self.releases]
-        if not others and value[B] > parts[str(self.releases)]:
+        others = [part for part in parts if part != self.frees]
+        if not others and value[B] > parts[str(self.frees)]:
             # b is fitted with the other part already: only the share is new.
             return fit.jacobian[:, SHARE]
         share = float(value[SHARE])

@@ -93,7 +93,7 @@ class FoundEffect:
         Of this effect, among its class and "none of these".
     indistinguishable
         The rest of its class: identifier and probability.
-    deciding
+    discriminating_test
         The one further measurement that would decide.
     location
         Where it shows.
@@ -110,7 +110,7 @@ class FoundEffect:
     p_value: float
     probability: float
     indistinguishable: tuple[tuple[str, float], ...]
-    deciding: str
+    discriminating_test: str
     location: Location
     curve: Mapping[str, Any] | None = None
 
@@ -132,7 +132,7 @@ class FoundEffect:
                 {"id": identifier, "probability": probability}
                 for identifier, probability in self.indistinguishable
             ],
-            "deciding_measurement": self.deciding,
+            "deciding_measurement": self.discriminating_test,
             "location": self.location.as_json(),
         }
         if self.curve is not None:

@@ -39,6 +39,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.curves import FOLLOW_UP_CURVES
+from pendpipe.quantities import compact
 
 _MOST_EFFECTS: Final = 6
 _NEEDED_CHI2: Final = 9.0
@@ -246,7 +247,7 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
     progress(
         f"chance does not explain the residual ({printed(state.now.p_value)}): refitting leads"
     )
-    closer = more_leads(state.fit, state.noise, undrawn(CLOSER_CURVES, state.fit))
+    closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
         state.fit,
@@ -272,11 +273,9 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         return False
     state.steps.append(step)
     winner = rivals[0]
-    before, after = (_rms(fit, state.data) for fit in (state.fit, winner.fit))
-    unit = state.data.unit
-    progress(
-        f"adding {winner.name}: the residual falls from {before:.3g} to {after:.3g} {unit} rms"
-    )
+    unit, fits = state.data.unit, (state.fit, winner.fit)
+    before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
+    progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
     if isinstance(winner.lead.effect, ReleasedParameter):
         state.held = winner.lead.effect.without(state.held)
     state.settle(winner.fit)

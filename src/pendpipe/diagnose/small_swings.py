@@ -16,6 +16,7 @@ from pendpipe.diagnose.cycles import between, cycles, span_ends
 from pendpipe.diagnose.data import Data
 from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.refine import Fit
+from pendpipe.quantities import with_error
 
 _FEWEST_SPANS: Final = 8
 """Spans of cycles needed to estimate their scatter."""
@@ -57,7 +58,7 @@ class SmallSwings:
         way, torque = ("above", "stiffer") if self.excess > 0.0 else ("below", "softer")
         return (
             f"At the smallest amplitudes ({self.amplitude:.3g} {unit}) the frequency is"
-            f" {100.0 * abs(self.excess):.2g} +- {100.0 * self.excess_sd:.1g} % {way} the"
+            f" {with_error(100.0 * abs(self.excess), 100.0 * self.excess_sd, '%')} {way} the"
             f" model's: the restoring torque is {torque} there."
         )
 

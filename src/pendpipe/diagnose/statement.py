@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.diagnose.chance import printed
-from pendpipe.estimate import Estimate, rounded
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact, with_error
 
 if TYPE_CHECKING:
     from pendpipe.diagnose.held_out import HeldOut
@@ -107,16 +108,16 @@ def statement(
     if not effects:
         nothing = (
             f"{_capital(model)} describes this recording: the residual of"
-            f" {_size(before.residual_rms_rad, unit)} rms agrees with the noise"
-            f" ({_size(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
+            f" {compact(before.residual_rms_rad, unit)} rms agrees with the noise"
+            f" ({compact(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
             f" than chance would ({printed(unexplained)})."
         )
         return " ".join([nothing, *stamps])
     times = before.residual_rms_rad / noise_rms
     text = [
         f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
-        f" {_size(before.residual_rms_rad, unit)} rms, {_times(times)} the noise of"
-        f" {_size(noise_rms, unit)}.",
+        f" {compact(before.residual_rms_rad, unit)} rms, {_factor(times)} times the noise of"
+        f" {compact(noise_rms, unit)}.",
         *(_effect(effect) for effect in effects),
         _improvement(len(effects), before, after, held, unit),
         _changes(before.parameters, after.parameters),
@@ -145,7 +146,7 @@ def _effect(effect: FoundEffect) -> str:
         lead += f". This recording alone cannot distinguish it from {_listed(others, 'or')}"
     elif effect.probability > _CERTAIN or effect.kind == "unnamed":
         return f"{lead}."
-    return _ended(f"{lead}. What to measure next: {effect.deciding}")
+    return _ended(f"{lead}. What to measure next: {effect.discriminating_test}")
 
 
 def _improvement(
@@ -154,19 +155,14 @@ def _improvement(
     """How much of the misfit the effects explain, and whether they predict."""
     old, new = before.residual_rms_rad, after.residual_rms_rad
     this = "this" if number == 1 else "these effects"
-    text = (
-        f"Including {this} reduces the residual from {_size(old, unit)} to {_size(new, unit)} rms"
-    )
+    text = f"Including {this} reduces the residual from {compact(old, unit)}"
+    text += f" to {compact(new, unit)} rms"
     if old > 1.05 * new > 0.0:
-        text += (
-            f", by a factor of {old / new:.2g}"
-            if old < 99.5 * new
-            else (f", by a factor of {old / new:.0f}")
-        )
+        text += f", by a factor of {_factor(old / new)}"
     if held is None or not math.isfinite(held.gain):
         return text + "."
     sd = held.gain_sd if math.isfinite(held.gain_sd) else None
-    by = rounded(abs(held.gain), sd)
+    by = with_error(abs(held.gain), sd)
     if held.gain < 0.0:
         return (
             f"{text}, but cycles left out of the fit are predicted worse (log-likelihood lower by"
@@ -220,7 +216,8 @@ def _biased(old: Estimate, new: Estimate) -> bool:
 
 def _like(old: Estimate, new: Estimate) -> str:
     """A value with the digits of another's error, without an error of its own."""
-    return rounded(old.value, new.sd).split(" +- ")[0]
+    value, _, rest = with_error(old.value, new.sd).strip("(").partition(" ± ")
+    return value + rest.partition(")")[2]
 
 
 def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
@@ -231,10 +228,11 @@ def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
         return f"A small misfit remains unexplained ({printed(unexplained)})."
     shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
     where = ", ".join(f"{_percent(share)} {_PARTS[name]}" for name, share in shares if share > 0.05)
+    times, enlarged = _factor(remainder.over_noise), _factor(remainder.error_scale)
     return (
-        f"The remaining residual is still {_times(remainder.over_noise)} the noise ({where}), so"
-        " the model is incomplete: the errors given here are enlarged by a factor of"
-        f" {remainder.error_scale:.2g}, and the probabilities are lowered accordingly."
+        f"The remaining residual is still {times} times the noise ({where}), so the model is"
+        f" incomplete: the errors given here are enlarged by a factor of {enlarged}, and the"
+        " probabilities are lowered accordingly."
     )
 
 
@@ -245,14 +243,9 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %" if share > 0.01 else "< 1 %"
 
 
-def _times(ratio: float) -> str:
-    """A factor in words."""
-    return f"{ratio:.2g} times" if ratio < 99.5 else f"{float(f'{ratio:.2g}'):.0f} times"
-
-
-def _size(value: float, unit: str) -> str:
-    """A size without an error."""
-    return f"{value:.3g} {unit}"
+def _factor(ratio: float) -> str:
+    """A ratio to two digits, without a power of ten."""
+    return f"{float(f'{ratio:.2g}'):.0f}" if ratio > 9.95 else f"{ratio:.2g}"
 
 
 def _rival(identifier: str) -> str:

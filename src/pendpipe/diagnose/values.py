@@ -114,7 +114,7 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
         return {}
     covariance = fit.covariance()
     found = {}
-    first = position.start + effect.switch
+    first = position.start + effect.parameter_free
     for offset, parameter in enumerate(effect.parameters):
         index = first + offset
         sd = math.sqrt(max(float(covariance[index, index]), 0.0))

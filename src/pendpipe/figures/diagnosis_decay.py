@@ -12,7 +12,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnose.refine import Fit
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, WIDTH_IN, key_above, styled
-from pendpipe.figures.units import axis_unit
+from pendpipe.quantities import axis_unit
 
 Model = tuple[str, Fit, str]
 """A model's name in the key, its fit and its colour."""

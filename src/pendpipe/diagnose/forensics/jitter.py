@@ -18,7 +18,8 @@ from pendpipe.diagnose.noise import Noise
 from pendpipe.diagnose.numerics import tail_of_squares
 from pendpipe.diagnose.refine import Fit
 from pendpipe.diagnose.result import Location
-from pendpipe.estimate import Estimate, rounded
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import with_error
 
 _CLIP_SD: Final = 3.0
 """Standard deviations at which errors are clipped."""
@@ -224,5 +225,5 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
             (omega / math.pi,),
         ),
         summary="the noise is largest where the motion is fastest, as if the sampling times"
-        f" were uncertain by {rounded(seconds, error, 's')}",
+        f" were uncertain by {with_error(seconds, error, 's')}",
     )
