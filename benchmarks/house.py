@@ -39,9 +39,7 @@ PLAIN: Final = frozenset({"property", "cached_property", "staticmethod", "classm
 """Decorators that enter nothing into a registry."""
 PROTOCOLS: Final = frozenset({"from_param"})
 """Methods that a library calls by name."""
-LAYOUT: Final = frozenset(
-    {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
-)
+LAYOUT: Final = {getattr(tokenize, k) for k in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT")}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -145,11 +143,10 @@ def shape_of(rows: list[list[tokenize.TokenInfo]]) -> tuple[object, ...]:
     shape: list[object] = []
     for row in rows:
         for token in row:
+            kinds = {tokenize.NUMBER: "number", tokenize.STRING: "string"}
+            shape.append(kinds.get(token.type, token.string))
             if token.type == tokenize.NAME:
-                shape.append(names.setdefault(token.string, len(names)))
-            else:
-                kinds = {tokenize.NUMBER: "number", tokenize.STRING: "string"}
-                shape.append(kinds.get(token.type, token.string))
+                shape[-1] = names.setdefault(token.string, len(names))
         shape.append("\n")
     return tuple(shape)
 
@@ -159,7 +156,8 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
     parts = files_of(tree)
     trees = {path: ast.parse(path.read_text("utf-8")) for paths in parts.values() for path in paths}
     packages = {path: trees[path] for path in parts["library"] + parts["challenge"]}
-    by, dead = importers(packages), unused(tree, packages)
+    code = {path: found for path, found in trees.items() if path not in parts["tests"]}
+    by, dead = importers(packages), unused(tree, code)
     table: dict[str, dict[str, Any]] = {}
     for part, paths in parts.items():
         texts = [path.read_text("utf-8") for path in paths]
@@ -242,8 +240,8 @@ def main() -> None:
         found = {name: measure(tree) for name, tree in trees.items()}
         prices = {name: costs(tree) for name, tree in trees.items()}
     parts = list(found["here"][0])
-    print("| |", " | ".join(f"{part}, {name}" for part in parts for name in trees), "|")
-    print("|---" * (1 + len(parts) * len(trees)) + "|")
+    heads = [f"{part}, {name}" for part in parts for name in trees]
+    print(f"| | {' | '.join(heads)} |\n{'|---' * (1 + len(heads))}|")
     for what in found["here"][0]["library"]:
         cells = [str(found[name][0][part][what]) for part in parts for name in trees]
         print(f"| {what} | {' | '.join(cells)} |")

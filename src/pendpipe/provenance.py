@@ -91,7 +91,7 @@ def _imports(module: str) -> frozenset[str]:
     if b"import_module" in content:
         for node in ast.walk(tree):
             if isinstance(node, ast.Call):
-                found.update(_imported_by_name(node))
+                found.update(_imported_by_name(node, module))
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
@@ -108,15 +108,23 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
                 yield from _statements(block.body)
 
 
-def _imported_by_name(call: ast.Call) -> set[str]:
-    """What ``importlib.import_module(f"pendpipe.formats.{name}")`` may import: each of them."""
+def _imported_by_name(call: ast.Call, module: str) -> set[str]:
+    """What ``importlib.import_module(f"pendpipe.formats.{name}")`` may import: each of them.
+
+    A package that imports its own modules writes ``f"{__name__}.{name}"``.
+    """
     if ast.unparse(call.func) != "importlib.import_module":
         return set()
     match call.args[0]:
         case ast.Constant(value=str(name)):
             return {name}
         case ast.JoinedStr(values=[ast.Constant(value=str(start)), *_]):
-            package = start.rpartition(".")[0]
-            folder = PACKAGE.joinpath(*package.split(".")[1:])
-            return {f"{package}.{path.stem}" for path in folder.glob("*.py")}
+            return _modules_of(start.rpartition(".")[0])
+        case ast.JoinedStr(values=[ast.FormattedValue(value=ast.Name(id="__name__")), *_]):
+            return _modules_of(module)
     raise ValueError(f"no name to follow in {ast.unparse(call)}")
+
+
+def _modules_of(package: str) -> set[str]:
+    folder = PACKAGE.joinpath(*package.split(".")[1:])
+    return {f"{package}.{path.stem}" for path in folder.glob("*.py")}

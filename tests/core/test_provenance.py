@@ -59,3 +59,22 @@ def test_a_module_imported_by_name_counts(library: Path, name: str) -> None:
     before = version()
     reader.write_text("x = 2\n")
     assert version() != before
+
+
+def test_a_package_that_imports_its_own_modules_depends_on_each(library: Path) -> None:
+    (library / "stage.py").write_text("from pendpipe import catalogue\n")
+    (library / "catalogue").mkdir()
+    (library / "catalogue/__init__.py").write_text(
+        'import importlib\nfound = [importlib.import_module(f"{__name__}.{n}") for n in "ab"]\n'
+    )
+    entry = library / "catalogue/a.py"
+    entry.write_text("x = 1\n")
+    before = version()
+    entry.write_text("x = 2\n")
+    assert version() != before
+
+
+def test_the_versions_of_all_commands_can_be_found() -> None:
+    """An import that can't be followed would keep the workflow from starting."""
+    for path in (provenance.PACKAGE / "commands").glob("*.py"):
+        assert len(provenance.code_version(f"pendpipe.commands.{path.stem}")) == 12
