@@ -24,13 +24,15 @@ include: "workflow/rules/challenge.smk"
 # Damaged results are named when a run is planned, a dry run too; they are renamed when it
 # starts, holding Snakemake's lock.
 if workflow.is_main_process:
-    for line in damaged_files(manifest.noticed):
-        logger.warning(f"pendpipe: {line}")
+    for _, lines in FOUND.values():
+        for line in lines:
+            logger.warning(f"pendpipe: {line}")
 
 
 onstart:
-    for line in damaged_files(manifest.set_aside_damaged):
-        logger.warning(f"pendpipe: {line}")
+    for lines in in_every_folder(manifest.set_aside_damaged).values():
+        for line in lines:
+            logger.warning(f"pendpipe: {line}")
 
 
 # `all` stands in this file: Snakemake forgets the default target of an included one.

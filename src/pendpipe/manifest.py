@@ -9,8 +9,8 @@ Planning must notice a file whose old time was put back, without hashing thousan
 files. No program can set a file's time of change (``st_ctime``): a file of the right
 length that has not changed since its manifest was written is sound.
 
-Snakemake compares a rule's parameters with those of its last run. `history` is such a
-parameter: it lists every damage of a stage's results, and keeps those that were repaired,
+Snakemake compares a rule's parameters with those of its last run. One of `histories` is
+such a parameter: it lists every damage of a stage's results, and keeps those that were repaired,
 so that each damage runs the stage once.
 """
 
@@ -152,19 +152,25 @@ def damages_of(home: Path, stage: str) -> tuple[Manifest, list[Damage]]:
     return manifest, manifest.damages()
 
 
-def history(home: Path, stage: str) -> str:
-    """List the damages of a stage's results, repaired or not: a parameter of its rule."""
-    manifest, found = damages_of(home, stage)
-    return " ".join((*manifest.repaired, *(damage.mark for damage in found)))
+def histories(home: Path) -> tuple[dict[str, str], list[str]]:
+    """Look for damage in a folder of results when a run is planned; nothing is touched.
 
-
-def noticed(home: Path) -> list[str]:
-    """Name what is damaged in a folder of results, and leave it there."""
-    return [
-        f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
-        for path in sorted((home / FOLDER).glob("*.json"))
-        for damage in damages_of(home, path.stem)[1]
-    ]
+    Returns
+    -------
+    histories
+        For each stage its damages, repaired or not: a parameter of its rule.
+    lines
+        A line for each damaged file.
+    """
+    found, lines = {}, []
+    for path in sorted((home / FOLDER).glob("*.json")):
+        manifest, damages = damages_of(home, path.stem)
+        found[path.stem] = " ".join((*manifest.repaired, *(damage.mark for damage in damages)))
+        lines += [
+            f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
+            for damage in damages
+        ]
+    return found, lines
 
 
 def set_aside_damaged(home: Path) -> list[str]:

@@ -45,6 +45,14 @@ def altered(content: bytes) -> bytes:
     return content.replace(b"1", b"7")
 
 
+def noticed(home: Path) -> list[str]:
+    return manifest.histories(home)[1]
+
+
+def history(home: Path) -> str:
+    return manifest.histories(home)[0]["fit"]
+
+
 DAMAGES = pytest.mark.parametrize(
     ("change", "problem"),
     [(cut, "torn"), (emptied, "empty"), (altered, "altered")],
@@ -73,10 +81,10 @@ def test_a_job_sets_a_damaged_input_aside_and_does_not_run(
 def test_planning_notices_a_damage_whose_time_was_put_back_and_touches_nothing(
     home: Path, change: Callable[[bytes], bytes], problem: str
 ) -> None:
-    assert manifest.noticed(home) == []
+    assert noticed(home) == []
     with_its_old_time(home / "fit.json", change)
     before = sorted(home.rglob("*"))
-    (line,) = manifest.noticed(home)
+    (line,) = noticed(home)
     assert line.startswith(f"{home / 'fit.json'}: ")
     assert problem in line
     assert sorted(home.rglob("*")) == before
@@ -84,34 +92,34 @@ def test_planning_notices_a_damage_whose_time_was_put_back_and_touches_nothing(
 
 def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
     """It is new when the damage is noticed, and the same after the repair."""
-    assert manifest.history(home, "fit") == ""
+    assert history(home) == ""
     with_its_old_time(home / "fit.json", emptied)
-    planned = manifest.history(home, "fit")
+    planned = history(home)
     assert planned == "fit.json:e3b0c442"
     manifest.set_aside_damaged(home)
-    assert manifest.history(home, "fit") == planned
+    assert history(home) == planned
     with manifest.job(home, "fit", inputs=[home / "recording.csv"]) as running:
         (home / "fit.json").write_text('{"a": 1}\n')
         running.outputs.append(home / "fit.json")
-    assert manifest.history(home, "fit") == planned
-    assert manifest.noticed(home) == []
+    assert history(home) == planned
+    assert noticed(home) == []
     with_its_old_time(home / "fit.json", emptied)
-    assert manifest.history(home, "fit") == f"{planned} {planned}"
+    assert history(home) == f"{planned} {planned}"
 
 
 def test_a_damaged_manifest_is_damage_too(home: Path) -> None:
     with_its_old_time(home / "manifest/fit.json", cut)
-    assert manifest.history(home, "fit") != ""
+    assert history(home) != ""
     (line,) = manifest.set_aside_damaged(home)
     assert "this is no manifest" in line
-    assert manifest.noticed(home) == []
+    assert noticed(home) == []
 
 
 def test_a_sound_copy_of_the_results_is_sound(home: Path) -> None:
     """A copy has new times of change: its files are hashed, and found as they were."""
     for path in [*home.glob("*.*"), *home.glob("manifest/*")]:
         path.write_bytes(path.read_bytes())
-    assert manifest.noticed(home) == []
+    assert noticed(home) == []
 
 
 def test_a_result_made_from_another_recording_is_not_read(home: Path) -> None:
@@ -139,7 +147,7 @@ def test_a_source_is_recorded_and_never_touched(home: Path, tmp_path: Path) -> N
     assert manifest.source_sha256(home, "acquire", source) == before
     with_its_old_time(source, cut)
     assert manifest.source_sha256(home, "acquire", source) != before
-    assert manifest.noticed(home) == []
+    assert noticed(home) == []
     assert source.exists()
 
 

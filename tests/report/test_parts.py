@@ -9,7 +9,7 @@ import pytest
 from pendpipe.report.findings import findings
 from pendpipe.report.health import STATES, health
 from pendpipe.report.records import table_of_records, without_folders
-from pendpipe.report.remarks import budget_rows, grouped_warnings
+from pendpipe.report.remarks import budget_rows, exponent_tables, grouped_warnings
 from pendpipe.report.vector import inline_svg
 
 
@@ -130,3 +130,10 @@ def test_findings_follow_the_numbers() -> None:
     air, water = findings(comparison)
     assert "standard deviations from the square" in air
     assert "30 standard deviations from 1" in water
+
+
+def test_two_records_of_one_frequency_have_no_local_exponent() -> None:
+    """Between them comparison.json has null."""
+    found = {"value": 0.5, "sd": 0.1, "local_slopes": [0.53, None, -0.2], "ranges": []}
+    (table,) = exponent_tables({"viscous_exponents": {"low": found}})
+    assert table["slopes"] == "0.53, –, −0.20"

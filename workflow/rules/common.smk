@@ -33,28 +33,29 @@ STRICT = CAMPAIGN.configuration.strict
 CONFIGURATION = jobs.store(CAMPAIGN, ".snakemake/pendpipe")
 
 
+def in_every_folder(look):
+    """What `look` finds in the campaign's folders of results, by folder."""
+    try:
+        return {
+            folder: look(Path(RESULTS, folder))
+            for folder in ("", "calibration", *RECORDS)
+        }
+    except InputError as fault:
+        raise WorkflowError(str(fault)) from None
+
+
+# Before any job has begun: while they run, results come and go.
+FOUND = in_every_folder(manifest.histories)
+
+
 def repaired(folder, *stages):
     """The damages that made a job's stages run again: a new one is a changed parameter."""
 
     def of_job(wildcards):
-        home = Path(RESULTS, folder.format(**wildcards))
-        return " ".join(
-            filter(None, (manifest.history(home, stage) for stage in stages))
-        )
+        histories, _ = FOUND[folder.format(**wildcards)]
+        return " ".join(filter(None, map(histories.get, stages)))
 
     return of_job
-
-
-def damaged_files(look):
-    """What `look` tells of every folder of results, a line for each damaged file."""
-    try:
-        return [
-            line
-            for folder in ("", "calibration", *RECORDS)
-            for line in look(Path(RESULTS, folder))
-        ]
-    except InputError as fault:
-        raise WorkflowError(str(fault)) from None
 
 
 wildcard_constraints:

@@ -39,7 +39,7 @@ class Exponent:
         Second derivative of ln Q_v with respect to ln f, from a parabola; NaN with fewer
         than three records. Zero for a power law.
     local_slopes
-        Between neighbours in frequency, from the lowest up.
+        Between neighbours in frequency, from the lowest up; NaN between equal frequencies.
     ranges
         The slope over parts of the branch, with up to two records left out at each end.
     records
@@ -71,7 +71,8 @@ def fit_exponent(branch: ViscousLosses, errors: SharedErrors) -> Exponent | None
     nan = float("nan")
     bend, bend_own, bend_common = _derivative(branch, errors, 2) if count > 2 else (nan, nan, nan)
     logs = np.log(branch.frequency_hz)
-    local = np.diff(_log_quality(branch)) / np.diff(logs)
+    steps = np.diff(logs)
+    local = np.diff(_log_quality(branch)) / np.where(steps > 0.0, steps, nan)
     return Exponent(
         exponent=Estimate(slope, float(np.hypot(own, common)), ""),
         sd_own=own,
@@ -84,14 +85,15 @@ def fit_exponent(branch: ViscousLosses, errors: SharedErrors) -> Exponent | None
 
 
 def _ranges(branch: ViscousLosses, errors: SharedErrors) -> tuple[RangeSlope, ...]:
-    """The slope with up to two records left out at each end."""
+    """The slope with up to two records left out at each end; none at a single frequency."""
     count = len(branch.records)
     parts = []
     for low in range(MOST_LEFT_OUT + 1):
         for high in range(count - MOST_LEFT_OUT, count + 1):
-            if high - low < min(FEWEST_IN_A_RANGE, count):
+            part = _part(branch, low, high)
+            if high - low < min(FEWEST_IN_A_RANGE, count) or np.ptp(part.frequency_hz) <= 0.0:
                 continue
-            slope, own, common = _derivative(_part(branch, low, high), errors, 1)
+            slope, own, common = _derivative(part, errors, 1)
             parts.append(
                 RangeSlope(
                     branch.records[low],

@@ -89,13 +89,18 @@ def exponent_tables(comparison: Comparison) -> list[dict[str, Any]]:
             "branch": branch,
             "value": with_error(number(found), error(found)),
             "curvature": with_error(number(curvature), error(curvature)) if curvature else "",
-            "slopes": ", ".join(f"{slope:.2f}".replace("-", "−") for slope in slopes),
+            "slopes": ", ".join(_slope(slope) for slope in slopes),
             "ranges": [
                 (part["first"], part["last"], with_error(part["exponent"], part["sd"]))
                 for part in found.get("ranges") or []
             ],
         })  # fmt: skip
     return tables
+
+
+def _slope(slope: float | None) -> str:
+    """A local exponent; between two records of one frequency there is none."""
+    return "–" if slope is None else f"{slope:.2f}".replace("-", "−")
 
 
 def budget_rows(comparison: Comparison) -> list[tuple[str, str, float]]:
