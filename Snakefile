@@ -30,6 +30,7 @@ if workflow.is_main_process:
 
 
 onstart:
+    checked(check_writable, RESULTS)
     for lines in in_every_folder(manifest.set_aside_damaged).values():
         for line in lines:
             logger.warning(f"pendpipe: {line}")

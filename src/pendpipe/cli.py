@@ -156,6 +156,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of our output (`head`, say) has gone; that is nobody's fault.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as fault:
+        if fault.filename is None:
+            raise
+        reason = fault.strerror or str(fault)
+        print(f"pendpipe: {fault.filename}: {reason}; check the path", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("pendpipe: interrupted", file=sys.stderr)
         return 130

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import math
 import os
+import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
-from typing import IO, Any
+from pathlib import Path, PurePath
+from typing import IO, Any, Final
 
 from pendpipe.errors import DamagedError, InputError
+
+_NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
 
 
 @contextmanager
@@ -29,13 +33,14 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     Raises
     ------
     InputError
-        Where no file can be written: no folder, no right to it, or a folder of that name.
+        Where no file can be written: no folder, no right to it, a folder of that name, or
+        no room on the disk.
     """
     target = Path(path)
     make_folder(target.parent)
-    if target.is_dir():
-        raise InputError(target, "this is a folder", "name a file in it")
     try:
+        if target.is_dir():
+            raise InputError(target, "this is a folder", "name a file in it")
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     except OSError as fault:
         raise _cannot_write(target, fault) from None
@@ -49,8 +54,10 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(target)
-    except BaseException:
+    except BaseException as fault:
         temporary.unlink(missing_ok=True)
+        if isinstance(fault, OSError) and fault.errno in _NO_ROOM:
+            raise _cannot_write(target, fault) from None
         raise
 
 
@@ -68,6 +75,21 @@ def make_folder(path: str | Path) -> None:
         raise InputError(path, "this is a file, not a folder", "name another folder") from None
     except OSError as fault:
         raise _cannot_write(path, fault) from None
+
+
+def check_writable(folder: str | Path) -> None:
+    """Make a folder for results and see that files can be made in it.
+
+    Raises
+    ------
+    InputError
+        If they can't: no right to write, or a disk that is only read.
+    """
+    make_folder(folder)
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as fault:
+        raise _cannot_write(folder, fault) from None
 
 
 def _cannot_write(path: str | Path, fault: OSError) -> InputError:
@@ -124,3 +146,16 @@ def sha256(path: str | Path) -> str:
     """Hash a file's content, for the provenance of what was made from it."""
     with Path(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+_PATH: Final = re.compile(r"(?<![\w./\\])(?:[A-Za-z]:[\\/]|~?/|\.{1,2}/)[^\s'\"(),;]+")
+"""An absolute path, or one that begins at a dot; not the slash of V/rad."""
+
+
+def without_folders(text: str) -> str:
+    """Keep the names of files and drop the folders: they are the user's own business.
+
+    >>> without_folders("/home/rdp/data/run 7.csv, line 3: no number")
+    'run 7.csv, line 3: no number'
+    """
+    return _PATH.sub(lambda found: PurePath(found.group().replace("\\", "/")).name, text)

@@ -226,7 +226,12 @@ class Job:
 
 @contextmanager
 def job(
-    home: Path, stage: str, *, inputs: Iterable[Path] = (), sources: Iterable[Path] = ()
+    home: Path,
+    stage: str,
+    *,
+    inputs: Iterable[Path] = (),
+    sources: Iterable[Path] = (),
+    out: Path | None = None,
 ) -> Iterator[Job]:
     """Run a stage between a check of what it reads and a record of what it wrote.
 
@@ -238,6 +243,9 @@ def job(
         Results of other stages. What is damaged is set aside, and the stage doesn't run.
     sources
         Files of the user: recorded and never touched. A missing one is left to the stage.
+    out
+        What is written; somewhere else than in `home` it is no result of the campaign, and
+        nothing is recorded.
 
     Raises
     ------
@@ -246,6 +254,9 @@ def job(
         that are there now.
     """
     checked = check(inputs)
+    if out is not None and not out.absolute().is_relative_to(home.absolute()):
+        yield Job()
+        return
     try:
         repaired = read_manifest(home, stage).repaired
     except DamagedError:

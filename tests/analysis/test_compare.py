@@ -127,6 +127,15 @@ def test_exponents_of_the_two_branches_are_near_the_papers() -> None:
     assert max(part.exponent for part in high.ranges) > high.exponent.value + 0.3
 
 
+def test_two_records_of_one_frequency_have_no_slope_between_them() -> None:
+    """The branch keeps its exponent; the slope between equal frequencies is none."""
+    records = water_records(drag_factor=1.117)
+    twin = replace(records[-1], record="twin")
+    low = campaign([*records, twin]).exponents["low"]
+    assert low.exponent.value == pytest.approx(0.5, abs=0.05)
+    assert sorted(np.isnan(low.local_slopes)) == [False] * 6 + [True]
+
+
 @given(exponent=st.floats(-6.0, 2.0), curvature=st.floats(-3.0, 3.0))
 @settings(max_examples=25, deadline=None)
 def test_slope_and_curvature_of_an_exact_branch(exponent: float, curvature: float) -> None:

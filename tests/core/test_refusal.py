@@ -27,6 +27,16 @@ def test_a_refused_record_leaves_one_line_and_whole_stubs(tmp_path: Path) -> Non
     assert read_json(out)["refused"] == "a.csv: there is no decay; record one"
 
 
+def test_a_refusal_names_no_folder_of_the_machine(tmp_path: Path) -> None:
+    def fails_far_away() -> None:
+        raise InputError("/home/me/data/run7.csv, line 3", "no number", "fix the row")
+
+    refused = tmp_path / "x/refused.json"
+    outputs = [tmp_path / "x/recording.csv"]
+    run_stage("acquire", "x", fails_far_away, outputs=outputs, refused=refused)
+    assert read_json(refused)["reason"] == "run7.csv, line 3: no number; fix the row"
+
+
 def test_the_stages_after_a_refusal_pass_it_on(tmp_path: Path) -> None:
     refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
     run_stage("acquire", "x", fails, outputs=[tmp_path / "recording.csv"], refused=refused)

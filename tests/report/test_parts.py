@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from pendpipe.files import without_folders
 from pendpipe.report.findings import findings
 from pendpipe.report.health import STATES, health
-from pendpipe.report.records import table_of_records, without_folders
+from pendpipe.report.records import table_of_records
 from pendpipe.report.remarks import budget_rows, exponent_tables, grouped_warnings
 from pendpipe.report.vector import inline_svg
 

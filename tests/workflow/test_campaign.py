@@ -25,7 +25,7 @@ class Campaign:
     """A campaign in a folder of its own, run by Snakemake from the project's root."""
 
     def __init__(self, folder: Path) -> None:
-        self.results = folder / "results"
+        self.results = folder / "my results"  # a space, as users have
         self.records = folder / "records.tsv"
         shutil.copy(SMALL / "records.tsv", self.records)
         content = yaml.safe_load((SMALL / "config.yaml").read_text(encoding="utf-8"))

@@ -83,6 +83,13 @@ def test_an_added_unknown_key_names_its_place(content: dict[str, Any]) -> None:
         (lambda c: c.update(typical_record="water-low-9"), "no record 'water-low-9'"),
         (lambda c: c.pop("simulated"), "a simulated record needs simulated"),
         (lambda c: c["simulated"]["release"].pop("air"), "nothing says how it is released"),
+        (lambda c: c["apparatus"]["rod"].update(mass_kg=float("inf")), "finite number"),
+        (lambda c: c["geometries"]["low-1"]["weights_m"].update(upper=float("nan")), "finite"),
+        (lambda c: c.update(results=".inj;touch PWNED;"), "';' can't stand in its name"),
+        (lambda c: c.update(results="a{record}"), "'{' can't stand in its name"),
+        (lambda c: c.update(results="-rf"), "is no folder"),
+        (lambda c: c.update(results=""), "is no folder"),
+        (lambda c: c.update(results="README.md/x"), "README.md is a file"),
     ],
 )
 def test_what_cannot_be_is_said_in_one_line(
@@ -93,6 +100,27 @@ def test_what_cannot_be_is_said_in_one_line(
         load_campaign(content, "config.yaml")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("written", [b"\xff\xfe", b"a: \x01", b"[" * 5000, b"a: [1", b"", b"3"])
+def test_a_file_that_is_no_configuration_is_named_in_one_line(
+    tmp_path: Path, written: bytes
+) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_bytes(written)
+    with pytest.raises(InputError, match=r"config\.yaml") as caught:
+        read_configuration(path)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="can't be read"):
+        read_configuration(tmp_path)
+
+
+def test_a_table_that_is_no_text_is_named_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "records.tsv"
+    path.write_bytes(b"record\tsource\n\xff\tsimulated\n")
+    for place in (path, tmp_path):
+        with pytest.raises(InputError, match="can't be read"):
+            read_records(place)
 
 
 def test_schema_and_manual_are_those_of_the_models() -> None:
@@ -116,7 +144,12 @@ def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:
         (["a b\tsimulated"], "record\tsource", "no name for a folder"),
         (["x\tsimulated", "X\tsimulated"], "record\tsource", "stands twice"),
         (["x\tfile.csv\tnine"], "record\tsource\tstart_s", "start_s 'nine' is no number"),
-        (["figures\tsimulated"], "record\tsource", "a folder of the campaign's own"),
+        (["figures\tsimulated"], "record\tsource", "of its own"),
+        (["campaign.json\tsimulated"], "record\tsource", "of its own"),
+        (["CON\tsimulated"], "record\tsource", "Windows keeps the name"),
+        (["nul.txt\tsimulated"], "record\tsource", "Windows keeps the name"),
+        (["x.\tsimulated"], "record\tsource", "no dot at the end"),
+        (["x" * 300 + "\tsimulated"], "record\tsource", "300 characters"),
         (["x\t"], "record\tsource", "the source is blank"),
         ([], "record\tsource", "no records"),
     ],

@@ -20,5 +20,5 @@ rule acquire:
     message:
         "{wildcards.record}: acquire"
     shell:
-        "pendpipe acquire --campaign {resources.configuration} --record {wildcards.record}"
-        " --out {output} {params.refusal} 2> {log}"
+        "pendpipe acquire --campaign {resources.configuration:q} --record {wildcards.record:q}"
+        " --out {output:q} {params.refusal} 2> {log:q}"

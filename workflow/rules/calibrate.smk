@@ -17,8 +17,8 @@ rule caliper:
     message:
         "the sensor against a caliper"
     shell:
-        "pendpipe acquire --campaign {resources.configuration} --caliper --out {output.table} 2> {log}"
-        " && pendpipe calibrate {output.table} {params.arm} --out {output.sensor} 2>> {log}"
+        "pendpipe acquire --campaign {resources.configuration:q} --caliper --out {output.table:q} 2> {log:q}"
+        " && pendpipe calibrate {output.table:q} {params.arm} --out {output.sensor:q} 2>> {log:q}"
 
 
 rule calibrate:
@@ -33,14 +33,12 @@ rule calibrate:
         "../envs/pendpipe.yaml"
     params:
         refusal=refusal,
-        sensor=lambda wildcards, input: (
-            f"--sensor {input.sensor}" if input.sensor else ""
-        ),
+        sensor=lambda wildcards, input: option("sensor", input.sensor or None),
         given=lambda wildcards: jobs.sensor_constant(CAMPAIGN, wildcards.record),
         repaired=repaired("{record}", "calibrate"),
         code=code_version("pendpipe.stages.calibrate"),
     message:
         "{wildcards.record}: calibrate"
     shell:
-        "pendpipe calibrate {input.recording} --record {wildcards.record} {params.sensor}"
-        " {params.given} --out {output} {params.refusal} 2> {log}"
+        "pendpipe calibrate {input.recording:q} --record {wildcards.record:q} {params.sensor}"
+        " {params.given} --out {output:q} {params.refusal} 2> {log:q}"

@@ -37,8 +37,8 @@ rule challenge_make:
     message:
         "make and seal {params.number} items"
     shell:
-        "pendpipe challenge make {params.folder} --sealed {params.sealed} --items {params.number}"
-        " {params.seed} {params.real} --workers {threads} 2> {log}"
+        "pendpipe challenge make {params.folder:q} --sealed {params.sealed:q} --items {params.number:q}"
+        " {params.seed} {params.real} --workers {threads} 2> {log:q}"
 
 
 rule challenge_solve:
@@ -56,7 +56,7 @@ rule challenge_solve:
     message:
         "solve the set"
     shell:
-        "pendpipe challenge solve {params.folder} --workers {threads} 2> {log}"
+        "pendpipe challenge solve {params.folder:q} --workers {threads} 2> {log:q}"
 
 
 rule challenge_open:
@@ -74,7 +74,7 @@ rule challenge_open:
     message:
         "check the seals and open the set"
     shell:
-        "pendpipe challenge open {params.folder} --sealed {params.sealed} 2> {log}"
+        "pendpipe challenge open {params.folder:q} --sealed {params.sealed:q} 2> {log:q}"
 
 
 rule challenge_score:
@@ -93,4 +93,4 @@ rule challenge_score:
     message:
         "score the set"
     shell:
-        "pendpipe challenge score {params.folder} --out {params.out} {params.page} > {log} 2>&1"
+        "pendpipe challenge score {params.folder:q} --out {params.out:q} {params.page} > {log:q} 2>&1"

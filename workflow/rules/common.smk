@@ -1,5 +1,6 @@
 # What the rules share: the checked configuration, and names. No rule, no physics.
 import re
+import shlex
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -8,40 +9,37 @@ from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
+from pendpipe.files import check_writable
 from pendpipe.provenance import code_version
 from pendpipe.stages.diagnose import DIAGNOSIS_FIGURES
 
 jobs.prepare_environment()
 
 
-def checked_campaign():
-    """Check the configuration before any job starts; a fault is one line."""
-    place = ", ".join(map(str, workflow.configfiles)) or "--config"
+def checked(call, *arguments):
+    """Call what may find the user's input wrong; an error is one line, without a traceback."""
     try:
-        return load_campaign(config, place)
-    except InputError as fault:
-        raise WorkflowError(str(fault)) from None
+        return call(*arguments)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
 
 
-CAMPAIGN = checked_campaign()
+CAMPAIGN = checked(
+    load_campaign, config, ", ".join(map(str, workflow.configfiles)) or "--config"
+)
+# The rules hand the file on as a resource: unlike a parameter, that is nothing to rerun for.
+# What a rule takes from the configuration is digested in its own parameters.
+CONFIGURATION = checked(jobs.store, CAMPAIGN, ".snakemake/pendpipe")
 RESULTS = CAMPAIGN.configuration.results
 RECORDS = [record.record for record in CAMPAIGN.records]
 FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
-# The rules hand it on as a resource: unlike a parameter, that is nothing to rerun for. What
-# a rule takes from the configuration is digested in its own parameters.
-CONFIGURATION = jobs.store(CAMPAIGN, ".snakemake/pendpipe")
 
 
 def in_every_folder(look):
     """What `look` finds in the campaign's folders of results, by folder."""
-    try:
-        return {
-            folder: look(Path(RESULTS, folder))
-            for folder in ("", "calibration", *RECORDS)
-        }
-    except InputError as fault:
-        raise WorkflowError(str(fault)) from None
+    folders = ("", "calibration", *RECORDS)
+    return {folder: checked(look, Path(RESULTS, folder)) for folder in folders}
 
 
 # Before any job has begun: while they run, results come and go.
@@ -64,7 +62,8 @@ wildcard_constraints:
 
 def refusal(wildcards):
     """The option that lets a stage refuse a record instead of failing."""
-    return "" if STRICT else f"--refused {RESULTS}/{wildcards.record}/refused.json"
+    refused = f"{RESULTS}/{wildcards.record}/refused.json"
+    return "" if STRICT else option("refused", refused)
 
 
 def of_all_records(name):
@@ -100,7 +99,7 @@ def figure_files():
 
 def option(name, value):
     """An option of the command line, or nothing."""
-    return "" if value is None else f"--{name} {value}"
+    return "" if value is None else f"--{name} {shlex.quote(str(value))}"
 
 
 def proof_option(wildcards):

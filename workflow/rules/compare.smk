@@ -18,5 +18,5 @@ rule compare:
     message:
         "the losses beside Eq. 16"
     shell:
-        "pendpipe compare --campaign {resources.configuration} --separation {input.separation}"
-        " --out {output.comparison} --summary {output.campaign} 2> {log}"
+        "pendpipe compare --campaign {resources.configuration:q} --separation {input.separation:q}"
+        " --out {output.comparison:q} --summary {output.campaign:q} 2> {log:q}"

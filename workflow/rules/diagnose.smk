@@ -22,7 +22,7 @@ rule diagnose:
     message:
         "{wildcards.record}: what physics is missing"
     shell:
-        "pendpipe diagnose {input.recording} --record {wildcards.record}"
-        " --calibration {input.calibration} --turning-points {input.turning_points}"
-        " --baseline {params.baseline} --level {params.level} --seed {params.seed}"
-        " --figures {params.figures} --out {params.folder} {params.refusal} > {log} 2>&1"
+        "pendpipe diagnose {input.recording:q} --record {wildcards.record:q}"
+        " --calibration {input.calibration:q} --turning-points {input.turning_points:q}"
+        " --baseline {params.baseline:q} --level {params.level:q} --seed {params.seed}"
+        " --figures {params.figures:q} --out {params.folder:q} {params.refusal} > {log:q} 2>&1"

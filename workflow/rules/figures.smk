@@ -26,5 +26,5 @@ rule figures:
     message:
         "figures 3 to 10"
     shell:
-        "pendpipe figures --campaign {resources.configuration} --comparison {input.comparison}"
-        " --out {params.folder} --processes {threads} 2> {log}"
+        "pendpipe figures --campaign {resources.configuration:q} --comparison {input.comparison:q}"
+        " --out {params.folder:q} --processes {threads} 2> {log:q}"

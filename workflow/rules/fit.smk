@@ -18,6 +18,6 @@ rule fit:
     message:
         "{wildcards.record}: fit a, b, c"
     shell:
-        "pendpipe fit {input.recording} --record {wildcards.record}"
-        " --calibration {input.calibration} --turning-points {input.turning_points}"
-        " --method {params.method} --seed {params.seed} --out {output} {params.refusal} 2> {log}"
+        "pendpipe fit {input.recording:q} --record {wildcards.record:q}"
+        " --calibration {input.calibration:q} --turning-points {input.turning_points:q}"
+        " --method {params.method:q} --seed {params.seed} --out {output:q} {params.refusal} 2> {log:q}"

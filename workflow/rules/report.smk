@@ -23,5 +23,5 @@ rule report:
     message:
         "the page about the campaign"
     shell:
-        "pendpipe report --campaign {resources.configuration} --comparison {input.comparison}"
-        " --summary {input.campaign} {params.proof} --out {output} 2> {log}"
+        "pendpipe report --campaign {resources.configuration:q} --comparison {input.comparison:q}"
+        " --summary {input.campaign:q} {params.proof} --out {output:q} 2> {log:q}"

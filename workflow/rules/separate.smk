@@ -16,4 +16,4 @@ rule separate:
     message:
         "hysteretic and viscous losses"
     shell:
-        "pendpipe separate --campaign {resources.configuration} --out {output} 2> {log}"
+        "pendpipe separate --campaign {resources.configuration:q} --out {output:q} 2> {log:q}"

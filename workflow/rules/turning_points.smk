@@ -15,5 +15,5 @@ rule turning_points:
     message:
         "{wildcards.record}: turning points"
     shell:
-        "pendpipe turning-points {input.recording} --record {wildcards.record}"
-        " --calibration {input.calibration} --out {output} {params.refusal} 2> {log}"
+        "pendpipe turning-points {input.recording:q} --record {wildcards.record:q}"
+        " --calibration {input.calibration:q} --out {output:q} {params.refusal} 2> {log:q}"

@@ -23,12 +23,13 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.stages.results import record_files, sensor_file
 
     campaign = load(arguments.campaign)
+    home = Path(campaign.configuration.results)
     inputs = [
         arguments.separation,
         sensor_file(campaign),
         *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
     ]
-    with job(arguments.out.parent, "compare", inputs=inputs) as running:
+    with job(home, "compare", inputs=inputs, out=arguments.out) as running:
         compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
         running.outputs += [arguments.out, arguments.summary]
     return 0

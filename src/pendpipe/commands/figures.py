@@ -47,7 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
         for entry in comparison["records"]
         for name in ("recording.csv", "turning_points.csv", "fit.json")
     ]
-    with job(folder, "figures", inputs=[arguments.comparison, *inputs]) as running:
+    inputs.append(arguments.comparison)
+    with job(folder, "figures", inputs=inputs, out=arguments.out) as running:
         return _draw(arguments, folder, comparison, running)
 
 

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     check([arguments.comparison])
     comparison = read_comparison(arguments.comparison)
     inputs = [arguments.comparison, arguments.summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs) as running:
+    with job(folder, "report", inputs=inputs, out=arguments.out) as running:
         page = render(
             configuration,
             comparison,

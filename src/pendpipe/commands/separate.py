@@ -21,8 +21,9 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.stages.separate import separate_campaign
 
     campaign = load(arguments.campaign)
+    home = Path(campaign.configuration.results)
     inputs = record_files(campaign, "fit.json", "calibration.json")
-    with job(arguments.out.parent, "separate", inputs=inputs) as running:
+    with job(home, "separate", inputs=inputs, out=arguments.out) as running:
         separate_campaign(campaign, arguments.out)
         running.outputs.append(arguments.out)
     return 0

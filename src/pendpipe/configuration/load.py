@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -14,6 +13,9 @@ from pendpipe.configuration.faults import as_input_error, nearest
 from pendpipe.configuration.models import Configuration, Geometry
 from pendpipe.configuration.records import Record, read_records
 from pendpipe.errors import InputError
+from pendpipe.files import read_json
+
+_NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,9 @@ def read_configuration(path: str | Path) -> dict[str, Any]:
         text = place.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(place, "there is no such configuration", "see config/README.md") from None
-    content = json.loads(text) if place.suffix == ".json" else _yaml(place, text)
+    except (OSError, UnicodeDecodeError) as fault:
+        raise InputError(place, f"it can't be read ({fault})", "give YAML in UTF-8") from None
+    content = read_json(place) if place.suffix == ".json" else _yaml(place, text)
     if not isinstance(content, dict):
         raise InputError(place, "this is no mapping of keys to values", "see config/README.md")
     return content
@@ -57,7 +61,9 @@ def _yaml(place: Path, text: str) -> Any:
         return yaml.safe_load(text)
     except yaml.MarkedYAMLError as fault:
         line = fault.problem_mark.line + 1 if fault.problem_mark else 1
-        raise InputError(f"{place}, line {line}", fault.problem or "no YAML", "mend it") from None
+        raise InputError(f"{place}, line {line}", fault.problem or "no YAML", "fix it") from None
+    except (yaml.YAMLError, RecursionError) as fault:
+        raise InputError(place, f"this is no YAML ({fault})", "fix it") from None
 
 
 def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
@@ -79,6 +85,7 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
         configuration = Configuration.model_validate(content)
     except ValidationError as fault:
         raise as_input_error(place, fault, Configuration) from None
+    _check_results(configuration.results, place)
     records = tuple(read_records(configuration.records))
     campaign = Campaign(configuration, records)
     for entry in records:
@@ -87,6 +94,22 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
     if configuration.typical_record is not None:
         campaign.record(configuration.typical_record)
     return campaign
+
+
+def _check_results(results: str, place: str | Path) -> None:
+    """Refuse a folder whose name shells, Snakemake's wildcards or Windows read otherwise."""
+    where = f"{place}, results"
+    if not results.strip() or results.startswith("-"):
+        raise InputError(where, f"'{results}' is no folder", "name one, such as results")
+    wrong = next((sign for sign in results if sign in _NOT_IN_A_FOLDER or sign < " "), None)
+    if wrong is not None:
+        raise InputError(
+            where, f"{wrong!r} can't stand in its name", "use letters, digits, spaces, / . _ -"
+        )
+    folder = Path(results)
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise InputError(where, f"{existing} is a file, not a folder", "name another folder")
 
 
 def _check_record(campaign: Campaign, entry: Record) -> None:

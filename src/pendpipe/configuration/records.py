@@ -26,6 +26,14 @@ COLUMNS: Final = (
 )
 REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+LONGEST_NAME: Final = 100
+"""The names of files made from it stay below the 255 bytes that file systems allow."""
+_OF_WINDOWS: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+_OF_THE_CAMPAIGN: Final = (
+    *("figures", "calibration", "logs", "manifest", "challenge", "challenge-sealed"),
+    *("campaign.json", "comparison.json", "separation.json", "report.html", "readme.md"),
+)
+"""What stands beside the records' folders."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,8 @@ def read_records(path: str | Path) -> list[Record]:
         text = place.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(place, "there is no such table", "see config/README.md") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise InputError(place, f"it can't be read ({fault})", "give a table in UTF-8") from None
     rows = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -122,10 +132,7 @@ def _check_columns(where: str, names: list[str]) -> None:
 
 def _record(where: str, row: dict[str, str]) -> Record:
     """Make a record from the cells of a row."""
-    if not NAME.fullmatch(row["record"]):
-        raise InputError(
-            where, f"'{row['record']}' is no name for a folder", "use letters, digits, . _ -"
-        )
+    _check_name(where, row["record"])
     if not row["source"]:
         raise InputError(where, "the source is blank", "write simulated, dataq:<port> or a file")
     words = {name: row.get(name, "") for name in COLUMNS[:6]}
@@ -136,6 +143,28 @@ def _record(where: str, row: dict[str, str]) -> Record:
         volts_per_radian=_number(where, row, "volts_per_radian"),
         temperature_c=_number(where, row, "temperature_c"),
     )
+
+
+def _check_name(where: str, name: str) -> None:
+    """Refuse what can't be the name of a folder on Linux, Windows and macOS alike."""
+    if len(name) > LONGEST_NAME:
+        raise InputError(
+            where,
+            f"the record's name has {len(name)} characters",
+            f"use at most {LONGEST_NAME}",
+        )
+    if not NAME.fullmatch(name) or name.endswith("."):
+        raise InputError(
+            where,
+            f"'{name}' is no name for a folder",
+            "use letters, digits, . _ -, and no dot at the end",
+        )
+    if _OF_WINDOWS.fullmatch(name):
+        raise InputError(where, f"Windows keeps the name '{name}' for itself", "rename the record")
+    if name.lower() in _OF_THE_CAMPAIGN:
+        raise InputError(
+            where, f"the campaign has a file or folder '{name}' of its own", "rename the record"
+        )
 
 
 def _number(where: str, row: dict[str, str], name: str) -> float | None:
@@ -155,13 +184,8 @@ def _number(where: str, row: dict[str, str], name: str) -> float | None:
 def _check_names(place: Path, records: list[Record]) -> None:
     """Refuse two records of one name, also where only the case differs (Windows)."""
     seen: dict[str, str] = {}
-    reserved = {"figures", "calibration"}
     for entry in records:
         key = entry.record.lower()
         if key in seen:
             raise InputError(place, f"the record '{entry.record}' stands twice", "rename one")
-        if key in reserved:
-            raise InputError(
-                place, f"'{entry.record}' is a folder of the campaign's own", "rename the record"
-            )
         seen[key] = entry.record

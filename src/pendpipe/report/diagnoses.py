@@ -10,11 +10,10 @@ from typing import Any, Final, NamedTuple
 from markupsafe import Markup
 
 from pendpipe.figures.data import number
-from pendpipe.files import read_json
+from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.report.health import Health
-from pendpipe.report.records import without_folders
 from pendpipe.report.vector import inline_svg
 
 VERDICTS: Final = {

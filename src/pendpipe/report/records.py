@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
-from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 from pendpipe.figures.data import Entry, error, number
+from pendpipe.files import without_folders
 from pendpipe.quantities import compact, pretty_unit, with_error
 from pendpipe.report.health import Health, health
 
@@ -35,8 +34,6 @@ COLUMNS: Final = (
     Column("chi2_per_dof", "χ²/dof"),
 )
 _MISFITS: Final = ("amplitude_rms_rad", "linear_damping_rms_rad")
-_PATH: Final = re.compile(r"(?<![\w./\\])(?:[A-Za-z]:[\\/]|~?/|\.{1,2}/)[^\s'\"(),;]+")
-"""An absolute path, or one that begins at a dot; not the slash of V/rad."""
 
 
 class Cell(NamedTuple):
@@ -207,12 +204,3 @@ def _noise(entry: Entry) -> Iterator[tuple[str, str]]:
 def _cut(cut: Mapping[str, Any]) -> str:
     start, stop = number(cut.get("start_s")), number(cut.get("stop_s"))
     return f"{start:.4g} s to {stop:.4g} s: {cut.get('reason', '')}"
-
-
-def without_folders(text: str) -> str:
-    """Keep the names of files and drop the folders: they are the user's own business.
-
-    >>> without_folders("/home/rdp/data/run 7.csv, line 3: no number")
-    'run 7.csv, line 3: no number'
-    """
-    return _PATH.sub(lambda found: PurePath(found.group().replace("\\", "/")).name, text)

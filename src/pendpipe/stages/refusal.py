@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import read_json, replaced, write_json
+from pendpipe.files import read_json, replaced, without_folders, write_json
 from pendpipe.manifest import check, job
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
@@ -98,11 +98,13 @@ def _work_or_refuse(
 
 
 def within_results(fault: InputError, refused: Path | None) -> str:
-    """What is written of a fault: a campaign's own files go by ``record/name``.
+    """What is written of an error: a campaign's own files go by ``record/name``.
 
-    Results name no path of the machine they were made on.
+    Results name no path of the machine they were made on: others go by their name alone.
     """
-    return str(fault) if refused is None else str(fault).replace(f"{refused.parent.parent}/", "")
+    if refused is None:
+        return str(fault)
+    return without_folders(str(fault).replace(f"{refused.parent.parent}/", ""))
 
 
 def reason_of(refused: Path, *, before: str | None = None) -> str | None:
