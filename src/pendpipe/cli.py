@@ -39,6 +39,7 @@ COMMANDS: Final = {
     "compare": "a campaign's losses beside Eq. 16",
     "figures": "the figures 3 to 10 of a campaign",
     "report": "one self-contained page about a campaign",
+    "doctor": "what is wrong with a campaign's results, and what is safe to do",
     "config": "check a configuration, or print its schema",
     "effects": "the catalogue of what may have been left out",
 }

@@ -142,14 +142,14 @@ def manifests(home: Path) -> Iterator[Manifest]:
             yield Manifest(home, path.stem)
 
 
-def damages_of(home: Path, stage: str) -> tuple[Manifest, list[Damage]]:
+def damages_of(home: Path, stage: str, *, hash_all: bool = False) -> tuple[Manifest, list[Damage]]:
     """Look for damage among a stage's results, its manifest included."""
     try:
         manifest = read_manifest(home, stage)
     except DamagedError as fault:
         manifest = Manifest(home, stage)
         return manifest, [Damage(manifest.path, fault.problem, sha256(manifest.path)[:8])]
-    return manifest, manifest.damages()
+    return manifest, manifest.damages(hash_all=hash_all)
 
 
 def histories(home: Path) -> tuple[dict[str, str], list[str]]:
@@ -281,7 +281,7 @@ def check(paths: Iterable[Path]) -> dict[Path, str]:
 
     A file that no manifest lists, from before there were manifests, is read as it is.
     """
-    index = _Index()
+    index = Index()
     hashes = {}
     for path in paths:
         if not path.is_file():
@@ -302,7 +302,7 @@ def check(paths: Iterable[Path]) -> dict[Path, str]:
     return hashes
 
 
-class _Index:
+class Index:
     """Finds the manifest that lists a file, reading each folder's manifests once."""
 
     def __init__(self) -> None:

@@ -1,0 +1,43 @@
+"""Examine a campaign's results: what was altered, is unfinished, or is in the way.
+
+Nothing is changed. Each line names a file or folder, what is wrong with it, and what is safe
+to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe doctor``."""
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path("results"),
+        metavar="DIR",
+        help="a folder of results (%(default)s)",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument(
+        "--fail-on", choices=("findings",), help="end with status 3 if anything is wrong"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Examine and print."""
+    import json
+
+    from pendpipe.doctor import examine
+
+    found = examine(arguments.folder)
+    if arguments.json:
+        findings = [finding._asdict() for finding in found]
+        print(json.dumps({"schema_version": 1, "findings": findings}, indent=1))
+    elif found:
+        print("\n".join(map(str, found)))
+    else:
+        print(f"{arguments.folder}: all results are as their stages wrote them")
+    return 3 if found and arguments.fail_on else 0

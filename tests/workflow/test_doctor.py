@@ -1,0 +1,106 @@
+"""`pendpipe doctor` names what is wrong with results, and changes nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pendpipe import manifest
+from pendpipe.cli import main
+from pendpipe.doctor import examine
+from pendpipe.files import sha256, write_json
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Results of one record: a recording, a fit made from it, and a separation."""
+    monkeypatch.chdir(tmp_path)
+    record = tmp_path / "results/air-01"
+    record.mkdir(parents=True)
+    recording, fit = record / "recording.csv", record / "fit.json"
+    with manifest.job(record, "acquire") as running:
+        recording.write_text("time_s,volts\n0.0,1.0\n")
+        running.outputs.append(recording)
+    with manifest.job(record, "fit", inputs=[recording]) as running:
+        write_json(fit, {"a": 1, "provenance": {"input_sha256": sha256(recording)}})
+        running.outputs.append(fit)
+    with manifest.job(record.parent, "separate", inputs=[fit]) as running:
+        write_json(record.parent / "separation.json", {"k": 3940})
+        running.outputs.append(record.parent / "separation.json")
+    return record.parent
+
+
+def kinds(results: Path) -> set[tuple[str, str]]:
+    return {(found.kind, Path(found.path).name) for found in examine(results)}
+
+
+def put(name: str, content: str = "x") -> Callable[[Path], object]:
+    def change(results: Path) -> None:
+        path = results / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+
+    return change
+
+
+def other_recording(results: Path) -> None:
+    with manifest.job(results / "air-01", "acquire") as running:
+        (results / "air-01/recording.csv").write_text("time_s,volts\n0.0,2.0\n")
+        running.outputs.append(results / "air-01/recording.csv")
+
+
+def killed_stage(results: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), manifest.job(results / "air-01", "calibrate"):
+        raise KeyboardInterrupt
+
+
+def test_sound_results_have_no_finding(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", str(results), "--fail-on", "findings"]) == 0
+    assert "as their stages wrote them" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (put("air-01/fit.json", "{}"), ("altered", "fit.json")),
+        (put("air-01/manifest/fit.json", "{"), ("altered", "fit.json")),
+        (lambda results: (results / "air-01/fit.json").unlink(), ("incomplete", "fit.json")),
+        (killed_stage, ("incomplete", "air-01")),
+        (other_recording, ("stale", "fit.json")),
+        (put("air-01/notes.csv"), ("orphaned", "notes.csv")),
+        (put("notes.json"), ("orphaned", "notes.json")),
+        (put("air-01/.fit.json.ab_12xyz"), ("temporary", ".fit.json.ab_12xyz")),
+        (put("air-01/fit.json.damaged-1a2b3c4d"), ("set-aside", "fit.json.damaged-1a2b3c4d")),
+        (put("live/raw/2026.raw"), ("raw", "2026.raw")),
+        (put("decay.raw"), ("raw", "decay.raw")),
+        (put("../.snakemake/locks/0.input.lock"), ("locked", "locks")),
+        (put("../.snakemake/incomplete/YQ=="), ("incomplete", "incomplete")),
+    ],
+)
+def test_each_thing_that_is_wrong_is_named(
+    results: Path,
+    change: Callable[[Path], object],
+    expected: tuple[str, str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    change(results)
+    before = {path: path.stat().st_mtime_ns for path in results.rglob("*")}
+    assert expected in kinds(results)
+    assert main(["doctor", str(results), "--fail-on", "findings"]) == 3
+    for line in capsys.readouterr().out.splitlines():
+        assert line.count("; ") >= 1, "each line ends with what is safe to do"
+    assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
+
+
+def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put("air-01/fit.json", "")(results)
+    assert main(["doctor", str(results), "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)["findings"]
+    assert {"kind", "path", "problem", "safe"} == set(findings[0])
+
+
+def test_a_folder_that_is_not_there_is_the_users_error(tmp_path: Path) -> None:
+    assert main(["doctor", str(tmp_path / "none")]) == 2
