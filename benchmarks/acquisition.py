@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.acquisition`` prints the tables and writes them into
 ``docs/acquisition.md`` (``make evidence`` does). A part may be named: ``faults``, ``slips``,
-``clock``, ``live``, ``kill``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``; parts not
-run keep their tables.
+``clock``, ``live``, ``kill``, ``flips``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``;
+parts not run keep their tables.
 Kills and fuzzing go on where they were broken off, as long as the code is the same.
 """
 
@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import journal
-from benchmarks.acquisition_live import live_table
+from benchmarks.acquisition_live import flip_table, live_table
 from benchmarks.acquisition_speed import speed_table
 from benchmarks.fuzz import fuzz_table
 from benchmarks.fuzz_seeds import windaq
@@ -538,6 +538,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "clock": clock_table,
     "live": live_table,
     "kill": kill_table,
+    "flips": flip_table,
     "disk": disk_table,
     "plug": plug_table,
     "speed": speed_table,

@@ -1,24 +1,32 @@
-"""Live recordings in a campaign: what unplugging, code changes and kills leave of them."""
+"""Recordings that must last: live ones in a campaign, and raw files with a flipped bit."""
 
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from pendpipe.acquire.decode import decode_recording
+from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.raw import read_raw
+from pendpipe.acquire.simulated import acquire_simulated
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.recording import read_plain
+from pendpipe.recording import GOOD, read_plain
 
+FLIPS: Final = 500
 ROOT: Final = Path(__file__).resolve().parents[1]
 SIGNAL: Final = """
 pendulum = {frequency_hz = 3.0, quality_factor_viscous = 60.0, release_angle_rad = 0.3}
@@ -189,3 +197,79 @@ def _live_rows(folder: Path, link: str, duration_s: float) -> Iterator[str]:
 def _row(what: str, status: int, campaign: LiveCampaign, verdict: str) -> str:
     length_s = read_plain(campaign.recording).time_s[-1]
     return f"{what} | {status} | {length_s:.2f} | {len(campaign.raw_files)} | {verdict}"
+
+
+def slow(time_s: FloatArray) -> FloatArray:
+    return np.asarray(5.0 * np.sin(0.02 * time_s))
+
+
+def recorded_bytes(kind: str) -> bytes:
+    """A raw recording of 40 s of the simulated device, some hundred frames."""
+    with tempfile.TemporaryDirectory(prefix="pendpipe-") as folder:
+        raw = Path(folder, "flips.raw")
+        acquire_simulated(
+            kind, slow, rate_hz=100.0, duration_s=40.0, clock_scale=20.0, raw_path=raw
+        )
+        return raw.read_bytes()
+
+
+@dataclass(frozen=True)
+class Flip:
+    """What one flipped bit of a raw file costs.
+
+    Parameters
+    ----------
+    noticed
+        Whether the recording's notes tell of it.
+    frames_lost, scans_lost
+        Frames and scans that are no longer there.
+    false_samples
+        Samples that are called good, and differ from those without the flip.
+    """
+
+    noticed: bool
+    frames_lost: int
+    scans_lost: int
+    false_samples: int
+
+
+def flip(whole: bytes, bit: int) -> Flip:
+    """Flip a bit of a raw file and decode it."""
+    damaged = bytearray(whole)
+    damaged[bit // 8] ^= 1 << bit % 8
+    before, after = decode_recording(whole), decode_recording(bytes(damaged))
+    raw_before, raw_after = read_raw(whole), read_raw(bytes(damaged))
+    good = after.usable if after.quality is None else after.usable & (after.quality == GOOD)
+    # Times count from the first scan that is there: the first frame of all may be lost.
+    size = find_driver(raw_after.header["model"]).decoder(1).bytes_per_scan
+    first = sum(-(-h.bytes_missing // size) for h in raw_after.holes if not h.at_byte)
+    rate_hz = 1.0 / before.interval_s
+    index = np.rint(after.time_s[good] * rate_hz).astype(np.int64) + first
+    inside = index < len(before)
+    false = int(np.sum(before.values[index[inside]] != after.values[good][inside]))
+    false += int(np.sum(~inside))
+    return Flip(
+        any("damaged" in note for note in after.notes),
+        len(raw_before.arrival_s) - len(raw_after.arrival_s),
+        len(before) - int(np.sum(good)),
+        false,
+    )
+
+
+def flip_table(_folder: Path) -> str:
+    """One flipped bit at random places of raw files."""
+    lines = [
+        "| device | flips | frames | opened and noticed | frames lost, most | scans lost, most | "
+        "false samples |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for kind in ("di154", "di149", "di245", "di2108"):
+        whole = recorded_bytes(kind)
+        instants = random.Random(7)
+        flips = [flip(whole, instants.randrange(8 * len(whole))) for _ in range(FLIPS)]
+        lines.append(
+            f"| {kind} | {len(flips)} | {len(read_raw(whole).arrival_s)} | "
+            f"{sum(one.noticed for one in flips)} | {max(one.frames_lost for one in flips)} | "
+            f"{max(one.scans_lost for one in flips)} | {sum(one.false_samples for one in flips)} |"
+        )
+    return "\n".join(lines)

@@ -467,7 +467,7 @@ def _raw_checked(random: Random) -> Case:
     """Damage under check sums that are right: what no disk, but a wrong program would do."""
     head, frames = seeds.raw_frames(random.choice(_raws()))
     for _ in range(random.choice((1, 1, 2, 4))):
-        what = random.randrange(6)
+        what = random.randrange(7)
         place = random.randrange(len(frames)) if frames else 0
         if what == 0:
             head = mutate(head, random).replace(b"\n", b" ")
@@ -480,14 +480,17 @@ def _raw_checked(random: Random) -> Case:
         elif not frames:
             continue
         elif what == 2:
-            kind, time_s, body = frames[place]
-            frames[place] = (kind, time_s, mutate(body, random) if body else b"x")
+            body = frames[place].content
+            frames[place] = frames[place]._replace(content=mutate(body, random) if body else b"x")
         elif what == 3:
-            kind, time_s, body = frames[place]
-            odd = random.choice([-1.0, 0.0, 1e300, float("nan"), float("inf"), time_s + 100.0, 1e7])
-            frames[place] = (kind, odd, body)
+            late_s = frames[place].time_s + 100.0
+            odd = random.choice([-1.0, 0.0, 1e300, float("nan"), float("inf"), late_s, 1e7])
+            frames[place] = frames[place]._replace(time_s=odd)
         elif what == 4:
             del frames[place]
+        elif what == 5:
+            at, stream = random.choice([0, 1, 500, 2**64 - 1]), random.choice([0, 1, 2, 65535])
+            frames[place] = frames[place]._replace(at_byte=at, stream=stream)
         else:
             frames.insert(place, random.choice(frames))
     return Case(seeds.raw_joined(head, frames))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import re
 import struct
 import zipfile
@@ -12,7 +11,7 @@ import zlib
 import numpy as np
 
 from pendpipe.acquire.devices.models import DEVICES
-from pendpipe.acquire.raw import RawWriter
+from pendpipe.acquire.raw import Frame, RawWriter, description_line
 from pendpipe.arrays import FloatArray
 
 ROWS = 30
@@ -226,28 +225,25 @@ def raw_file(model: str = "di2108", title: str = "DI-2108") -> bytes:
     return stream.getvalue()
 
 
-_FRAME = struct.Struct("<cIdI")
+_FRAME = struct.Struct("<4scIHQdI")
 
 
-def raw_frames(data: bytes) -> tuple[bytes, list[tuple[bytes, float, bytes]]]:
+def raw_frames(data: bytes) -> tuple[bytes, list[Frame]]:
     """Take a raw file apart: description, frames."""
     head, _, rest = data.partition(b"\n")
     frames, at = [], 0
     while at + _FRAME.size <= len(rest):
-        kind, length, time_s, _ = _FRAME.unpack_from(rest, at)
-        frames.append((kind, time_s, rest[at + _FRAME.size : at + _FRAME.size + length]))
-        at += _FRAME.size + length
+        _, kind, length, stream, at_byte, time_s, _ = _FRAME.unpack_from(rest, at)
+        at += _FRAME.size
+        frames.append(Frame(kind, time_s, rest[at : at + length], stream, at_byte))
+        at += length
     return head, frames
 
 
-def raw_joined(head: bytes, frames: list[tuple[bytes, float, bytes]]) -> bytes:
+def raw_joined(head: bytes, frames: list[Frame]) -> bytes:
     """Put it together again, check sums and all."""
-    parts = [head, b"\n"]
-    for kind, time_s, body in frames:
-        check = zlib.crc32(body, zlib.crc32(struct.pack("<cId", kind, len(body), time_s)))
-        parts += [_FRAME.pack(kind, len(body), time_s, check), body]
-    return b"".join(parts)
+    return b"".join([head, b"\n", *(frame.packed() for frame in frames)])
 
 
 def raw_header(change: dict[str, object]) -> bytes:
-    return json.dumps({"format": "pendpipe-raw", "version": 1, **RAW_HEADER, **change}).encode()
+    return description_line({**RAW_HEADER, **change})

@@ -20,7 +20,7 @@ from pendpipe.acquire.drivers.base import Setup
 from pendpipe.acquire.drivers.cdc import DI2108
 from pendpipe.acquire.noise import NoiseWatch
 from pendpipe.acquire.progress import ProgressLine
-from pendpipe.acquire.raw import RawWriter, read_raw
+from pendpipe.acquire.raw import Frame, RawWriter, read_raw
 from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
@@ -110,7 +110,7 @@ class FullDisk:
 
 
 def test_a_full_disk_keeps_every_whole_frame() -> None:
-    disk = FullDisk(600)
+    disk = FullDisk(1200)
     writer = RawWriter(disk, {"model": "DI-2108"})  # type: ignore[arg-type]
     pieces = [bytes([number]) * 20 for number in range(40)]
     with pytest.raises(OSError, match="No space left"):
@@ -118,7 +118,10 @@ def test_a_full_disk_keeps_every_whole_frame() -> None:
             writer.data(0.1 * number, piece)
     raw = read_raw(disk.content)
     assert b"".join(pieces).startswith(raw.data)
-    assert len(raw.data) // 20 == (600 - disk.content.index(b"\n") - 1) // (17 + 20)
+    described = len(disk.content) - len(disk.content.partition(b"\n")[2])
+    frame = len(Frame(b"D", 0.0, b"").packed())
+    # The description stands twice, the second time as a frame.
+    assert len(raw.data) // 20 == (1200 - 2 * described + 1 - frame) // (frame + 20)
 
 
 def test_a_full_file_system_is_one_line_and_what_was_kept_opens(tmp_path: Path) -> None:

@@ -57,7 +57,8 @@ def decode_recording(
     segments = split(raw, driver)
     kept = raw.event("stopped").get("keep_scans")
     if kept is not None and len(segments) == 1:
-        segments = [cut(segments[0], int(kept))]
+        gone = sum(loss.lost_scans for loss in segments[0].losses if loss.reason == "damage")
+        segments = [cut(segments[0], max(1, int(kept) - gone))]
     if not segments:
         raise NothingRecordedError(
             place, "no scan was recorded", "check the device, and record again"
@@ -231,5 +232,8 @@ def _notes(
     elif stopped.get("reason") not in COMPLETE:
         notes.append(f"ended early: {stopped.get('reason')} ({extent} kept)")
     if raw.damaged_bytes:
-        notes.append(f"{raw.damaged_bytes} bytes at the end of the raw file are no whole frame")
+        scans = sum(loss.lost_scans for loss in losses if loss.reason == "damage")
+        notes.append(
+            f"{raw.damaged_bytes} bytes of the raw file are damaged: {scans} scans are lost"
+        )
     return tuple(notes)

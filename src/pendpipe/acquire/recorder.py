@@ -100,7 +100,9 @@ def record(
         header |= {"volts_per_radian": volts_per_radian, "source": source}
         kept = {key: value for key, value in header.items() if value is not None}
         try:
-            session.run(RawWriter(stream, kept))
+            size = kind.decoder(len(session.setup.channels)).bytes_per_scan
+            bytes_per_s = session.setup.rate_hz * size
+            session.run(RawWriter(stream, kept, bytes_per_s=bytes_per_s))
         except OSError as fault:
             raise _cannot_write(raw_path or "memory", fault) from None
         content = stream.getvalue() if isinstance(stream, BytesIO) else None

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.acquire.clock_losses import find_clock_losses
 from pendpipe.acquire.drivers.base import Decoder, Driver, Loss
 from pendpipe.acquire.drivers.words import WordDecoder
-from pendpipe.acquire.raw import RawRecording
+from pendpipe.acquire.raw import Hole, RawRecording
 from pendpipe.acquire.slips import find_slips
 from pendpipe.arrays import AnyArray, FloatArray, IntArray
 
@@ -50,10 +50,15 @@ def split(raw: RawRecording, driver: type[Driver]) -> list[Segment]:
     edges.append(len(raw.data))
     scale = float(raw.header.get("clock_scale", 1.0))
     found: list[Segment] = []
-    for begin, end in pairwise(edges):
+    for number, (begin, end) in enumerate(pairwise(edges)):
         inside = (raw.arrived_bytes > begin) & (raw.arrived_bytes <= end)
         segment = _decode(
             raw.data[begin:end],
+            [
+                hole._replace(at_byte=hole.at_byte - begin)
+                for hole in raw.holes
+                if hole.stream == number
+            ],
             driver.decoder(len(raw.header["channels"])),
             raw.arrival_s[inside],
             raw.arrived_bytes[inside] - begin,
@@ -81,6 +86,7 @@ def offsets_s(segments: Sequence[Segment], rate_hz: float) -> list[float]:
 
 def _decode(
     data: bytes,
+    holes: Sequence[Hole],
     decoder: Decoder,
     arrival_s: FloatArray,
     arrived_bytes: IntArray,
@@ -88,7 +94,7 @@ def _decode(
     scale: float,
 ) -> Segment:
     """Decode one stream and look for what only the clock can tell."""
-    counts, losses = _scans_of(data, decoder)
+    counts, losses = _scans_of(data, holes, decoder)
     made, good = _scans_by(arrived_bytes, losses, decoder.bytes_per_scan)
     missing, limit_s = find_clock_losses(arrival_s, made, rate_hz, scale)
     for loss in missing:
@@ -100,28 +106,63 @@ def _decode(
     return Segment(counts, ordered, arrival_s, made, limit_s)
 
 
-def _scans_of(data: bytes, decoder: Decoder) -> tuple[AnyArray, tuple[Loss, ...]]:
-    """Decode a stream; one without marks is put into step again wherever it slips."""
+def _scans_of(
+    data: bytes, holes: Sequence[Hole], decoder: Decoder
+) -> tuple[AnyArray, tuple[Loss, ...]]:
+    """Decode a stream, put into step again behind every hole and, without marks, every slip."""
     size = decoder.bytes_per_scan
     parts: list[AnyArray] = []
     losses: list[Loss] = []
-    scans = begin = 0
-    for slip in find_slips(data, size // 2) if isinstance(decoder, WordDecoder) else []:
-        fed = decoder.feed(data[begin : slip.last_byte])
+    begin = scans = 0
+    marked = not isinstance(decoder, WordDecoder)
+    for cut in _cuts(data, holes, size, marked=marked):
+        fed = decoder.feed(data[begin : cut.last_byte])
         # (What might be the beginning of a stop code is held back.)
-        parts += [fed.counts, decoder.finish().counts]
-        scans = sum(map(len, parts))
-        thrown = slip.next_byte - slip.last_byte
-        lost, reason = -(-thrown // size), "slip" if slip.sure else "slip, channels unsure"
-        losses.append(Loss(scans, thrown, lost, suspect_before=True, reason=reason))
-        begin = slip.next_byte
-    fed, end = decoder.feed(data[begin:]), decoder.finish()
-    if not parts:
-        return (np.concatenate([fed.counts, end.counts]) if len(end) else fed.counts), (
-            *fed.losses, *end.losses,
-        )  # fmt: skip
-    # A decoder of words counts its scans on over a slip.
-    return np.concatenate([*parts, fed.counts, end.counts]), (*losses, *fed.losses, *end.losses)
+        ended = decoder.finish()
+        parts += [fed.counts, ended.counts]
+        # A decoder of words tells of a stop code whenever it ends: once is enough.
+        losses += [*fed.losses, *ended.losses] if marked else []
+        scans += len(fed) + len(ended)
+        thrown = cut.next_byte - cut.last_byte
+        lost = -(-(thrown + cut.bytes_missing) // size)
+        losses.append(Loss(scans, thrown, lost, suspect_before=cut.suspect, reason=cut.reason))
+        begin = cut.next_byte
+    fed, ended = decoder.feed(data[begin:]), decoder.finish()
+    # A decoder counts its scans on over a cut.
+    counts = [part for part in (*parts, fed.counts, ended.counts) if len(part)]
+    joined = np.concatenate(counts) if len(counts) > 1 else (counts or [fed.counts])[0]
+    return joined, (*losses, *fed.losses, *ended.losses)
+
+
+class _Cut(NamedTuple):
+    """Where a stream is taken apart: what is between the two bytes is thrown away."""
+
+    last_byte: int
+    next_byte: int
+    reason: str
+    bytes_missing: int = 0
+    suspect: bool = False
+
+
+def _cuts(data: bytes, holes: Sequence[Hole], size: int, *, marked: bool) -> list[_Cut]:
+    """Find the places where a stream of scans of so many bytes is out of step."""
+    cuts: list[_Cut] = []
+    begin = 0
+    for hole in (*holes, None):
+        end = len(data) if hole is None else hole.at_byte
+        if not marked:
+            for slip in find_slips(data[begin:end], size // 2):
+                reason = "slip" if slip.sure else "slip, channels unsure"
+                last, following = begin + slip.last_byte, begin + slip.next_byte
+                cuts.append(_Cut(last, following, reason, suspect=True))
+            begin = cuts[-1].next_byte if cuts else begin
+        if hole is None:
+            break
+        last = end - (end - begin) % size
+        following = end + -(end - last + hole.bytes_missing) % size
+        cuts.append(_Cut(last, min(following, len(data)), "damage", hole.bytes_missing))
+        begin = cuts[-1].next_byte
+    return cuts
 
 
 def _scans_by(
