@@ -20,6 +20,8 @@ _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""
 _CERTAIN: Final = 0.95
 """Probability from which an effect without rivals needs no further measurement."""
+_IMPROBABLE: Final = 0.01
+"""Probability below which a rival is not named beside more probable ones."""
 _SIGNIFICANT: Final = 3.0
 """Standard deviations from which a change of a parameter is reported as a bias."""
 _NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
@@ -120,7 +122,7 @@ def statement(
         f" {compact(noise_rms, unit)}.",
         *(_effect(effect) for effect in effects),
         _improvement(len(effects), before, after, held, unit),
-        _changes(before.parameters, after.parameters),
+        _changes(before.parameters, after.parameters, unit),
         _rest(unexplained, level, remainder),
     ]
     if swings is not None:
@@ -142,8 +144,8 @@ def _effect(effect: FoundEffect) -> str:
     if effect.location.summary:
         lead += f"; {effect.location.summary}"
     if effect.indistinguishable:
-        others = [f"{_rival(name)} ({_percent(share)})" for name, share in effect.indistinguishable]
-        lead += f". This recording alone cannot distinguish it from {_listed(others, 'or')}"
+        rivals = _listed(_rivals(effect.indistinguishable), "or")
+        lead += f". This recording alone cannot distinguish it from {rivals}"
     elif effect.probability > _CERTAIN or effect.kind == "unnamed":
         return f"{lead}."
     return _ended(f"{lead}. What to measure next: {effect.discriminating_test}")
@@ -165,16 +167,17 @@ def _improvement(
     by = with_error(abs(held.gain), sd)
     if held.gain < 0.0:
         return (
-            f"{text}, but cycles left out of the fit are predicted worse (log-likelihood lower by"
-            f" {by}), so the extended model fails this test."
+            f"{text}, but cycles left out of the fit are predicted worse, by {by} in"
+            " log-likelihood: the extended model fails this test."
         )
-    return f"{text}, and cycles left out of the fit are predicted better (log-likelihood up {by})."
+    better = f"and cycles left out of the fit are predicted better, by {by} in log-likelihood"
+    return f"{text}, {better}."
 
 
-def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate]) -> str:
+def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str) -> str:
     """What it changes in the small-angle period, in Q, and in the other parameters."""
-    parts = []
-    for name, of in (("small-angle period", _period), ("Q limit (pi f/b)", _quality_factor)):
+    parts, period = [], "small-angle period" if unit == "rad" else "period"
+    for name, of in ((period, _period), ("Q limit (pi f/b)", _quality_factor)):
         old, new = of(before), of(after)
         if old is None or new is None:
             continue
@@ -240,12 +243,20 @@ def _percent(share: float) -> str:
     """A probability in per cent."""
     if share > 0.995:
         return "> 99 %"
-    return f"{100.0 * share:.0f} %" if share > 0.01 else "< 1 %"
+    return f"{100.0 * share:.0f} %" if share > _IMPROBABLE else "< 1 %"
 
 
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):.0f}" if ratio > 9.95 else f"{ratio:.2g}"
+
+
+def _rivals(indistinguishable: Sequence[tuple[str, float]]) -> list[str]:
+    """The names of rivals with their probabilities; improbable ones only if there are no others."""
+    probable = [pair for pair in indistinguishable if pair[1] > _IMPROBABLE]
+    others = [] if len(probable) in (0, len(indistinguishable)) else ["others below 1 %"]
+    shown = probable or indistinguishable
+    return [*(f"{_rival(name)} ({_percent(share)})" for name, share in shown), *others]
 
 
 def _rival(identifier: str) -> str:
