@@ -189,7 +189,7 @@ def _nulls(done: Sequence[Outcome]) -> str:
     counts = Counter(entry["effects"][0][0] for entry in alarms)
     names = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
     return f"**False alarms** at 1 % nominal: {share(len(alarms), len(nulls))}" + (
-        f"; accused were {names}." if alarms else "."
+        f"; reported were {names}." if alarms else "."
     )
 
 
@@ -257,7 +257,7 @@ def _peers(done: Sequence[Outcome]) -> str:
     if not judged:
         return ""
     kinds = {
-        "nulls accused": [entry for entry in judged if entry["family"] == "null"],
+        "false alarms": [entry for entry in judged if entry["family"] == "null"],
         "at 50 detected": [entry for entry in judged if entry["size"] == 50.0],
         "at 100 detected": [entry for entry in judged if entry["size"] == 100.0],
     }

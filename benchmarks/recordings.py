@@ -37,8 +37,8 @@ SHOWN = ("adip", "AAAtAmp3", "data32", "dataset4")
 
 HEAD = """# Real recordings
 
-Recordings that others made, each through the whole tool with its path alone: no start or
-stop time, no layout, no unit is told. Made by
+Recordings of other laboratories, each through the whole tool with its path alone: no start or
+stop time, no layout and no unit are given. Made by
 
 ```sh
 snakemake --cores 2 --configfile benchmarks/shared_recordings.yaml
@@ -47,8 +47,8 @@ python -m benchmarks.recordings
 
 *Misfit* is the rms of turning-point amplitudes about the fitted law: Eq. 14 (a, b and c),
 and beside it linear damping alone (b), the textbook's exponential, on the same points with
-the same weights. Large chi^2 is to be expected: the recordings hold physics that Eq. 8
-leaves out (sin x, stiction, second modes). To find and name it is the diagnosis's work.
+the same weights. A large chi^2 is expected: the recordings contain physics that Eq. 8 lacks
+(sin x, stiction, second modes). The diagnosis finds and names it.
 """
 
 

@@ -1,4 +1,4 @@
-"""What the diagnosis says of the real recordings: its part of ``docs/recordings.md``."""
+"""The diagnoses of the real recordings: their part of ``docs/recordings.md``."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Content = Mapping[str, Any]
 
 
 class Known(NamedTuple):
-    """One known thing, and how it would show: the evidence in words, or None."""
+    """One known property, and a test of the diagnosis for it: the evidence in words, or None."""
 
     words: str
     shown: Callable[[Content], str | None]
 
 
 def by_name(*names: str) -> Callable[[Content], str | None]:
-    """One of these effects is named, or the record cannot tell it from what is named."""
+    """Whether one of these effects is named, or can't be distinguished from a named one."""
 
     def shown(content: Content) -> str | None:
         for effect in content["effects"]:
@@ -89,7 +89,7 @@ CIRCULAR = Known("circular error", by_name("circular-error"))
 COULOMB = Known("Coulomb friction", by_name("coulomb-friction"))
 DRAG = Known("quadratic drag", by_name("quadratic-drag"))
 STIFFENING = Known("stiffer below 0.04 rad", stiffens)
-WANDER = Known("slow wander of the level", warned("the level wanders"))
+WANDER = Known("slow wander of the offset", warned("the level wanders"))
 SPRING = Known("spring-type period change, no circular error", like_a_spring)
 
 KNOWN: Mapping[str, tuple[Known, ...]] = {
@@ -126,12 +126,12 @@ KNOWN_VISCOUS: Mapping[str, tuple[Known, ...]] = {
 
 
 def cell(known: tuple[Known, ...], content: Content) -> str:
-    """What is known of a recording, each item with what was found of it."""
-    told = []
+    """List what is known of a recording, each item with what was found of it."""
+    cells = []
     for item in known:
         found = item.shown(content)
-        told.append(f"{item.words}: " + (f"**found** ({found})" if found else "not found"))
-    return "; ".join(told)
+        cells.append(f"{item.words}: " + (f"**found** ({found})" if found else "not found"))
+    return "; ".join(cells)
 
 
 SHOWN = (
@@ -142,38 +142,50 @@ SHOWN = (
     ("filo0509", "residual_spectrum", "Spectrum of the residual"),
 )
 """Recording, figure, words."""
+ANSWERED = (
+    *("8050", "lab1_data", "damping_angle", "adip", "data2_14"),
+    *("data32", "1.3_100mA", "21337", "filo0509", "dataset4"),
+)
+"""Recordings whose paragraph is printed."""
 VISCOUS = ("1.3_100mA", "data32", "adip", "lab1_data")
 
-HEAD = """## What Eq. 8 leaves out in them
+HEAD = """## What Eq. 8 lacks in them
 
-`pendpipe diagnose` on the same files, nothing told. *Residual* is the rms of all readings
-used, without and with what was found; *over noise* is the square root of chi^2 per degree of
-freedom at the end (1 is perfect); *open* is the global p-value of what remains. Behind each
-name stand its probability and, in brackets, what the record can't tell apart from it.
+`pendpipe diagnose` on the same files, without options. *Residual* is the rms of all readings
+used, without and with the effects found; *over noise* is the square root of chi^2 per degree of
+freedom at the end (1 is perfect); *open* is the global p-value of the final residual. Behind each
+name stand its probability and, in brackets, the effects that the record can't distinguish from it.
 
-**Where more than 1.14 times the noise is left, the remainder is systematic**: a camera's
-distortion, an encoder's eccentricity or its lost counts, a bearing. A name is then kept only if it
-explains three quarters of the misfit and stands out against the rest (not against the noise); it
-is believed no more than the part that it explains; and all errors are widened by the excess
-per independent number of the rest. What is left has no name: it is drawn as a curve where
-one describes most of it, and *remainder* says in which parts of the motion it lies.
+**Where more than 1.14 times the noise remains, the misfit is systematic**: a camera's
+distortion, an encoder's eccentricity or its lost counts, a bearing. A named effect is then kept
+only if it explains three quarters of the misfit and is significant against the rest (not against
+the noise); its probability is at most the part that it explains; and all errors are enlarged by
+the excess per independent number of the rest. The rest has no name: it is described by a curve if
+one explains most of it, and *remainder* gives the parts of the motion in which it lies.
 
-What the recordings' README knows was told to nobody: the last column says which of it was
-found, and by what. The beat of filo0509, which the README gives as 9 s, is a line at 1.006 Hz
+Nothing in the recordings' README was given to the diagnosis: the last column lists what is known
+from it, and what was found of that. The beat of filo0509, 9 s in the README, is a line at 1.006 Hz
 beside the motion's 1.345 Hz: the beats come every 2.95 s. Amplitudes taken every 12 half cycles
-(4.46 s) go up and down in turns, every 8.9 s.
+(4.46 s) alternate, with a period of 8.9 s.
+"""
+
+ANSWERS_HEAD = """### Ten answers as they are printed
+
+What `pendpipe diagnose` prints, for string pendulums (8050, lab1_data, damping_angle), rods
+(adip, data2_14, data32), a torsion wheel (1.3_100mA), a ship's roll (21337), a mass on a spring
+(filo0509) and a Furuta arm (dataset4).
 """
 
 VISCOUS_HEAD = """### From the viscous baseline
 
-`pendpipe diagnose --baseline viscous`: Eq. 3 has neither Coulomb friction nor quadratic drag,
-so that both are to be found, beside what Eq. 8 leaves out. Names that stand for a part of a
-law that was not found (a step of the damping, a drift) are the tool's errors.
+`pendpipe diagnose --baseline viscous`: Eq. 3 has neither Coulomb friction nor quadratic drag, so
+that both should be found, beside what Eq. 8 lacks. Effects that stand for part of a law that was
+not found (a step of the damping, a drift) are errors of the tool.
 """
 
 COLUMNS = [
-    "| record | left out | residual (before, after) | over noise | open | remainder"
-    " | known, and what was found of it |",
+    "| record | missing | residual (before, after) | over noise | open | remainder"
+    " | known, and found |",
     "|---|---|---|---|---|---|---|",
 ]
 
@@ -182,7 +194,8 @@ def section(results: Path, names: list[str], images: Path) -> list[str]:
     """The section's lines; figures are copied to the documentation's images."""
     lines = [*HEAD.splitlines(), "", *COLUMNS]
     lines += table(results, names, "diagnosis", KNOWN)
-    lines += ["", *VISCOUS_HEAD.splitlines(), "", *COLUMNS]
+    lines += ["", *ANSWERS_HEAD.splitlines(), "", *answers(results)]
+    lines += [*VISCOUS_HEAD.splitlines(), "", *COLUMNS]
     lines += [*table(results, list(VISCOUS), "viscous", KNOWN_VISCOUS), ""]
     for name, figure, words in SHOWN:
         drawn = results / name / f"diagnosis/{figure}.svg"
@@ -191,6 +204,17 @@ def section(results: Path, names: list[str], images: Path) -> list[str]:
             shutil.copyfile(drawn, target)
             lines += [f"![{words} of {name}](images/{target.name})", ""]
     return lines
+
+
+def answers(results: Path) -> list[str]:
+    """Quote the paragraphs of some recordings."""
+    found = [(name, results / name / "diagnosis/diagnosis.json") for name in ANSWERED]
+    quoted = [
+        [f"**{name}.** {read_json(path)['statement']}", ""]
+        for name, path in found
+        if path.is_file()
+    ]
+    return [line for lines in quoted for line in lines]
 
 
 def table(

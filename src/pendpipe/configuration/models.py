@@ -169,10 +169,10 @@ class Diagnose(Section):
 
     enabled: bool = Field(True, description="whether the records are diagnosed")
     baseline: Literal["eq8", "viscous"] = Field(
-        "eq8", description="what they are held against: Eq. 8, or Eq. 3 (linear damping alone)"
+        "eq8", description="the null model: Eq. 8, or Eq. 3 (linear damping alone)"
     )
     level: Annotated[float, Field(gt=0, lt=1)] = Field(
-        0.01, description="how often a record that lacks nothing may be accused"
+        0.01, description="false-alarm probability for a record that lacks nothing"
     )
     figures: Literal["all", "found", "none"] = Field(
         "found", description="draw them for all records, or where something is missing, or never"
