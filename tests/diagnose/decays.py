@@ -47,7 +47,7 @@ class Pendulum:
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a test of forensics is given."""
+    """The input of a test of the measurement."""
 
     data: Data
     fit: Fit

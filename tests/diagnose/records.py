@@ -1,4 +1,4 @@
-"""Short recordings with something left out of Eq. 8, and their diagnoses, each made once."""
+"""Short recordings with an effect that Eq. 8 lacks, and their diagnoses, each made once."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ VALUES: dict[str, tuple[float, ...]] = {
     "sensor-quadratic": (0.02,),
     "sensor-cubic": (0.2,),
 }
-"""Effects that stand out of the noise by ten standard deviations or more."""
+"""Effects of ten standard deviations or more."""
 
 
 def white(seed: int, count: int = len(TIME_S), rms: float = NOISE_RAD) -> FloatArray:
@@ -102,7 +102,7 @@ def null_fit(seed: int = 3) -> tuple[Fit, Data, Noise]:
 
 
 def _dropped() -> FloatArray:
-    """Three readings are missing at 46.7 s, and no gap in the times tells."""
+    """Three readings are missing at 46.7 s, without a gap in the times."""
     whole = other_engine(TRUTH)
     return np.concatenate([whole[:700], whole[703:]])
 
@@ -131,8 +131,8 @@ def diagnosed(name: str, seed: int = 1) -> Outcome:
     return diagnose_recording(recording(make(), seed))
 
 
-def accused(outcome: Outcome) -> list[set[str]]:
-    """The identifiers of each accusation's class."""
+def classes_found(outcome: Outcome) -> list[set[str]]:
+    """The identifiers of each found effect's class."""
     return [
         {effect.identifier, *(name for name, _ in effect.indistinguishable)}
         for effect in outcome.diagnosis.effects

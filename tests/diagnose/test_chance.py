@@ -72,7 +72,7 @@ def test_the_draws_follow_their_seed() -> None:
     assert draw_chance(bank, None, seed=3) != draw_chance(bank, None, seed=4)
 
 
-def test_the_whole_catalogue_accuses_noise_as_often_as_it_says() -> None:
+def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() -> None:
     """Of 80 fresh residuals a tenth have p < 0.1, and three tenths p < 0.3."""
     fit, data, noise = null_fit()
     scanner = prepare(fit, data, noise, applicable(CATALOGUE, fit, "eq8", "rad"))

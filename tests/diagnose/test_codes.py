@@ -1,4 +1,4 @@
-"""Which codes come: coarser lattices, combs, and what is neither."""
+"""Which codes occur: coarser lattices, combs, and neither."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def code() -> FloatArray:
 
 
 def asked(readings: FloatArray, name: str) -> Finding:
-    """One test, where the file says what the converter's step is."""
+    """One test, where the file gives the converter's step."""
     record = fitted(AIR, readings)
     samples = with_true_step(replace(record.samples, step=STEP_16, promised_step=None))
     return TESTS[name](record.data, record.fit, record.noise, samples)
 
 
 @pytest.mark.parametrize("dead", [1, 2, 3])
-def test_bits_that_do_not_move_make_a_coarser_step(dead: int, code: FloatArray) -> None:
+def test_dead_bits_make_a_coarser_step(dead: int, code: FloatArray) -> None:
     """And no code is missing on the lattice that is left."""
     coarse = 2**dead * np.floor(code / 2**dead)
     finding = asked(STEP_16 * coarse, "coarse-quantisation")
@@ -66,7 +66,7 @@ def test_a_step_of_any_size_before_the_converter_is_a_coarser_step(times: float)
         assert asked(readings, other).p_value > 1e-3
 
 
-def test_a_coarse_step_before_the_converter_is_all_that_is_said(code: FloatArray) -> None:
+def test_a_coarse_step_before_the_converter_is_all_that_is_reported(code: FloatArray) -> None:
     readings = rounded(rounded(STEP_16 * code, 12.62 * STEP_16), STEP_16)
     record = Recording(AIR.times(), readings, "angle_rad", resolution=STEP_16)
     effects = diagnose_recording(record).diagnosis.effects
@@ -76,7 +76,7 @@ def test_a_coarse_step_before_the_converter_is_all_that_is_said(code: FloatArray
 
 @pytest.mark.parametrize("spacing", [2.2, math.e, math.pi, 7.3, 25.2, 1e3 / 3.0])
 def test_the_spacing_of_codes_is_that_of_the_lattice_they_are_roundings_of(spacing: float) -> None:
-    """Though every fourth of them never comes."""
+    """Though every fourth of them never occurs."""
     for seed in range(20):
         generator = np.random.default_rng(seed)
         number = np.flatnonzero(generator.random(200) < 0.75)
@@ -93,7 +93,7 @@ def test_codes_that_lie_anywhere_have_no_spacing(usual: float, seed: int) -> Non
 
 @pytest.mark.parametrize("period", [4, 16, 64])
 def test_a_comb_of_missing_codes_is_no_coarser_step(period: int, code: FloatArray) -> None:
-    """No single code may be due often enough; all of them together are."""
+    """No single code may be expected often enough; all of them together are."""
     readings = STEP_16 * (code + (code % period == 3))
     finding = asked(readings, "missing-codes")
     assert finding.p_value < 1e-6
@@ -109,8 +109,8 @@ def test_a_good_converters_codes_lie_on_its_own_lattice(code: FloatArray) -> Non
     assert asked(STEP_16 * code, "missing-codes").p_value > 1e-3
 
 
-def test_combs_that_chance_makes_are_as_rare_as_they_say() -> None:
-    """Codes drawn at random from where they are due."""
+def test_combs_that_chance_makes_are_as_rare_as_their_p_value() -> None:
+    """Codes drawn at random from their expectation."""
     generator, seldom = np.random.default_rng(5), 0
     due = np.pad(np.full((3, 398), 8000 / 398), ((0, 0), (1, 1)))
     for _ in range(200):
@@ -121,7 +121,7 @@ def test_combs_that_chance_makes_are_as_rare_as_they_say() -> None:
     assert seldom <= binom.isf(1e-3, 200, 0.05)
 
 
-def test_one_stuck_bit_is_told_as_either(code: FloatArray) -> None:
+def test_one_stuck_bit_may_be_either_effect(code: FloatArray) -> None:
     time = AIR.times()
     readings = STEP_16 * 2.0 * np.floor(code / 2.0)
     record = Recording(time, readings, "angle_rad", resolution=STEP_16)

@@ -36,7 +36,7 @@ def fitted(kind: type[DampingCurve] | type[DriveCurve], quadratic: float) -> tup
     return fit, effect
 
 
-def test_a_loss_curve_is_the_loss_that_was_left_out() -> None:
+def test_a_loss_curve_is_the_missing_loss() -> None:
     """Quadratic drag takes -dy/dt = a y^2: a loss rate of a y (Eq. 13)."""
     fit, effect = fitted(DampingCurve, QUADRATIC)
     found = curve_values(fit, effect)  # type: ignore[arg-type]

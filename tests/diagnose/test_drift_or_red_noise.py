@@ -1,4 +1,4 @@
-"""Slow noise, or something slow: what passes for one colour of the noise may be a drift."""
+"""Red noise or a slow effect: apparent red noise may be a drift."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def named(readings: FloatArray, seed: int) -> set[str]:
     }
 
 
-def test_weak_drifts_of_the_level_in_white_noise_are_told_from_red_noise() -> None:
+def test_weak_drifts_of_the_offset_in_white_noise_are_distinguished_from_red_noise() -> None:
     """Delta chi^2 = (slope/sigma)^2 sum (t - mean t)^2 = 64; found in most of twelve."""
     centred = TIME_S - TIME_S.mean()
     slope = 8.0 * NOISE_RAD / np.sqrt(centred @ centred)
@@ -33,14 +33,14 @@ def test_weak_drifts_of_the_level_in_white_noise_are_told_from_red_noise() -> No
     assert np.mean(found) > 0.5
 
 
-def test_red_noise_is_not_accused_of_drifting() -> None:
+def test_red_noise_is_not_reported_as_a_drift() -> None:
     """Twice the white density at 0.05 Hz, as 1/f below; four of 24 would be one in ten thousand."""
     frequency = np.arange(len(TIME_S)) / (2.0 * len(TIME_S) * INTERVAL_S)
     spectrum = 1.0 + np.where(frequency < 0.05, 0.05 / np.maximum(frequency, frequency[1]), 0.0)
-    accused = 0
+    reported = 0
     for seed in range(24):
         cosines = np.sqrt(spectrum) * np.random.default_rng(seed).standard_normal(len(TIME_S))
         noise = NOISE_RAD * idct(cosines, norm="ortho")
         found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad")).diagnosis
-        accused += any(effect.identifier in SLOW for effect in found.effects)
-    assert binom.sf(accused - 1, 24, 0.01) > 1e-3
+        reported += any(effect.identifier in SLOW for effect in found.effects)
+    assert binom.sf(reported - 1, 24, 0.01) > 1e-3

@@ -1,4 +1,4 @@
-"""What looked like a fault before the physics was known is looked at again behind it."""
+"""What looked like a fault before the physics was known is tested again with it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LEVEL, ODD = 0.01, 812
 
 
 def blamed(error: float) -> tuple[Forensics, State]:
-    """A search whose model is right at last, and one reading that was left out as a glitch."""
+    """A search with the right model, and one reading that was masked as a glitch."""
     readings = other_engine(TRUTH) + white(21)
     # Its own noise taken off: it is wrong by just so much.
     readings[ODD] = other_engine(TRUTH)[ODD] + error * NOISE_RAD
@@ -42,7 +42,7 @@ def blamed(error: float) -> tuple[Forensics, State]:
 
 
 @pytest.mark.parametrize("error", [0.5, 3.0, -3.5])
-def test_a_reading_that_noise_explains_in_the_end_comes_back(error: float) -> None:
+def test_a_reading_that_noise_explains_in_the_end_returns(error: float) -> None:
     forensics, state = blamed(error)
     before = state.fit
     assert forensics.again(state, silent)
@@ -72,8 +72,8 @@ def clipped_at(level_rad: float) -> FloatArray:
     return np.minimum(other_engine(TRUTH) + white(5), level_rad)
 
 
-def test_a_range_that_ends_is_said_once() -> None:
-    """A sensor that bends is tried first; with the readings at the end left out it is needless."""
+def test_clipping_is_reported_once() -> None:
+    """A nonlinear sensor is tried first; with the clipped readings masked it is not needed."""
     level = 0.9 * float(other_engine(TRUTH).max())
     record = Recording(TIME_S, clipped_at(level), "angle_rad")
     found = diagnose_recording(record).diagnosis

@@ -1,4 +1,4 @@
-"""Between the rows of a scan of instants: the fit must end where the truth's own does."""
+"""Between the instants of a scan: the fit must end where one from the truth does."""
 
 from __future__ import annotations
 

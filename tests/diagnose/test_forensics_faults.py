@@ -1,4 +1,4 @@
-"""Each fault of the measurement is found, measured, and taken for no other."""
+"""Each fault of the measurement is found, measured, and not taken for another."""
 
 from __future__ import annotations
 
@@ -77,9 +77,7 @@ def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
-def test_few_glitches_of_one_size_do_not_pass_for_each_others_tail(
-    number: int, clean: FloatArray
-) -> None:
+def test_few_glitches_of_one_size_are_not_taken_for_a_tail(number: int, clean: FloatArray) -> None:
     """Seven standard deviations: one is as rare as 3e-12, and two make no tail."""
     where = np.linspace(300, AIR.count - 300, number).astype(int)
     readings = clean + white(generator(3), AIR.count)
@@ -98,7 +96,7 @@ def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:
     assert np.flatnonzero(finding.mask).tolist() == where
 
 
-def test_a_step_of_the_level_is_no_glitch(clean: FloatArray) -> None:
+def test_a_step_of_the_offset_is_not_a_glitch(clean: FloatArray) -> None:
     readings = clean + white(generator(), AIR.count)
     readings[1500:] += 10.0 * NOISE
     finding = found(fitted(AIR, readings)).get("glitches")
@@ -117,7 +115,7 @@ def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None
 
 
 @pytest.mark.parametrize("codes", [(20,), (-40, -7, 11)])
-def test_codes_that_never_come_are_named(codes: tuple[int, ...], clean: FloatArray) -> None:
+def test_codes_that_never_occur_are_named(codes: tuple[int, ...], clean: FloatArray) -> None:
     exact = np.round((clean + 10.0 * white(generator(), AIR.count)) / STEP_12).astype(np.int64)
     finding = found(fitted(AIR, STEP_12 * (exact - np.isin(exact, codes))))["missing-codes"]
     assert finding.location.adc_codes == codes
@@ -133,7 +131,7 @@ def test_a_stuck_bit_is_named(bit: int, clean: FloatArray) -> None:
     assert finding.parameters["bit"].value == bit
 
 
-def test_a_step_is_said_to_rule_only_where_it_does(clean: FloatArray) -> None:
+def test_a_coarse_step_is_reported_only_where_it_matters(clean: FloatArray) -> None:
     noise = generator().standard_normal(AIR.count)
     coarse = fitted(AIR, rounded(clean + 0.1 * STEP_12 * noise, STEP_12))
     finding = TESTS["coarse-quantisation"](coarse.data, coarse.fit, coarse.noise, coarse.samples)
@@ -170,8 +168,8 @@ def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> N
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_an_amplitude_that_is_held_tells_no_jitter_and_stops_nothing(seed: int) -> None:
-    """As of a recording that is driven first: v^2's mean can't be told from the noise's level."""
+def test_a_constant_amplitude_shows_no_jitter_and_stops_nothing(seed: int) -> None:
+    """As in a recording that is driven first: the mean of v^2 looks like the noise's variance."""
     held = Pendulum(quality_factor=1e10, quadratic=0.0, coulomb=0.0)
     clean = held.model().reading(held.values())
     record = fitted(held, clean + white(generator(seed), held.count))
@@ -201,7 +199,7 @@ def test_a_random_torque_is_measured(clean: FloatArray) -> None:
     assert np.mean(np.abs(pulls)) < 2.0
 
 
-def test_stiffness_left_out_is_no_random_torque() -> None:
+def test_missing_stiffness_is_not_a_random_torque() -> None:
     stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (CubicStiffness(),))
     readings = stiff.reading(np.append(AIR.values(), 3e-3)) + white(generator(), AIR.count)
     record = fitted(AIR, readings)
@@ -210,7 +208,7 @@ def test_stiffness_left_out_is_no_random_torque() -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
-def test_stamps_are_believed_where_they_are_true(share: float, clean: FloatArray) -> None:
+def test_time_stamps_are_used_where_they_are_right(share: float, clean: FloatArray) -> None:
     draw = generator()
     stamps = AIR.times() + draw.uniform(-5e-4, 5e-4, AIR.count)
     true = stamps + share * (AIR.times() - stamps)
@@ -270,7 +268,7 @@ def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
     return Fitted(data, fit, noise, record.samples)
 
 
-def test_codes_are_judged_behind_a_mended_clock() -> None:
+def test_codes_are_tested_after_a_corrected_clock() -> None:
     """Ten samples are lost in the middle; the data's times are right, the samples' are not."""
     longer = Pendulum(count=AIR.count + 10)
     kept = np.delete(np.arange(longer.count), slice(2000, 2010))
@@ -278,16 +276,16 @@ def test_codes_are_judged_behind_a_mended_clock() -> None:
     noisy = longer.model().reading(longer.values()) + noise
     exact = np.round(noisy / STEP_12).astype(np.int64)
     readings = (STEP_12 * (exact + np.isin(exact, (20,))))[kept]
-    mended = fitted(AIR, readings, longer.times()[kept])
-    samples = replace(mended.samples, time_s=AIR.times()[: len(kept)])
-    finding = TESTS["missing-codes"](mended.data, mended.fit, mended.noise, samples)
+    corrected = fitted(AIR, readings, longer.times()[kept])
+    samples = replace(corrected.samples, time_s=AIR.times()[: len(kept)])
+    finding = TESTS["missing-codes"](corrected.data, corrected.fit, corrected.noise, samples)
     assert finding.location.adc_codes == (20,)
 
 
 FAST = Pendulum(rate_hz=400.0, count=20_000)
 
 
-def test_the_codes_behind_means_of_readings_are_judged() -> None:
+def test_the_codes_of_averaged_readings_are_tested() -> None:
     noisy = FAST.model().reading(FAST.values()) + 1e-3 * generator().standard_normal(FAST.count)
     exact = np.round(noisy / STEP_12).astype(np.int64)
     findings = found(folded(FAST, STEP_12 * (exact + np.isin(exact, (30,)))))
@@ -295,7 +293,7 @@ def test_the_codes_behind_means_of_readings_are_judged() -> None:
     assert findings["missing-codes"].location.adc_codes == (30,)
 
 
-def test_the_range_behind_means_of_readings_is_judged() -> None:
+def test_the_range_of_averaged_readings_is_tested() -> None:
     noisy = FAST.model().reading(FAST.values()) + white(generator(), FAST.count)
     record = folded(FAST, rounded(np.minimum(noisy, 0.15), STEP_16))
     findings = found(record)
@@ -337,10 +335,10 @@ def test_glitches_need_no_model(clean: FloatArray) -> None:
         assert (finding.p_value < 1e-3) == bool(expected)
 
 
-def test_lost_samples_that_no_motion_could_follow_are_not_mended(
+def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Behind a loss that outlasts the motion there is none to compare: the record stays."""
+    """After a loss longer than the motion there is nothing to compare: the record stays."""
     fit, data, noise = null_fit()
     late = LostSamples(float(data.time_s[-20]), 10**9, 1e9, 1.0)
     monkeypatch.setattr("pendpipe.diagnose.faults.find_lost_samples", lambda *_: [late])

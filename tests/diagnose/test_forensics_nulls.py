@@ -1,4 +1,4 @@
-"""Noise alone is taken for no fault, whatever its kind."""
+"""Noise alone is not taken for a fault, whatever its kind."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_noise_is_no_fault(kind: str) -> None:
         assert values.min() > 2e-4, name
 
 
-def test_the_jitter_test_says_p_as_often_as_p() -> None:
+def test_the_p_values_of_the_jitter_test_are_uniform() -> None:
     values = np.concatenate([p_values(kind)["jitter"] for kind in ("white", "Student, nu = 5")])
     # Kolmogorov and Smirnov's distance from the diagonal, at 1 %.
     ordered, steps = np.sort(values), np.arange(1, len(values) + 1) / len(values)
@@ -51,7 +51,7 @@ def test_the_jitter_test_says_p_as_often_as_p() -> None:
 
 
 @pytest.mark.parametrize("freedom", [1e9, 8.0])
-def test_the_largest_of_many_errors_is_judged_by_their_tail(freedom: float) -> None:
+def test_the_largest_of_many_errors_is_tested_against_their_tail(freedom: float) -> None:
     generator = np.random.default_rng(4)
     chances = []
     for _ in range(300):
@@ -62,7 +62,7 @@ def test_the_largest_of_many_errors_is_judged_by_their_tail(freedom: float) -> N
         assert np.sum(np.array(chances) < level) < expected + 3.3 * math.sqrt(expected)
 
 
-def test_rounding_does_not_promise_thin_tails() -> None:
+def test_rounding_does_not_imply_thin_tails() -> None:
     # A step of 2.3 standard deviations fills the bulk of the errors and leaves their tails.
     generator, step, chances, unaware = np.random.default_rng(5), 2.3, [], []
     for _ in range(200):
@@ -78,7 +78,7 @@ def test_rounding_does_not_promise_thin_tails() -> None:
 
 
 def ruled_by_rounding(seed: int, extra: FloatArray | float = 0.0) -> tuple[Fitted, float]:
-    """A tenth of a step of noise, judged as in a search; and what is said of it in steps."""
+    """A tenth of a step of noise, estimated as in a search; and the finding, in steps."""
     noise = 0.1 * STEP_16 * np.random.default_rng(seed).standard_normal(AIR.count)
     clean = CLEAN.setdefault(AIR, AIR.model().reading(AIR.values()))
     record = fitted(AIR, rounded(clean + noise, STEP_16) + extra)
@@ -89,7 +89,7 @@ def ruled_by_rounding(seed: int, extra: FloatArray | float = 0.0) -> tuple[Fitte
     return record, finding.parameters["noise_over_step"].value
 
 
-def test_a_reading_on_the_other_side_of_a_codes_edge_is_no_glitch() -> None:
+def test_a_reading_beyond_the_edge_of_a_code_is_not_a_glitch() -> None:
     # It is a whole step off the code that was due, and yet hardly half a step off the angle.
     for seed in range(20):
         record, before_rounding = ruled_by_rounding(seed)

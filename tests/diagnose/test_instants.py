@@ -1,4 +1,4 @@
-"""An instant is known as well as chi^2 says, in whichever half cycle its minimum comes to lie."""
+"""Intervals of instants hold the truth, in whichever half cycle chi^2 has its minimum."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_hard_knock_is_known_to_a_part_of_a_cycle() -> None:
     assert 1.96 * estimates["time"].sd < 0.25 / FREQUENCY_HZ
 
 
-def test_what_happens_at_no_instant_is_left_alone() -> None:
+def test_an_effect_without_an_instant_is_unchanged() -> None:
     effect = by_identifier("frequency-drift")
     data, noise = prepared(other_engine(TRUTH) + noise_of(2))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)

@@ -1,4 +1,4 @@
-"""The name that is reported is the likelier in the end, whatever was taken first."""
+"""The reported effect is the likelier one in the end, whichever was added first."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .test_one_curve import pulled
 
 @functools.cache
 def magnet() -> Outcome:
-    """A torque of no catalogue, drawn as a curve."""
+    """A torque outside the catalogue, described by a curve."""
     return diagnose_recording(recording(pulled(), 5))
 
 
@@ -36,7 +36,7 @@ def wrong_loss() -> Outcome:
 
 
 def having_taken(outcome: Outcome, name: str) -> Search:
-    """The same search, had it added another of the effects that it refitted."""
+    """The same search as if it had added another of the refitted effects."""
     found = outcome.search
     (step,) = found.steps
     first = next(rival for rival in step.rivals if rival.identifier == name)
@@ -56,7 +56,7 @@ def having_taken(outcome: Outcome, name: str) -> Search:
 
 
 def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
-    """Who leads in the end where another was taken first, and all probabilities."""
+    """Return the final leader if another was added first, and all probabilities."""
     found, (weighed,) = swap_in_likelier(having_taken(outcome, name), outcome.beginning)
     (step,) = found.steps
     own, *others = weighed.weights[:-1].tolist()
@@ -65,8 +65,8 @@ def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Sea
 
 
 @pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
-def test_a_likelier_name_takes_the_place_of_what_was_taken_first(taken: str) -> None:
-    """All follow the swings of a pendulum whose torque is sin x: that it is, is known."""
+def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
+    """All fit a pendulum whose torque is sin x; the prior knows that it is."""
     step, own, mates, found = led(diagnosed("circular-error"), taken)
     assert step.winner.identifier == "circular-error"
     assert own > max(mates.values())
@@ -96,7 +96,7 @@ def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
 def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     odds: float, leads: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Curves follow any law: names go before them, but not where that is told from the name."""
+    """Curves can follow any law: names precede them unless the recording excludes the name."""
 
     def weighed(*asked: Any) -> Weighed:
         found = weigh(*asked)
@@ -110,13 +110,13 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     assert found.steps[0].winner.identifier == leads
 
 
-def test_the_likelier_of_two_curves_is_drawn() -> None:
+def test_the_likelier_of_two_curves_is_reported() -> None:
     step, own, mates, _ = led(magnet(), "unnamed-measurement")
     assert step.winner.identifier == "unnamed-restoring"
     assert own > max(mates.values())
 
 
-def test_a_wrong_parameter_takes_the_place_of_missing_physics() -> None:
+def test_a_wrong_parameter_replaces_missing_physics() -> None:
     """It is fitted then, and comes out right."""
     taken = next(
         rival.identifier
@@ -130,7 +130,7 @@ def test_a_wrong_parameter_takes_the_place_of_missing_physics() -> None:
     assert abs(found.improved.value[B] - TRUTH[B]) < 4.0 * sd
 
 
-def test_what_came_next_is_judged_beside_the_effect_that_leads_now(
+def test_the_next_effect_is_compared_beside_the_new_leader(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Without the second effect the model is that of the new first alone."""

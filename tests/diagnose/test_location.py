@@ -1,4 +1,4 @@
-"""Where a mismatch lies: time, frequency, harmonic."""
+"""Where an effect shows: time, frequency, harmonic."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_tone_lies_at_its_frequency() -> None:
 
 
 def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_third() -> None:
-    """What a curve does to the fundamental, amplitude and losses take."""
+    """Amplitude and losses absorb its effect on the fundamental."""
     for name, harmonic in (("sensor-quadratic", 2), ("sensor-cubic", 3)):
         found = location_of(name)
         assert harmonic in found.harmonics
@@ -88,7 +88,7 @@ def located(
     base: FloatArray = TRUTH,
     time_s: FloatArray = TIME_S,
 ) -> tuple[Location, float]:
-    """Where an effect shows that Eq. 8 alone leaves out; and Eq. 8's slip of the phase, rad."""
+    """Where an effect shows that Eq. 8 lacks; and Eq. 8's phase error, rad."""
     effect = by_identifier(identifier)
     bare, extended = Model(time_s, INTERVAL_S), Model(time_s, INTERVAL_S, (effect,))
     truth = np.append(base, values)
@@ -108,8 +108,8 @@ SLIPPING = {
 
 
 @pytest.mark.parametrize("name", SLIPPING)
-def test_a_phase_that_slips_by_a_radian_is_a_misfit_of_the_fundamental(name: str) -> None:
-    """However far it slips: the pendulum is early or late, and its level is where it was."""
+def test_a_phase_error_of_a_radian_is_a_misfit_of_the_fundamental(name: str) -> None:
+    """However large: the pendulum is early or late, and its offset unchanged."""
     found, slip = located(name, *SLIPPING[name])
     assert slip > 0.5
     assert found.harmonics == (1,)
@@ -117,8 +117,8 @@ def test_a_phase_that_slips_by_a_radian_is_a_misfit_of_the_fundamental(name: str
     assert "level" not in found.summary
 
 
-def test_a_slip_is_seen_at_the_same_amplitudes_whether_it_is_small_or_large() -> None:
-    """What it does to the readings is linear along the motion, if not in the readings."""
+def test_a_phase_error_shows_at_the_same_amplitudes_whether_it_is_small_or_large() -> None:
+    """Its effect is linear along the motion, if not in the readings."""
     small, slip = located("clock-drift", (2e-6, 1e3))
     large, slipped = located("clock-drift", (1e-4, 1e3))
     assert slip < 0.02
@@ -126,7 +126,7 @@ def test_a_slip_is_seen_at_the_same_amplitudes_whether_it_is_small_or_large() ->
     assert large.amplitude_rad == pytest.approx(small.amplitude_rad, rel=0.01)
 
 
-def test_a_misfit_of_the_phase_shows_at_both_crossings_and_one_of_the_loss_where_it_turns() -> None:
+def test_a_phase_misfit_shows_at_the_zero_crossings_and_a_loss_at_the_turning_points() -> None:
     """Twice a cycle: no single arc of less than half a circle holds most of it."""
     early, _ = located("clock-drift", (1e-5, 1e3))
     assert early.phase_rad is None
@@ -136,7 +136,7 @@ def test_a_misfit_of_the_phase_shows_at_both_crossings_and_one_of_the_loss_where
     assert "turning points" in lossy.summary
 
 
-def test_a_step_of_the_level_prefers_no_part_of_the_cycle() -> None:
+def test_a_step_of_the_offset_prefers_no_part_of_the_cycle() -> None:
     summary = located("equilibrium-step", (4e-4, INSTANT_S))[0].summary
     assert "crossings" not in summary
     assert "turning points" not in summary
@@ -149,7 +149,7 @@ def test_what_fades_after_the_release_lies_at_the_beginning_and_not_at_its_time_
     assert 4.8 < found.time_s[1] < 0.5 * TIME_S[-1]
 
 
-def test_an_encoder_that_writes_its_counts_makes_no_harmonics_of_a_slip() -> None:
+def test_an_encoder_that_records_its_counts_makes_no_harmonics_of_a_phase_error() -> None:
     """Its readings are dense at the crossings: |sin| of the phase, which has a second harmonic."""
     finer = np.arange(0.0, 60.0, INTERVAL_S / 4.0)
     speed = np.abs(np.sin(TRUTH[4] * (finer - TRUTH[6])))

@@ -1,4 +1,4 @@
-"""Who is refitted, and who goes first where a misfit is gross."""
+"""Which effects are refitted, and which comes first in a gross misfit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .records import INTERVAL_S, LINEAR, TIME_S, TRUTH, prepared, white
 
 
 def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
-    """A scan's answer, the p-values too small to matter."""
+    """The result of a scan, with negligible p-values."""
     leads = [
         Lead(by_identifier(name), shape, score, 0.0) for name, (score, shape) in scores.items()
     ]
@@ -26,10 +26,10 @@ def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
 
 
 @pytest.mark.parametrize(("others", "at_a_bound"), [(LINEAR, True), (TRUTH, False)])
-def test_what_a_bound_holds_back_is_asked_though_it_scores_half(
+def test_an_effect_whose_score_a_bound_halves_is_refitted(
     others: FloatArray, at_a_bound: bool
 ) -> None:
-    """A loss between b and a asks for a negative c, which the score holds at zero."""
+    """A loss between b and a needs a negative c, which the score keeps at zero."""
     power = by_identifier("power-law-damping")
     truth = np.concatenate([others, [5e-4, 1.4, 1.0]])
     readings = Model(TIME_S, INTERVAL_S, (power,)).reading(truth)

@@ -1,4 +1,4 @@
-"""The noise of the readings: its level and colour, whatever the motion's misfit."""
+"""The noise of the readings: its variance and colour, whatever the motion's misfit."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_noise_of_any_colour_is_made_white(
         assert inside.mean() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / inside.size))
 
 
-def test_a_white_record_is_called_red_no_oftener_than_chance_calls_it_so() -> None:
+def test_white_noise_is_taken_for_red_no_more_often_than_by_chance() -> None:
     """Two parameters more gain 4 in -2 ln L with a probability of exp(-2) at most."""
     count = 30
     found = [estimated(white(np.random.default_rng(seed))) for seed in range(count)]
@@ -89,7 +89,7 @@ def test_red_noise_is_recognised() -> None:
     assert np.mean([noise.slope for noise in found]) == pytest.approx(1.5, abs=0.25)
 
 
-def test_noise_below_a_corner_is_not_taken_for_flat() -> None:
+def test_red_noise_below_a_corner_is_not_taken_for_flat() -> None:
     """A few slow cosines that are small by chance make the slowest no effect: red noise rises."""
     power = np.random.default_rng(8).chisquare(1.0, 3500)[1:]
     frequency = np.arange(1, 3500) / (2.0 * 3500 * 0.178)
@@ -115,8 +115,8 @@ def test_a_red_part_may_be_forbidden() -> None:
     assert noise.red == 0.0
 
 
-def test_what_the_motion_leaves_about_its_harmonics_is_no_noise() -> None:
-    """A misfit three times the noise, that comes and goes, changes the level by 1 % at most."""
+def test_a_misfit_about_the_harmonics_is_not_noise() -> None:
+    """A misfit three times the noise, that comes and goes, changes the estimate by 1 % at most."""
     readings = white(np.random.default_rng(5))
     times = np.arange(COUNT) * INTERVAL_S
     swell = np.sin(np.pi * times / times[-1]) ** 2
@@ -126,14 +126,14 @@ def test_what_the_motion_leaves_about_its_harmonics_is_no_noise() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-9, 0.3, 1e3])
-def test_the_level_follows_the_unit(scale: float) -> None:
+def test_the_noise_follows_the_unit(scale: float) -> None:
     readings = white(np.random.default_rng(7))
     assert estimated(scale * readings).rms == pytest.approx(
         scale * estimated(readings).rms, rel=1e-3
     )
 
 
-def test_no_reading_is_believed_beyond_the_floor() -> None:
+def test_the_noise_is_never_below_the_floor() -> None:
     readings = white(np.random.default_rng(8))
     noise = estimate_noise(data_of(readings), readings, MOTION_HZ, 1e-2)
     assert noise.rms == pytest.approx(1e-2)

@@ -1,4 +1,4 @@
-"""A law that is in no catalogue is drawn, and not called two things at once."""
+"""A law outside the catalogue is one curve, and not two effects at once."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_magnet_is_a_restoring_torque_without_a_name() -> None:
 
 
 def state_with(readings: FloatArray, *names: str) -> State:
-    """A search that has come to several names."""
+    """A search that has added several effects."""
     data, noise = prepared(readings)
     effects = tuple(by_identifier(name) for name in names)
     bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
@@ -81,12 +81,12 @@ def test_two_names_for_one_law_give_way_to_a_curve() -> None:
     assert state.fit.chi2 < before + 40.0
 
 
-def test_two_things_that_are_there_keep_their_names() -> None:
+def test_two_real_effects_keep_their_names() -> None:
     assert len(diagnosed("two").search.steps) == 2
     assert all(step.winner.lead.effect.kind != "unnamed" for step in diagnosed("two").search.steps)
 
 
-def test_one_name_is_left_alone() -> None:
+def test_a_single_effect_stays() -> None:
     fit, data, noise = null_fit()
     state = State(fit, data, noise, [], TRUTH, fit.value)
     state.steps = [Step((_rival(by_identifier("cubic-stiffness"), fit),), 1e-9, fit)]

@@ -1,4 +1,4 @@
-"""A window that grows finds the motion where a start over the whole record is turns away."""
+"""A progressive window finds the motion where a start over the whole record is turns away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of recordings that others made stands in them, though nobody tells it.
+"""What is known of real recordings is found in them without being given.
 
 They are read where they lie (``../shared/recordings``). Here mostly single laws are fitted, which
 is quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found of it.
@@ -88,7 +88,7 @@ def test_a_ships_righting_moment_hardens() -> None:
 
 
 def test_a_ship_hardens_rather_than_drifts() -> None:
-    """A clock that runs off by 0.7 % would fit as well, and is less likely beforehand."""
+    """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
     named = diagnose_recording(whole(SHIP)).diagnosis.effects
     assert named[0].identifier == "cubic-stiffness"
     assert named[0].parameters["k3"].value == pytest.approx(0.27 / 0.375, abs=0.25)
@@ -126,17 +126,17 @@ def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
     assert 0.2 < friction / drag < 5.0
 
 
-def test_the_sine_goes_before_a_clock_that_fits_a_trifle_better() -> None:
+def test_the_sine_precedes_a_clock_that_fits_slightly_better() -> None:
     """At 0.7 rad and without Eq. 3's quadratic drag a drift of the clock gains more."""
     named = diagnose_recording(whole(VIDEO), baseline="viscous").diagnosis.effects
     assert [effect.identifier for effect in named[:2]] == ["circular-error", "quadratic-drag"]
     assert named[0].probability > 0.5
 
 
-def test_a_gap_of_the_time_stamps_is_said_with_its_place_and_length() -> None:
+def test_a_gap_of_the_time_stamps_is_noted_with_its_time_and_length() -> None:
     recording = whole(GAP)
     note = gap_note(recording.time_s, 0.72, counts=True)
     assert note is not None
-    assert "13.24 s behind 241.5" in note
+    assert "13.24 s after 241.5" in note
     before = recording.time_s < 200.0
     assert gap_note(recording.time_s[before], 0.72, counts=True) is None

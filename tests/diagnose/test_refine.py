@@ -1,4 +1,4 @@
-"""Maximum likelihood: from far away, within bounds, with honest errors."""
+"""Maximum likelihood: from far away, within bounds, with valid errors."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_the_covariance_is_the_scatter_of_repeated_records() -> None:
 
 
 @pytest.mark.parametrize("start", [0.7, 1.4, 2.0])
-def test_friction_that_took_another_laws_place_is_found_from_nothing(start: float) -> None:
+def test_friction_that_another_law_imitates_is_found_from_zero(start: float) -> None:
     """Coulomb and quadratic losses imitate Stribeck's, and all must change at once.
 
     The exchange leaves the motion as it is, but friction changes the frequency in second
@@ -131,7 +131,7 @@ def test_friction_that_took_another_laws_place_is_found_from_nothing(start: floa
     ("identifier", "shape"),
     [("damping-drift", [100.0]), ("power-law-damping", [1.5, 0.0]), ("gain-drift", [100.0])],
 )
-def test_a_limit_of_chi2_spoils_no_fit_that_gets_below_it(
+def test_a_limit_of_chi2_changes_no_fit_that_gets_below_it(
     identifier: str, shape: list[float], above: float
 ) -> None:
     model, data, noise, truth = stribeck_record()
@@ -144,8 +144,8 @@ def test_a_limit_of_chi2_spoils_no_fit_that_gets_below_it(
     assert limited.chi2 == pytest.approx(whole.chi2)
 
 
-def test_a_hopeless_fit_is_left_after_a_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A slow change of the damping is not what Stribeck's friction leaves: its fit creeps."""
+def test_a_hopeless_fit_stops_after_a_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow change of the damping does not describe Stribeck's friction: its fit creeps."""
     model, data, noise, truth = stribeck_record()
     without = refine(model.bare(), data, noise, truth[:-2])
     drift = model.bare().adding(by_identifier("damping-drift"))

@@ -1,4 +1,4 @@
-"""Refits side by side: who is followed to the end."""
+"""Refits side by side: which are carried to the end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .records import null_fit, stribeck_record
 
 
 @pytest.mark.parametrize("gain", [0.0, 20.0, 100.0, 400.0, 1e4])
-def test_whom_the_record_cannot_tell_from_the_best_is_of_use(gain: float) -> None:
+def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
     best = Rival(lead, fit, gain, gain)
@@ -27,12 +27,12 @@ def test_whom_the_record_cannot_tell_from_the_best_is_of_use(gain: float) -> Non
 
 
 @pytest.mark.parametrize("gain", [20.0, 400.0, 1e4])
-def test_a_name_that_may_stand_beside_another_for_a_curve_is_of_use(gain: float) -> None:
+def test_an_effect_that_with_another_may_replace_a_curve_is_useful(gain: float) -> None:
     assert useful_chi2(0.0, gain, drawn=True) >= (1.0 - OF_A_CURVE) * gain
 
 
 def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
-    """Else only those do that come near the best: here the friction that is there."""
+    """Otherwise only those that come near the best: here the true friction."""
     model, data, noise, truth = stribeck_record()
     base = refine(model.bare(), data, noise, truth[:-2])
     names = {"stribeck-friction": (float(truth[-1]),), "damping-drift": (100.0,)}

@@ -1,4 +1,4 @@
-"""What a model leaves beyond the noise, and what that makes of names and errors."""
+"""The misfit beyond the noise, and its consequences for names and errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def left_by(extra: FloatArray) -> tuple[Fit, Remainder]:
     return fit, remainder_of(fit, data, noise)
 
 
-def test_noise_alone_leaves_nothing_and_widens_no_error() -> None:
+def test_noise_alone_leaves_nothing_and_enlarges_no_error() -> None:
     found = remainder_of(*null_fit())
     assert not found.systematic
     assert found.error_scale == 1.0
@@ -40,7 +40,7 @@ def test_noise_alone_leaves_nothing_and_widens_no_error() -> None:
         ("between", 4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S)),
     ],
 )
-def test_the_rest_is_said_to_lie_where_it_was_put(where: str, extra: FloatArray) -> None:
+def test_the_misfit_is_located_where_it_was_put(where: str, extra: FloatArray) -> None:
     """Its mean square adds to the noise's, and nine tenths of it are there."""
     _, found = left_by(extra)
     expected = math.sqrt(1.0 + np.mean(extra**2) / NOISE_RAD**2)

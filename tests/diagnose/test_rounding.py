@@ -36,7 +36,7 @@ def test_rounding_shifts_the_mean_of_noisy_readings(
 @pytest.mark.parametrize("share", [0.12, 0.25])
 @pytest.mark.parametrize("shift", [0.0, 0.3])
 def test_the_noise_before_the_rounding_is_found(share: float, shift: float) -> None:
-    """And the zero of the converter's steps; with it the bias leaves the residual."""
+    """And the origin of the converter's steps; with it the residual has no bias."""
     step = 1e-3
     plain = other_engine(TRUTH)
     readings = shift * step + rounded(plain - shift * step + white(4, rms=share * step), step)

@@ -1,4 +1,4 @@
-"""The diagnosis as a whole: the right name, the right size, and nothing said of noise."""
+"""The diagnosis as a whole: the right effect, the right size, and nothing from noise."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .records import (
     TIME_S,
     TRUTH,
     VALUES,
-    accused,
+    classes_found,
     diagnosed,
     other_engine,
     recording,
@@ -36,8 +36,8 @@ NAMES = tuple(VALUES)
 
 def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> None:
     seeds = range(1, 9)
-    accusations = sum(diagnosed("null", seed).diagnosis.p_value < 0.01 for seed in seeds)
-    assert accusations <= binom.ppf(0.999, len(seeds), 0.01)
+    alarms = sum(diagnosed("null", seed).diagnosis.p_value < 0.01 for seed in seeds)
+    assert alarms <= binom.ppf(0.999, len(seeds), 0.01)
 
 
 @pytest.mark.parametrize("seed", range(1, 5))
@@ -50,7 +50,7 @@ def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: i
         assert abs(estimate.value - truth) < 4.0 * estimate.sd
 
 
-def test_a_step_that_rules_and_does_no_harm_is_no_doubt_of_the_model() -> None:
+def test_a_coarse_step_that_does_no_harm_leaves_the_record_consistent() -> None:
     """Noise far below the step, and amplitudes far above it: p is that of the verdict."""
     step = 7.9e-5
     readings = rounded(other_engine(TRUTH) + white(1, rms=0.05 * step), step)
@@ -61,11 +61,11 @@ def test_a_step_that_rules_and_does_no_harm_is_no_doubt_of_the_model() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_effect_is_named(name: str) -> None:
-    """It leads, or cannot be told from what leads; and it is the only accusation."""
+    """It leads, or is in the leader's class; and nothing else is reported."""
     outcome = diagnosed(name)
     assert outcome.diagnosis.verdict == "missing-physics"
     assert len(outcome.diagnosis.effects) == 1
-    assert name in accused(outcome)[0]
+    assert name in classes_found(outcome)[0]
     assert outcome.diagnosis.effects[0].p_value < 0.01
     assert outcome.diagnosis.p_value < 0.01
 
@@ -100,7 +100,7 @@ def test_the_improved_model_leaves_noise(name: str) -> None:
         ("equilibrium-step", "offset", TRUTH[OFFSET]),
     ],
 )
-def test_what_was_left_out_had_spoiled_the_fit(name: str, parameter: str, truth: float) -> None:
+def test_the_missing_effect_had_biased_the_fit(name: str, parameter: str, truth: float) -> None:
     found = diagnosed(name).diagnosis
     before, after = found.baseline.parameters[parameter], found.improved.parameters[parameter]
     assert abs(before.value - truth) > 5.0 * before.sd
@@ -121,14 +121,14 @@ def test_lost_samples_are_counted_where_they_were_lost() -> None:
 
 def test_two_effects_are_both_named() -> None:
     outcome = diagnosed("two")
-    classes = accused(outcome)
+    classes = classes_found(outcome)
     assert len(classes) == 2
     assert sum("equilibrium-step" in names for names in classes) == 1
     assert sum("tone-pickup" in names for names in classes) == 1
     assert outcome.diagnosis.unexplained_p_value > 0.001
 
 
-def test_what_happens_twice_is_told_twice_each_with_its_own_size_and_instant() -> None:
+def test_what_happens_twice_is_reported_twice_each_with_its_own_size_and_instant() -> None:
     effects = diagnosed("two steps").diagnosis.effects
     assert [effect.identifier for effect in effects] == ["equilibrium-step"] * 2
     size, instant_s = VALUES["equilibrium-step"]
@@ -149,7 +149,7 @@ def test_a_viscous_baseline_lacks_coulomb_friction() -> None:
     assert len(outcome.diagnosis.effects) == 1
 
 
-def test_a_viscous_pendulum_is_all_that_a_viscous_baseline_asks() -> None:
+def test_a_viscous_pendulum_is_consistent_with_a_viscous_baseline() -> None:
     outcome = diagnose_recording(recording(other_engine(LINEAR), 4), baseline="viscous")
     assert outcome.diagnosis.verdict == "consistent"
     linear = outcome.diagnosis.baseline.parameters["b"]
@@ -157,8 +157,8 @@ def test_a_viscous_pendulum_is_all_that_a_viscous_baseline_asks() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
-def test_a_wrong_prediction_of_the_losses_is_mended_by_the_truth(factor: float) -> None:
-    """Where only b was given, and that wrong, b is let go and comes out right."""
+def test_a_wrong_prediction_of_the_loss_is_corrected_to_the_truth(factor: float) -> None:
+    """If only b was given, and wrong, b is released and comes out right."""
     given = {"b": factor * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert [effect.identifier for effect in outcome.diagnosis.effects] == ["parameter-b"]
@@ -181,7 +181,7 @@ def quality_factor(rate: float) -> float:
 
 @pytest.mark.parametrize("part", ["hysteretic", "viscous"])
 def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
-    """One part given by itself, and too large, is accused; b was free to be more, not less."""
+    """One part given by itself, and too large, is reported; b was free to be larger only."""
     name = f"quality_factor_{part}"
     given = {name: quality_factor(1.2 * float(TRUTH[B]))}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)

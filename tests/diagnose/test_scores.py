@@ -1,4 +1,4 @@
-"""Scores: unit columns beside all that the baseline's own parameters can do."""
+"""Scores: unit columns orthogonal to the derivatives by the baseline's parameters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .records import INTERVAL_S, TIME_S, TRUTH, other_engine, prepared
 
 @functools.cache
 def perfect() -> tuple[Fit, Data, Noise, Bank]:
-    """Readings without noise, so that what an effect does stands alone."""
+    """Readings without noise, to isolate the effect."""
     data, noise = prepared(Model(TIME_S, INTERVAL_S).reading(TRUTH))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH, held=(3,))
     effects = [e for e in applicable(CATALOGUE, fit, "eq8", "rad") if not e.spectral]
@@ -30,7 +30,7 @@ def perfect() -> tuple[Fit, Data, Noise, Bank]:
 
 
 def white_residuals(draws: int) -> tuple[Bank, FloatArray]:
-    """What a fit leaves of white noise: nothing in its tangent space."""
+    """The residual of white noise: nothing in the tangent space of the fit."""
     _, _, _, bank = perfect()
     drawn = np.random.default_rng(17).standard_normal((len(bank.basis), draws))
     return bank, drawn - bank.basis @ (bank.basis.T @ drawn)

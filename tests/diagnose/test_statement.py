@@ -135,7 +135,7 @@ def test_a_diagnosis_prints_as_its_paragraph() -> None:
     assert len(repr(outcome.diagnosis)) < 100
 
 
-def test_lost_samples_are_told_by_the_time_by_which_later_readings_are_late() -> None:
+def test_lost_samples_are_reported_as_the_delay_of_later_readings() -> None:
     """Three readings are missing: what follows was read three intervals later."""
     (effect,) = diagnosed("dropped-samples").diagnosis.effects
     late = effect.parameters["d"]

@@ -1,4 +1,4 @@
-"""A curve may follow some of both of two effects: what one name leaves, a second explains."""
+"""A curve may follow parts of two effects: what one leaves, a second explains."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .test_one_curve import pulled
 
 
 def rivals_after(readings: np.ndarray, seed: int) -> list[Rival]:
-    """A curve of the torque leads; see who does after a second look."""
+    """A curve of the torque leads; return what leads after two effects are tried."""
     record = recording(readings, seed)
     begun = beginning_of(record)
     noise = first_noise(begun)
@@ -44,6 +44,6 @@ def test_a_step_and_a_tone_go_before_a_curve() -> None:
     assert found[1].identifier == "unnamed-restoring"
 
 
-def test_a_law_of_no_catalogue_stays_a_curve() -> None:
+def test_a_law_outside_the_catalogue_stays_a_curve() -> None:
     found = rivals_after(pulled(), 3)
     assert [each.identifier for each in found] == ["unnamed-restoring"]

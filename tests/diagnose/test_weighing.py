@@ -1,4 +1,4 @@
-"""Who shares the probability with an effect: whom the final noise does not reject."""
+"""The rivals that share the probability of an effect: those that the final noise allows."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from .records import (
 )
 
 JUMP_RAD = 1e-3
-"""Ten times the noise of a reading: so large that the level is taken for red noise at first."""
+"""Ten times the noise of a reading: so large that the jump is taken for red noise at first."""
 
 
 @functools.cache
 def jumped() -> Outcome:
-    """The equilibrium jumps; what is noise and what is not changes with the model."""
+    """The equilibrium jumps; the estimate of the noise changes with the model."""
     model = Model(TIME_S, INTERVAL_S, (by_identifier("equilibrium-step"),))
     return diagnose_recording(recording(model.reading(np.append(TRUTH, [JUMP_RAD, INSTANT_S])), 3))
 
@@ -56,7 +56,7 @@ def test_a_jump_that_was_seen_through_red_noise_has_no_rival_when_that_is_gone()
 
 
 @pytest.mark.parametrize("place", range(1, 4))
-def test_a_rival_is_weighed_by_what_it_gains_under_the_noise_that_was_judged_last(
+def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
     place: int,
 ) -> None:
     found = jumped().search
@@ -74,7 +74,7 @@ def test_a_rival_is_weighed_by_what_it_gains_under_the_noise_that_was_judged_las
 
 
 @pytest.mark.parametrize("loss", [1.0, 30.0, 3e4])
-def test_what_makes_a_model_worse_is_worth_its_loss(loss: float) -> None:
+def test_a_negative_gain_stays_negative(loss: float) -> None:
     """Later, under a smaller noise, it must not be credited with what it had lost."""
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
@@ -85,8 +85,8 @@ def test_what_makes_a_model_worse_is_worth_its_loss(loss: float) -> None:
 
 
 @pytest.mark.parametrize("gain", [1e4, 1e5, 1e6])
-def test_what_is_known_beforehand_raises_nobody_whom_the_readings_reject(gain: float) -> None:
-    """The circular error is likelier than a cubic torque beforehand; but not far behind it."""
+def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
+    """Circular error has a higher prior than a cubic torque; but not if it is far behind."""
     cubic = rival(by_identifier("cubic-stiffness"), gain)
     near, far = (rival(by_identifier("circular-error"), gain - behind) for behind in (0.0, 101.0))
     own, other, _ = probabilities([cubic, near], gain - 5.0)
@@ -95,8 +95,8 @@ def test_what_is_known_beforehand_raises_nobody_whom_the_readings_reject(gain: f
     assert other <= own
 
 
-def test_a_curve_that_follows_better_does_not_put_a_name_down() -> None:
-    """Of a gain of 10^5 a real law leaves more than that to the catalogue's form of it."""
+def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
+    """A real law differs from the catalogue's form by more than that at a gain of 10^5."""
     curve = rival(CURVES[0](null_fit()[0].at.span), 1e5)
     name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
     drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)

@@ -1,4 +1,4 @@
-"""A prediction that is wrong, physics that is missing, or both: told from each other."""
+"""A wrong prediction, missing physics, or both: distinguished from each other."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def names(outcome: Outcome) -> set[str]:
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.15, 1.25, 2.0])
-def test_a_wrong_loss_is_no_drift_of_it(factor: float) -> None:
+def test_a_wrong_loss_is_not_a_drift_of_it(factor: float) -> None:
     """Of whatever size: to first order a drift or a curve may look the better."""
     given = {"b": factor * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
@@ -36,7 +36,7 @@ def test_a_wrong_loss_is_no_drift_of_it(factor: float) -> None:
 
 
 @pytest.mark.parametrize(("fluid", "bearing"), [(4.0, 2.0), (0.5, 2.0)])
-def test_two_wrong_losses_are_no_third_that_has_no_name(fluid: float, bearing: float) -> None:
+def test_two_wrong_losses_are_not_an_unnamed_third(fluid: float, bearing: float) -> None:
     given = {"a": fluid * float(TRUTH[A]), "c": bearing * float(TRUTH[C])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert names(outcome) == {"parameter-a", "parameter-c"}
@@ -46,7 +46,7 @@ def test_two_wrong_losses_are_no_third_that_has_no_name(fluid: float, bearing: f
 
 
 @pytest.mark.parametrize("wrong", ["a", "c"])
-def test_of_several_predictions_the_wrong_one_is_accused(wrong: str) -> None:
+def test_of_several_predictions_the_wrong_one_is_reported(wrong: str) -> None:
     given = {"a": float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
     given[wrong] *= 1.5
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
@@ -54,7 +54,7 @@ def test_of_several_predictions_the_wrong_one_is_accused(wrong: str) -> None:
 
 
 @pytest.mark.parametrize("excess", [2e-4, 5.5e-4, 5e-3])
-def test_a_wrong_frequency_and_circular_error_are_both_told(excess: float) -> None:
+def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -> None:
     """The one shifts the frequency throughout, the other with the amplitude's square."""
     given = {"frequency": (1.0 + excess) * FREQUENCY_HZ}
     outcome = diagnose_recording(recording(with_effects("circular-error"), 3), fixed=given)
@@ -63,7 +63,7 @@ def test_a_wrong_frequency_and_circular_error_are_both_told(excess: float) -> No
     assert abs(found.value - FREQUENCY_HZ) < 4.0 * found.sd
 
 
-def test_right_predictions_are_not_accused_of_what_is_missing() -> None:
+def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     """All losses given and true, and one that nobody knew: a free a and b would do as well."""
     effect = by_identifier("cubic-damping")
     readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [0.05, 1.0]))
