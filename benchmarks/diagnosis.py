@@ -31,8 +31,8 @@ from pendpipe.provenance import code_version
 from pendpipe_challenge.sets import process_pool
 
 if TYPE_CHECKING:
-    from pendpipe.diagnose.refine import Fit
-    from pendpipe.diagnose.run import Outcome
+    from pendpipe.diagnosis.refine import Fit
+    from pendpipe.diagnosis.run import Outcome
 
 
 def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
@@ -43,8 +43,8 @@ def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
     and the answer where it holds two. Infinite where the true pair can't be fitted: it counts
     as needed then.
     """
-    from pendpipe.diagnose.one_curve import cost
-    from pendpipe.diagnose.weighing import refitted
+    from pendpipe.diagnosis.one_curve import cost
+    from pendpipe.diagnosis.weighing import refitted
 
     found, held = outcome.search, outcome.beginning.held
     singles, pairs = [found.baseline, *_answer(outcome, 1)], _answer(outcome, 2)
@@ -65,9 +65,9 @@ def _answer(outcome: Outcome, effects: int) -> list[Fit]:
 
 def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
     """The fit with one more effect of a given name, at the shape its scan finds, if it moves."""
-    from pendpipe.diagnose.detect import detect, prepare
-    from pendpipe.diagnose.naming import refit_leads
-    from pendpipe.diagnose.state import is_gross
+    from pendpipe.diagnosis.detect import detect, prepare
+    from pendpipe.diagnosis.naming import refit_leads
+    from pendpipe.diagnosis.state import is_gross
     from pendpipe.effects.catalogue import by_identifier
 
     found = outcome.search
@@ -181,7 +181,7 @@ def diagnosed(case: Case) -> dict[str, Any]:
     """Make and diagnose one recording."""
     import tempfile
 
-    from pendpipe.diagnose.run import diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
     from pendpipe.dynamics.any_law import NoMotionError
     from pendpipe.errors import InputError
     from pendpipe.process import keep_memory
@@ -274,7 +274,7 @@ def _peers(item: Any) -> dict[str, Any]:
 @cache
 def code() -> str:
     """Digest of what makes the recordings, diagnoses them, and says what is right."""
-    digest = hashlib.sha256(code_version("pendpipe.diagnose.run").encode())
+    digest = hashlib.sha256(code_version("pendpipe.diagnosis.run").encode())
     here = [Path(__file__), Path(__file__).with_name("peers_diagnosis.py")]
     for path in [*here, *sorted(Path(pendpipe_challenge.__file__).parent.glob("*.py"))]:
         digest.update(path.read_bytes())

@@ -73,7 +73,7 @@ def recorded(samples: int, hidden: str, number: int) -> tuple[Recording, float]:
 
 def cost(samples: int, hidden: str, number: int) -> Cost:
     """Make a recording, diagnose it, and have pysindy judge it."""
-    from pendpipe.diagnose.run import diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
     from pendpipe.process import keep_memory
 
     keep_memory()  # as the command does

@@ -10,11 +10,11 @@ import sys
 import time
 
 import numpy as np
-from tests.diagnose.decays import Fitted, Pendulum
-from tests.diagnose.examine import examine
-from tests.diagnose.faults import AIR, FAULTS, NOISES, null
+from tests.diagnosis.decays import Fitted, Pendulum
+from tests.diagnosis.examine import examine
+from tests.diagnosis.faults import AIR, FAULTS, NOISES, null
 
-from pendpipe.diagnose.forensics import TESTS
+from pendpipe.diagnosis.forensics import TESTS
 
 _LEVELS = (0.1, 0.01, 0.001)
 _FOUND = 1e-3

@@ -3,7 +3,7 @@
 Each judges one recording and returns whether something is missing and the catalogue's
 identifier that it names (None where it can't name). Their common ground is Eq. 8 fitted by
 scipy over the challenge's integrator, and templates written down here, so that they owe
-nothing to ``pendpipe.diagnose`` or ``pendpipe.effects``.
+nothing to ``pendpipe.diagnosis`` or ``pendpipe.effects``.
 """
 
 from __future__ import annotations

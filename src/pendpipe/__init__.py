@@ -18,7 +18,15 @@ from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe import effects, physics
-    from pendpipe.api import find_free_decay, fit, inspect, read, simulate, turning_points
+    from pendpipe.api import (
+        diagnose,
+        find_free_decay,
+        fit,
+        inspect,
+        read,
+        simulate,
+        turning_points,
+    )
     from pendpipe.dynamics import Eq8
     from pendpipe.errors import InputError
     from pendpipe.estimate import Estimate
@@ -30,6 +38,7 @@ __all__ = [
     "InputError",
     "Recording",
     "__version__",
+    "diagnose",
     "effects",
     "find_free_decay",
     "fit",

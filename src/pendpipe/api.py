@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import Baseline, FitResult, Method
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
+    from pendpipe.diagnosis import Outcome
     from pendpipe.formats import Inspection
 
 Source = Recording | str | Path
@@ -226,6 +227,67 @@ def fit(
     )
     cuts = tuple(cut._asdict() for cut in points.cuts)
     return replace(result, cuts=cuts, points=points, decay=decay)
+
+
+def diagnose(
+    recording: Source,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    level: float = 0.01,
+    seed: int = 0,
+    volts_per_radian: float | None = None,
+    name: str | None = None,
+) -> Outcome:
+    """Find what physics a fit of Eq. 8 leaves out of a recording.
+
+    Eq. 8 is fitted to the free decay; its residual is searched for every effect of the catalogue
+    (docs/effects.md), and what chance does not explain is named, modelled and tested again.
+
+    Parameters
+    ----------
+    recording
+        A recording, or the path of its file.
+    baseline
+        The null model: ``"eq8"``, or ``"viscous"`` for Eq. 3.
+    fixed
+        Parameters to hold, by name, so that a prediction is compared with the recording.
+    level
+        Significance level: how often a recording that lacks nothing may be reported.
+    seed
+        Seed of the draws that count independent trials.
+    volts_per_radian
+        The sensor's constant, where the readings are volts and do not carry it.
+    name
+        What to call the recording in messages; by default its path.
+
+    Returns
+    -------
+    Outcome
+        Prints as one paragraph; ``.verdict``, ``.effects``, ``.plot()``, ``.to_dict()``,
+        ``.save(folder)``.
+
+    Raises
+    ------
+    NotAnalysableError
+        If there is no free decay.
+
+    Examples
+    --------
+    >>> answer = diagnose("examples/string-pendulum.csv")
+    >>> answer.verdict, answer.effects[0].identifier
+    ('missing-physics', 'circular-error')
+    """
+    from pendpipe.diagnosis import diagnose_recording
+
+    return diagnose_recording(
+        _motion(recording, volts_per_radian),
+        baseline=baseline,
+        fixed=fixed or {},
+        level=level,
+        seed=seed,
+        place=name or _place(recording),
+    )
 
 
 def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) -> Recording:

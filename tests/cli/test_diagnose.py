@@ -224,7 +224,7 @@ def test_the_campaigns_diagnosis_says_that_it_is_not_there_yet(
 
 
 def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:
-    from pendpipe.diagnose import diagnose_recording
+    from pendpipe.diagnosis import diagnose_recording
     from pendpipe.recording import read_plain
 
     cli.main(["diagnose", str(linear), "--out", str(tmp_path), "--no-figures", "--seed", "3"])
@@ -244,7 +244,7 @@ def test_json_goes_to_standard_output_and_needs_no_folder(
 
 
 def test_importing_the_diagnosis_costs_nothing() -> None:
-    code = "import sys, pendpipe.diagnose; print(*sys.modules)"
+    code = "import sys, pendpipe.diagnosis; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )

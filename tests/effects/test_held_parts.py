@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.noise import white_noise
-from pendpipe.diagnose.refine import refine
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
 from pendpipe.effects.baseline import HYSTERETIC, SHARE, VISCOUS, B, pendulum_of
 from pendpipe.effects.model import Model
 

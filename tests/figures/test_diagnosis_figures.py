@@ -13,8 +13,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.integrate import solve_ivp
 
-from pendpipe.diagnose import diagnose_recording
-from pendpipe.diagnose.cycles import cycles
+from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.cycles import cycles
 from pendpipe.figures import (
     diagnosis_codes,
     diagnosis_curve,

@@ -244,7 +244,7 @@ def diagnosed(name: str) -> dict[str, Any]:
 
 
 def test_the_verdicts_of_the_diagnosis_are_on_the_page(example: Any, tmp_path: Path) -> None:
-    from pendpipe.diagnose.result import not_analysable
+    from pendpipe.diagnosis.result import not_analysable
     from pendpipe.files import write_json
 
     found, refused, none = (entry["record"] for entry in example.content["records"][:3])

@@ -1,6 +1,6 @@
 """Concealed effects: an independent generator, its oracle, sealing and scoring.
 
-Nothing here imports `pendpipe.dynamics`, `pendpipe.effects` or `pendpipe.diagnose`: the
+Nothing here imports `pendpipe.dynamics`, `pendpipe.effects` or `pendpipe.diagnosis`: the
 proof may not be the program agreeing with itself.
 
 The generator: `torques`, `motion`, `chain`, `scenario`; what it hides: `hidden` and

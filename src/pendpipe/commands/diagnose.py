@@ -168,7 +168,7 @@ def _not_analysable(
     provenance: dict[str, Any],
 ) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
-    from pendpipe.diagnose.result import not_analysable
+    from pendpipe.diagnosis.result import not_analysable
     from pendpipe.stages.diagnose import write_not_analysable
 
     if arguments.out is not None:

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     result = replace(api.fit(recording, name=arguments.file), provenance=provenance)
     statement = None
     if not arguments.no_diagnosis:
-        from pendpipe.diagnose import diagnose_recording
+        from pendpipe.diagnosis import diagnose_recording
 
         statement = diagnose_recording(recording, place=arguments.file).diagnosis.statement
     page = render_recording(name, recording, result, statement)

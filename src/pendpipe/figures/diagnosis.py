@@ -8,7 +8,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from pendpipe.diagnose.run import Outcome
+from pendpipe.diagnosis.run import Outcome
 from pendpipe.figures import (
     diagnosis_codes,
     diagnosis_curve,

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from pendpipe.diagnose.forensics.lattice import find_lattice
+from pendpipe.diagnosis.forensics.lattice import find_lattice
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled

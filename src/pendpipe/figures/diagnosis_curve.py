@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pendpipe.diagnose.result import FoundEffect
+from pendpipe.diagnosis.result import FoundEffect
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREEN, INK, WIDTH_IN, key_above, styled

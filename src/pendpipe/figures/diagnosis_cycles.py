@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.cycles import Spans
+from pendpipe.diagnosis.cycles import Spans
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, INK, VERMILION, WIDTH_IN, key_above, styled

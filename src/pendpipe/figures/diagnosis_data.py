@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.cycles import Cycles, Spans, between, cycles, span_ends
-from pendpipe.diagnose.data import Data
-from pendpipe.diagnose.noise import Noise
-from pendpipe.diagnose.refine import Fit
-from pendpipe.diagnose.result import Diagnosis
-from pendpipe.diagnose.run import Outcome
+from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import Outcome
 from pendpipe.effects.model import Evaluated
 from pendpipe.figures.data import NothingToDrawError
 

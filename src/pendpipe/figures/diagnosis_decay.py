@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnosis.refine import Fit
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, WIDTH_IN, key_above, styled
 from pendpipe.quantities import axis_unit

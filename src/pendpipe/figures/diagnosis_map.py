@@ -13,7 +13,7 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedFormatter
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnosis.refine import Fit
 from pendpipe.figures.diagnosis_data import Shown
 from pendpipe.figures.style import BLUE, VERMILION, WIDTH_IN, styled
 from pendpipe.quantities import compact

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnose.refine import Fit
+from pendpipe.diagnosis.refine import Fit
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis_data import Shown

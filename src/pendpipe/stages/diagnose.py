@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pendpipe.diagnose import Progress, silent
-from pendpipe.diagnose.result import FILE_NAME
+from pendpipe.diagnosis import Progress, silent
+from pendpipe.diagnosis.result import FILE_NAME
 from pendpipe.files import replaced, write_json
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import Baseline
-    from pendpipe.diagnose.run import Outcome
+    from pendpipe.diagnosis.run import Outcome
     from pendpipe.recording import Recording
 
 RESULT: Final = FILE_NAME
@@ -66,7 +66,7 @@ def diagnose_motion(
 ) -> Outcome:
     """Diagnose a recording in rad (or m), with the turning points of an earlier stage if given."""
     from pendpipe.analysis.turning_points import read_turning_points
-    from pendpipe.diagnose.run import diagnose_decay, diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 
     asked: dict[str, Any] = {
         "baseline": options.baseline,
@@ -121,7 +121,7 @@ def write_not_analysable(
     folder: Path, options: DiagnosisOptions, reason: str, provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Write the result of a recording that can't be analysed, and return its content."""
-    from pendpipe.diagnose.result import not_analysable
+    from pendpipe.diagnosis.result import not_analysable
 
     content = not_analysable(options.baseline, reason, provenance)
     _remove_figures(folder)

@@ -1,0 +1,160 @@
+"""From a recording to the readings and the start values of the baseline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.fit.start import start_values, usable_span
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data, gather
+from pendpipe.diagnosis.unwrapped import anchored
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
+from pendpipe.effects.model import Model
+from pendpipe.physics.decay import time_at
+
+_FEWEST_READINGS: Final = 24
+_DEAD_BANDS: Final = 10.0
+"""Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
+jumps with the parameters."""
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Readings, baseline and start values of a diagnosis.
+
+    Parameters
+    ----------
+    data
+        The readings of the free decay, without those near its end at rest.
+    model
+        The baseline.
+    value
+        Its start values.
+    held
+        Indices of values that are not fitted.
+    noise_rms
+        First estimate of one reading's noise.
+    points
+        The turning points.
+    """
+
+    data: Data
+    model: Model
+    value: FloatArray
+    held: tuple[int, ...]
+    noise_rms: float
+    points: TurningPoints
+
+
+def begin(
+    samples: Samples,
+    points: TurningPoints,
+    *,
+    baseline: Baseline,
+    fixed: Mapping[str, float],
+) -> Beginning:
+    """Choose the readings that are compared, and the start values of the search."""
+    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
+    start = start_values(points, held_rates, fixed, baseline)
+    span = usable_span(samples, points, start)
+    value = np.empty(8)
+    a, b, c, omega, angle, time, offset, share = start.value
+    value[[A, B, C, SHARE, OMEGA, START, TIME, OFFSET]] = (
+        a,
+        b,
+        c,
+        min(max(share, 0.0), 1.0),
+        omega,
+        angle,
+        time,
+        offset,
+    )
+    if "offset" in fixed:
+        value[OFFSET] = fixed["offset"]
+    data = gather(
+        samples.time_s[span],
+        samples.values[span],
+        step=samples.step,
+        unit=samples.unit,
+        counts=samples.counts,
+        period_s=2.0 * math.pi / omega,
+        noise_rms=points.noise_rms_rad,
+    )
+    value = with_parts(value, parts)
+    data = _far_from_the_stop(data, value)
+    order = order_for(abs(angle), samples.unit)
+    data, model = _before_the_stop(data, value, order, parts)
+    data = replace(data, anchor=anchored(data, model.evaluate(value)))
+    held = _held(held_rates, fixed, parts, baseline)
+    return Beginning(data, model, value, held, data.noise_rms, points)
+
+
+def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
+    """Leave out readings whose amplitude is within a few widths of the Coulomb dead band."""
+    rates = [max(float(value[k]), 0.0) for k in (A, B, C)]
+    width = 0.5 * math.pi * rates[2] / value[OMEGA]
+    start = abs(float(value[START]))
+    if not 0.0 < _DEAD_BANDS * width < 0.5 * start:
+        return data
+    last = value[TIME] + float(time_at(_DEAD_BANDS * width, start, *rates))
+    keep = int(np.searchsorted(data.time_s, last))
+    return data.first(keep) if _FEWEST_READINGS < keep < len(data) else data
+
+
+def _before_the_stop(
+    data: Data, value: FloatArray, order: int, parts: Mapping[str, float]
+) -> tuple[Data, Model]:
+    """Leave out readings at the end until the model with the start values moves throughout."""
+    while True:
+        model = Model(
+            data.time_s,
+            data.interval_s,
+            order=order,
+            fold=data.fold,
+            first_s=float(data.time_s[0]),
+            parts=parts,
+        )
+        try:
+            model.evaluate(value)
+        except NoMotionError:
+            keep = int(0.93 * len(data))
+            if keep < _FEWEST_READINGS:
+                raise
+            data = data.first(keep)
+        else:
+            return data, model
+
+
+def order_for(amplitude: float, unit: str) -> int:
+    """Return the number of nodes in a half cycle: more where sin x differs more from x."""
+    if unit != "rad" or amplitude < 0.8:
+        return 14
+    if amplitude < 1.6:
+        return 20
+    return 28 if amplitude < 2.4 else 48
+
+
+def _held(
+    held_rates: Mapping[str, float],
+    fixed: Mapping[str, float],
+    parts: Mapping[str, float],
+    baseline: Baseline,
+) -> tuple[int, ...]:
+    index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
+    # Held parts of b are handled by the model.
+    held = [index[name] for name in held_rates if name != "b" or not parts]
+    if "frequency" in fixed:
+        held.append(OMEGA)
+    if baseline == "viscous" or held_rates.get("b") == 0.0:
+        held.append(SHARE)
+    return tuple(held)

@@ -1,0 +1,238 @@
+"""Evidence of refitted effects, and the probabilities of their names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.distributions import chi2_beyond, chi2_of_one
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.chance import Chance, Trials
+from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.effects import Effect
+from pendpipe.effects.curves import Curve
+
+CLASS: Final = 6.0
+"""Twice the log-likelihood ratio within which effects are of one class."""
+_SHAPE_CHARGE: Final = 2.0
+"""Charge for a fitted shape (Akaike)."""
+_FORM_SD: Final = 3.0
+"""Standard deviation of a difference of evidence due to the exact form of a law, for small gains;
+for large ones it is `MISSHAPEN` times the gain."""
+MISSHAPEN: Final = 0.03
+"""Part of a gain by which a real law differs from the catalogue's form of it (a flexure's sinh from
+a cubic term, a drag C_D(Re) from a power), or from a curve that is straight between knots."""
+_PROBABILITY_FORM: Final = (4.5, 0.01)
+"""The same two numbers for probabilities, calibrated on opened challenges: scans and optima add
+scatter to small gains, and most laws differ less from their forms than the worst."""
+SIZE_CHARGE: Final = 6.0
+"""Charge for a further size, for gains too large for p-values."""
+NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
+"""Of a curve, which has no shapes to scan."""
+_FAR_BEHIND: Final = 100.0
+"""Difference of chi^2 beyond which a prior can't make an effect more probable than a better one."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A refitted effect.
+
+    Parameters
+    ----------
+    lead
+        Its score in the scan.
+    fit
+        Of the extended model.
+    gain
+        Delta chi^2 over the model without it.
+    evidence
+        chi^2 of one degree of freedom that is as improbable by chance, the trials of the
+        effect's own scan included.
+    left
+        chi^2 per reading that the best of its rivals leaves: `evidence` uses `gain` over it.
+    """
+
+    lead: Lead
+    fit: Fit
+    gain: float
+    evidence: float
+    left: float = 1.0
+
+    def reaching(self, fit: Fit, gain: float) -> Rival:
+        """Return it with another fit where only noise is left, with the same charge for its scan.
+
+        A curve has no scan; it is charged for the coefficients that it needs now.
+        """
+        if isinstance(self.lead.effect, Curve):
+            return Rival(self.lead, fit, gain, evidence(self.lead, fit, gain, NO_SCAN))
+        charged = self.gain / self.left - self.evidence
+        return Rival(self.lead, fit, gain, gain - charged)
+
+    @property
+    def identifier(self) -> str:
+        """The effect's identifier."""
+        return self.lead.effect.identifier
+
+    @property
+    def name(self) -> str:
+        """The effect's name in words."""
+        return self.lead.effect.name
+
+    @property
+    def prior(self) -> float:
+        """Twice the log of its prior probability ratio, with that of its size."""
+        return _prior(self.lead.effect, self.fit)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether it is an unnamed curve."""
+        return self.lead.effect.kind == "unnamed"
+
+
+def form_spread(best: Rival) -> float:
+    """Return the standard deviation of a difference of evidence from the best's.
+
+    Real laws differ slightly from the catalogue's forms, and curves have knots.
+    """
+    return math.hypot(_FORM_SD, MISSHAPEN * max(best.gain, 0.0))
+
+
+def class_width(best: Rival) -> float:
+    """Return the difference of evidence within which the record can't distinguish an effect."""
+    return CLASS * form_spread(best) / _FORM_SD
+
+
+def of_one_class(best: Rival, rival: Rival) -> bool:
+    """Whether the record can't distinguish two effects, or only their priors differ.
+
+    Each additional value is charged 2 (Akaike).
+    """
+    within = class_width(best)
+    more = max(best.lead.effect.count - rival.lead.effect.count, 0)
+    by_record = best.gain - rival.gain - _SHAPE_CHARGE * more < within
+    return by_record or best.evidence - rival.evidence < within
+
+
+def equivalent(p_value: float, score: float) -> float:
+    """Return chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
+    if p_value <= 1e-290:
+        return score
+    return chi2_of_one(p_value)
+
+
+def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
+    """Convert a gain to evidence, comparable between effects with more or fewer free values.
+
+    Parameters
+    ----------
+    lead, fit
+        The effect, and the model with it.
+    gain
+        Delta chi^2, divided by the remaining chi^2 per reading where that exceeds 1.
+    chance
+        The trials of its own scan.
+    """
+    superfluous, sizes = _needed_sizes(fit, lead.effect)
+    gain -= superfluous
+    if gain <= 0.0:
+        # A negative gain stays negative: a rival that is refitted with another noise
+        # (`Rival.reaching`) must not be credited with it.
+        return gain
+    effect = lead.effect
+    if effect.parameter_free:
+        # The size is predicted: a free one would be charged.
+        gain += max(math.log(gain) - 0.45, 0.0)
+    local = float(chi2_beyond(gain, sizes))
+    trials = chance.own.get(effect.key, Trials(1.0, 0.0))
+    if local > 1e-290:
+        worth = equivalent(trials.global_p_value(local), gain)
+    else:
+        # Too large for p-values: subtract the charges for trials and further sizes.
+        worth = gain - 2.0 * math.log(trials.number_at(-0.5 * gain)) - SIZE_CHARGE * (sizes - 1)
+    fitted = len(effect.parameters) - effect.sizes if effect.parameters else 0
+    return worth - _SHAPE_CHARGE * max(fitted, 0) + _prior(effect, fit)
+
+
+def _prior(effect: Effect, fit: Fit) -> float:
+    place = next((place for other, place in fit.model.places() if other is effect), None)
+    # A released parameter has no place among the model's effects.
+    unlikely = 0.0 if place is None else effect.prior_penalty(fit.value[place], fit.at.span)
+    return effect.prior - unlikely
+
+
+def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
+    """Return the gain of coefficients that are not needed, and how many are needed.
+
+    All sizes of a named effect are needed. A curve is charged for the coefficients that stand
+    out, tested in order of how well the record resolves them.
+    """
+    if not isinstance(effect, Curve):
+        return 0.0, effect.sizes
+    place = next(place for other, place in fit.model.places() if other is effect)
+    others = [index for index in fit.free if not place.start <= index < place.stop]
+    own, rest = fit.jacobian[:, place], fit.jacobian[:, others]
+    basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
+    left = own - basis @ (basis.T @ own)
+    squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
+    superfluous = squares < SIZE_CHARGE
+    return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)
+
+
+def ranked(rivals: Sequence[Rival]) -> list[Rival]:
+    """Sort by evidence, with named effects before curves that the record can't distinguish.
+
+    A curve can follow any law, and one in time anything: curves of the motion or the sensor
+    precede it.
+    """
+    best = max(rivals, key=lambda rival: rival.evidence)
+    within = class_width(best)
+
+    def order(rival: Rival) -> tuple[int, float, float]:
+        if best.evidence - rival.evidence >= within:
+            return 3, 0.0, -rival.evidence
+        freedom = int(rival.drawn) + int(rival.lead.effect.in_time)
+        return freedom, -rival.prior if rival.drawn else 0.0, -rival.evidence
+
+    return sorted(rivals, key=order)
+
+
+def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
+    """Return the probability of each rival, and last that of "none of these" (evidence `none`).
+
+    Real laws differ slightly from the catalogue's forms, so that differences of evidence are
+    uncertain: log odds are averaged over this uncertainty (MacKay's approximation).
+    """
+    leader = max(rivals, key=lambda rival: rival.evidence)
+    spread = math.hypot(_PROBABILITY_FORM[0], _PROBABILITY_FORM[1] * max(leader.gain, 0.0))
+    shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
+    prior = np.array([rival.prior for rival in rivals])
+    likelihood = np.array([rival.evidence for rival in rivals]) - prior
+    best = float(likelihood.max())
+    # A released parameter has the baseline's own form, which has no such uncertainty.
+    own_form = np.array([rival.lead.effect.kind == "parameter" for rival in rivals])
+    worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
+    logs = _in_order(0.5 * (worth + prior), rivals)
+    logs = np.append(logs, 0.5 * (none - best))
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
+    """Limit each log probability to that of effects with far better evidence.
+
+    For large gains the uncertainty of the forms leaves little weight to differences of evidence,
+    and the prior could raise an effect that the readings reject above one that they support.
+    Curves, which can follow any law, limit only curves.
+    """
+    evidence = np.array([rival.evidence for rival in rivals])
+    drawn = np.array([rival.drawn for rival in rivals])
+    lowered = []
+    for log, rival in zip(logs, rivals, strict=True):
+        better = (evidence > rival.evidence + _FAR_BEHIND) & (rival.drawn | ~drawn)
+        lowered.append(np.min(logs[better], initial=log))
+    return np.array(lowered)

@@ -1,0 +1,238 @@
+"""Faults of the measurement within a search: tested, corrected and reported.
+
+One lost sample changes chi^2 more than most physics. So faults that can corrupt the fit are
+tested before the catalogue, and those that only small residuals reveal after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray
+from pendpipe.diagnosis import Progress
+from pendpipe.diagnosis.chance import TESTS_SHARE
+from pendpipe.diagnosis.data import at_even_times
+from pendpipe.diagnosis.evidence import Rival, equivalent
+from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples
+from pendpipe.diagnosis.forensics.finding import Finding
+from pendpipe.diagnosis.forensics.glitches import find_in_misfit
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.state import Fault, State, is_gross
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.estimate import Estimate
+
+_TESTED_BEFORE: Final = ("clipping", "glitches")
+_TESTED_AFTER: Final = (
+    "missing-codes",
+    "coarse-quantisation",
+    "jitter",
+    "coloured-noise",
+    "broadband-drive",
+)
+_SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
+_ROUNDS: Final = 3
+_CLEAN_CHI2: Final = 1.3
+"""Largest chi^2 per degree of freedom at which the fine tests are made."""
+_IN_PHASE: Final = 0.3
+"""Largest phase error in rad at which residuals reveal errors of the time stamps."""
+_CURVE_MARGIN: Final = 15.0
+"""Margin in chi^2 by which random kicks are preferred to a curve in time, which can follow them."""
+
+
+class Forensics:
+    """The tests of the measurement, on one recording.
+
+    Parameters
+    ----------
+    samples
+        The readings as recorded.
+    level
+        The significance level (global p-value).
+    """
+
+    def __init__(self, samples: Samples, level: float) -> None:
+        self.samples, self.level = samples, level
+        self._quiet: dict[str, float] = {}
+        self.clock_notes: list[str] = []
+
+    def p_value(self, faults: Sequence[Fault]) -> float:
+        """Return the smallest global p-value, of the reported faults and of the other tests.
+
+        Properties of the record that do no harm (a coarse step at large amplitude) don't count.
+        """
+        return min([1.0, *self._quiet.values(), *(fault.p_value for fault in faults)])
+
+    def before(self, state: State, progress: Progress) -> None:
+        """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""
+        self._correct_time_stamps(state, progress)
+        self._correct_lost_samples(state, progress)
+        if is_gross(state.fit, state.data):
+            self._examine("glitches", state, progress, find_in_misfit)
+            return
+        for name in _TESTED_BEFORE:
+            for _ in range(_ROUNDS):
+                if not self._examine(name, state, progress):
+                    break
+
+    def after(self, state: State, progress: Progress) -> None:
+        """Make the tests that need a clean residual: a misfit could look like any fault."""
+        clean = not is_gross(state.fit, state.data)
+        tests: tuple[str, ...]
+        if clean and state.fit.chi2 <= _CLEAN_CHI2 * state.data.used:
+            tests = _TESTED_AFTER
+        else:
+            # Dead bits show in the codes themselves, whatever the model.
+            tests = ("coarse-quantisation",) if self.samples.promised_step is not None else ()
+        known = [fault.finding.identifier for fault in state.faults]
+        for name in [name for name in tests if name not in known]:
+            self._examine(name, state, progress)
+
+    def _tested(self, name: str, state: State, test: Test | None = None) -> tuple[Finding, float]:
+        """Make one test, and convert its p-value to a global one by its share of the level."""
+        made = test or TESTS[name]
+        finding = made(state.data, state.fit, state.noise, self.samples)
+        return finding, min(finding.p_value / _SHARE_OF_EACH, 1.0)
+
+    def _examine(
+        self, name: str, state: State, progress: Progress, test: Test | None = None
+    ) -> bool:
+        """Make one test and keep its finding; return whether to repeat it."""
+        finding, p_value = self._tested(name, state, test)
+        known = next((each for each in state.faults if each.finding.identifier == name), None)
+        if finding.kind != "fault":
+            return False
+        if p_value > self.level:
+            if known is None:
+                self._quiet[name] = min(p_value, self._quiet.get(name, 1.0))
+            return False
+        progress(f"{name}: {finding.summary}")
+        if known is None:
+            state.faults.append(Fault(finding, p_value, len(state.steps), finding.mask))
+        if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
+            return False
+        if known is not None and known.mask is not None:
+            more = replace(known, mask=known.mask[: len(state.data)] | finding.mask)
+            state.faults[_index(known, state.faults)] = more
+        _refit(state, (state.data.weight == 0.0) | finding.mask)
+        return True
+
+    def again(self, state: State, progress: Progress) -> bool:
+        """Repeat, with the final model, the tests that masked readings; return whether some return.
+
+        A misfit of the motion (or another fault) displaces readings in a local fit. With complete
+        physics in the model they may be as good as any.
+        """
+        before = state.data.weight
+        for fault in [fault for fault in state.faults if fault.mask is not None]:
+            if is_gross(state.fit, state.data):
+                break
+            self._test_again(fault, state, progress)
+        return bool(np.any(state.data.weight > before))
+
+    def _test_again(self, fault: Fault, state: State, progress: Progress) -> None:
+        name, number, masked = fault.finding.identifier, _index(fault, state.faults), state.data
+        assert fault.mask is not None
+        others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
+        whole = replace(masked, weight=np.where(others, 0.0, 1.0))
+        noise = replace(state.noise, weight=whole.weight)
+        finding = TESTS[name](whole, state.fit, noise, self.samples)
+        p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
+        if p_value > self.level or finding.mask is None:
+            progress(f"{name}: no longer needed with the final model")
+            del state.faults[number]
+            self._quiet[name] = p_value
+            _refit(state, others)
+            return
+        state.faults[number] = Fault(finding, p_value, fault.behind, finding.mask)
+        if np.any((others | finding.mask) != (masked.weight == 0.0)):
+            _refit(state, others | finding.mask)
+
+    def _correct_time_stamps(self, state: State, progress: Progress) -> None:
+        """Use the times of a regular clock if the readings agree better with it."""
+        if state.fit.max_phase_error_rad > _IN_PHASE or self.clock_notes:
+            return
+        finding = TESTS["time-stamps"](state.data, state.fit, state.noise, self.samples)
+        if finding.time_s is None or finding.p_value > self.level * _SHARE_OF_EACH:
+            return
+        data = at_even_times(state.data, finding.time_s)
+        noise = white_noise(data, state.noise.white_rms)
+        model = state.fit.model.at_times(data.time_s)
+        fit = refine(model, data, noise, state.fit.value, held=state.held)
+        if fit.chi2 / data.used > state.fit.chi2 / state.data.used:
+            return
+        progress(finding.summary)
+        self.clock_notes.append(finding.summary)
+        state.settle(fit, data, noise)
+
+    def _correct_lost_samples(self, state: State, progress: Progress) -> None:
+        """Correct the times of the readings after lost samples."""
+        data = state.data
+        interval = data.interval_s / data.fold
+        lost = find_lost_samples(data, state.fit, interval)
+        if not lost:
+            return
+        time = data.time_s.copy()
+        for each in lost:
+            time[data.time_s >= each.time_s - 1e-9] += each.number * interval
+        corrected = replace(data, time_s=time, uniform=False)
+        model = state.fit.model.at_times(time)
+        try:
+            fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
+        except NoMotionError:
+            return  # the model comes to rest before the corrected times
+        if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
+            return
+        progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
+        number = sum(each.number for each in lost)
+        found = Finding(
+            "dropped-samples",
+            0.0,
+            state.fit.chi2 - fit.chi2,
+            {
+                "d": Estimate(number * interval, 0.0, "s"),
+                "samples": Estimate(float(number), 0.0, ""),
+            },
+            Location(time_s=(lost[0].time_s, lost[-1].time_s)),
+            summary="samples were lost at "
+            + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
+        )
+        state.faults.append(Fault(found, 0.0, len(state.steps)))
+        state.settle(fit, corrected)
+
+    def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
+        """Test whether random kicks explain more than the best effect of the catalogue."""
+        name = "broadband-drive"
+        finding, p_value = self._tested(name, state)
+        if p_value > self.level:
+            return False
+        worth = equivalent(p_value, finding.delta_chi2)
+        if rival.lead.effect.kind == "unnamed":
+            worth += _CURVE_MARGIN
+            if not state.steps:
+                # A large misfit: its p-value is extreme, and a curve can follow any random walk.
+                worth = max(worth, finding.delta_chi2 + _CURVE_MARGIN)
+        if worth < rival.evidence:
+            return False
+        progress(f"{name}: {finding.summary}")
+        state.faults.append(Fault(finding, p_value, len(state.steps)))
+        return True
+
+
+def _index(fault: Fault, faults: Sequence[Fault]) -> int:
+    """Return the index by identity (faults hold arrays, and can't be compared)."""
+    return next(number for number, each in enumerate(faults) if each is fault)
+
+
+def _refit(state: State, out: BoolArray) -> None:
+    """Refit without the readings that are `out`, and with all others."""
+    data = replace(state.data, weight=np.where(out, 0.0, 1.0))
+    noise = replace(state.noise, weight=data.weight)
+    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
+    state.settle(fit, data, noise)

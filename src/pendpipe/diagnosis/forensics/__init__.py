@@ -1,0 +1,49 @@
+"""Tests for faults of the measurement without a smooth signature in time, a file for each.
+
+Every module has ``find(data, fit, noise, samples) -> Finding``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics import (
+    broadband_drive,
+    clipping,
+    coarse_quantisation,
+    coloured_noise,
+    glitches,
+    jitter,
+    missing_codes,
+    time_stamps,
+)
+from pendpipe.diagnosis.forensics.finding import Finding
+from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+
+Test = Callable[[Data, Fit, Noise, Samples], Finding]
+
+TESTS: Final[dict[str, Test]] = {
+    "time-stamps": time_stamps.find_irregular,
+    "clipping": clipping.find,
+    "glitches": glitches.find,
+    "missing-codes": missing_codes.find,
+    "coarse-quantisation": coarse_quantisation.find,
+    "jitter": jitter.find,
+    "coloured-noise": coloured_noise.find,
+    "broadband-drive": broadband_drive.find,
+}
+"""In order: readings masked by one test are not used by those after it."""
+
+
+__all__ = [
+    "TESTS",
+    "Finding",
+    "LostSamples",
+    "Test",
+    "find_lost_samples",
+]

@@ -1,0 +1,284 @@
+"""Glitches: single wrong readings."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.distributions import binomial_at_least
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.finding import Finding, nothing
+from pendpipe.diagnosis.forensics.local import (
+    Local,
+    error_of,
+    local_residual,
+    whitened_in_time,
+)
+from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Location
+from pendpipe.estimate import Estimate
+
+_GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
+_CERTAIN_SD: Final = 4.5
+_LARGE_SD: Final = 3.0
+_SHARED_ERROR: Final = 0.35
+"""Largest part of an error that its neighbours may share if it belongs to a single reading."""
+_ROUNDS: Final = 4
+_NEIGHBOURS: Final = 4
+_BLOCK: Final = 50
+_MOST_ROUNDS: Final = 20
+_FAR_SD: Final = 8.0
+_WINDOW_RAD: Final = 4.0 * math.pi
+_NOT_RANDOM: Final = 1e-3
+_EXPECTED_BY_CHANCE: Final = 0.05
+"""A reading is left out if chance would give fewer than this in the whole record."""
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test for readings that neither normal nor heavy-tailed noise explains.
+
+    Each error is compared with its window and its neighbours. For k = 1, 2, 3, 5, 10 ... the
+    tail of the noise (Student's distribution, averaged over the posterior of nu) is fitted with
+    the k largest errors censored, and the k-th largest of n is tested:
+
+        p_k = P(at least k of n beyond the k-th largest).
+
+    The test uses the smallest p_k, with half of the probability given to k = 1. Readings that
+    are too small at the extremes of the motion are left to the tests for saturation.
+    """
+    if data.used < 60:
+        return nothing("glitches")
+    residual, used = error_of(data, fit), data.weight > 0.0
+    local, smeared = _errors(data, fit, noise, residual, ~used)
+    error = own_error(local)
+    count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
+    ordered = np.sort(error[used])
+    p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
+    mask = np.zeros(len(data), dtype=bool)
+    size = np.zeros(len(data))
+    for _ in range(_ROUNDS):
+        beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
+        beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED_BY_CHANCE
+        if smeared:
+            # The filter spreads a wrong reading over its neighbours: take the largest first.
+            beyond &= error == _largest_about(error)
+        if not beyond.any():
+            break
+        size[beyond] = local.scaled[beyond]
+        mask |= beyond
+        if not smeared:
+            break
+        local, _ = _errors(data, fit, noise, residual, ~used | mask)
+        error = own_error(local)
+    ends = bent_ends(data.values - residual, size, mask, used)
+    if ends.any():
+        mask &= ~ends
+        p_value = _smallest_p_value(np.sort(error[used & ~ends]), step)
+    if not mask.any() or p_value > _EXPECTED_BY_CHANCE:
+        quiet = "no reading exceeds the noise"
+        return Finding("glitches", max(p_value, _EXPECTED_BY_CHANCE), summary=quiet)
+    return _described(data, fit, residual, size, mask, p_value, tail)
+
+
+def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test for single wrong readings where the model itself is wrong.
+
+    This needs no model: the smooth motion is subtracted window by window. Only deviations of eight
+    standard deviations count, and only without deviating neighbours: lost samples, a jump or a
+    corner of the motion displace several readings.
+    """
+    if data.used < 60 or data.time_noise:
+        return nothing("glitches")
+    used, phase = data.weight > 0.0, fit.at.sampled.phase
+    values = data.values - float(np.median(data.values[used]))
+    mask = np.zeros(len(data), dtype=bool)
+    for _ in range(_MOST_ROUNDS):
+        # A wrong reading biases its window: take the largest first.
+        local = local_residual(phase, values, used, leave_out=mask)
+        error = np.where(mask | ~used, 0.0, np.abs(local.scaled))
+        beyond = (error > _FAR_SD) & (error == _largest_about(error))
+        if not beyond.any():
+            break
+        mask |= beyond
+    single = mask & (_largest_beside(np.abs(local.scaled)) < _LARGE_SD)
+    # Several displaced readings bias their window, so that others there seem wrong.
+    bent = phase[mask & ~single]
+    single[single] = [np.all(np.abs(bent - at) > _WINDOW_RAD) for at in phase[single]]
+    single &= ~bent_ends(values - local.left, local.scaled, single, used)
+    if not single.any():
+        return nothing("glitches")
+    ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
+    step = _rounding_in(data, local.rms)
+    p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
+    return _described(data, fit, values, local.scaled, single, p_value, tail)
+
+
+def _largest_beside(error: FloatArray) -> FloatArray:
+    """Return the largest of each reading's neighbours, two on each side."""
+    left = np.pad(error, (2, 0))
+    right = np.pad(error, (0, 2))
+    return np.asarray(np.max([left[:-2], left[1:-1], right[1:-1], right[2:]], axis=0))
+
+
+def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolArray) -> BoolArray:
+    """Return which wrong readings lie too near an extreme of the motion to be random.
+
+    Of m readings at random, k or more all lie above a threshold exceeded by the fraction f of all
+    readings with a probability of at most C(m, k) f^k. A saturating sensor makes its errors
+    there, and towards the middle.
+
+    Parameters
+    ----------
+    angle, size
+        The motion's, and the readings' errors; shape (n,).
+    mask, used
+        Which are wrong, and which count; shape (n,).
+    """
+    found = np.zeros(len(angle), dtype=bool)
+    for sign in (1.0, -1.0):
+        wrong = np.flatnonzero(mask & (sign * size < 0.0))
+        wrong = wrong[np.argsort(-sign * angle[wrong])]
+        share = [float(np.mean(sign * angle[used] >= sign * angle[at])) for at in wrong]
+        chances = [
+            math.comb(int(np.count_nonzero(mask)), k) * part**k for k, part in enumerate(share, 1)
+        ]
+        if chances and min(chances) < _NOT_RANDOM:
+            found[wrong[: int(np.argmin(chances)) + 1]] = True
+    return found
+
+
+def _errors(
+    data: Data, fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray
+) -> tuple[Local, bool]:
+    """Return each reading's error, and whether a filter has spread it over its neighbours.
+
+    If a misfit of the motion remains in the windows, each reading is compared with the cubic
+    through its four neighbours instead.
+    """
+    phase = fit.at.sampled.phase
+    rest = np.where(out, 0.0, residual)
+    local = local_residual(phase, whitened_in_time(rest, noise), ~out)
+    if not local.smooth():
+        return local, noise.uniform and noise.memory != 0.0
+    filled = np.interp(phase, phase[~out], residual[~out])
+    padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")
+    between = (4.0 * (padded[1:-3] + padded[3:-1]) - padded[:-4] - padded[4:]) / 6.0
+    error = (filled - between) / _local_scale(filled - between)
+    return local_residual(phase, np.where(out, 0.0, error), ~out), True
+
+
+def _local_scale(error: FloatArray) -> FloatArray:
+    """Return the local median of |error|, which a misfit makes vary along the record."""
+    count = max(len(error) // _BLOCK, 1)
+    ends = np.linspace(0, len(error), count + 1).astype(np.int64)
+    usual = [np.median(np.abs(error[i:j])) for i, j in pairwise(ends)]
+    scale = np.interp(np.arange(len(error)), 0.5 * (ends[:-1] + ends[1:]), usual)
+    return np.asarray(np.maximum(scale, max(float(np.median(usual)), 1e-300)))
+
+
+def own_error(local: Local) -> FloatArray:
+    """Return |error| in standard deviations, less the part that neighbours share."""
+    scaled = local.scaled
+    around = np.zeros(len(scaled))
+    around[1:-1] = 0.5 * (scaled[:-2] + scaled[2:])
+    around[0], around[-1] = scaled[1], scaled[-2]
+    # Only for large errors: the distribution of the others must not change.
+    shared = (np.abs(around) > _SHARED_ERROR * np.abs(scaled)) & (np.abs(scaled) > _LARGE_SD)
+    alone = np.abs(scaled - around) * math.sqrt(2.0 / 3.0)
+    return np.asarray(np.where(shared, np.minimum(np.abs(scaled), alone), np.abs(scaled)))
+
+
+def _largest_about(error: FloatArray) -> FloatArray:
+    """Return the largest of each reading and its neighbours."""
+    padded = np.pad(error, _NEIGHBOURS)
+    return np.asarray(
+        np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1).max(axis=1)
+    )
+
+
+def _rounding_in(data: Data, error_rms: float) -> float:
+    """Return the step in standard deviations of an error (smaller for means of readings)."""
+    return data.step / math.sqrt(data.fold) / error_rms
+
+
+def _smallest_p_value(sorted_error: FloatArray, step: float) -> float:
+    """Return the p-value over all numbers of glitches."""
+    count = len(sorted_error)
+    numbers = [k for k in _GLITCH_NUMBERS if k <= count // 30]
+    best = 1.0
+    for k in numbers:
+        if sorted_error[count - k] < _LARGE_SD:
+            break  # not larger than noise
+        tail = fit_tail(sorted_error, k, step=step)
+        chance = float(tail.beyond(sorted_error[count - k]))
+        p_value = binomial_at_least(k, count, min(chance, 1.0))
+        share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
+        best = min(p_value / share, best)
+    return best
+
+
+def _noise_tail(sorted_error: FloatArray, step: float) -> Tail:
+    """Fit the tail of the noise where the largest errors are glitches."""
+    foreign = int(np.count_nonzero(sorted_error > _CERTAIN_SD))
+    most = min(max(foreign, 1), len(sorted_error) // 10)
+    return fit_tail(sorted_error, most, foreign=True, step=step)
+
+
+def _described(
+    data: Data,
+    fit: Fit,
+    residual: FloatArray,
+    sizes: FloatArray,
+    mask: BoolArray,
+    p_value: float,
+    tail: Tail,
+) -> Finding:
+    sampled = fit.at.sampled
+    size = sizes[mask]
+    used = data.weight > 0.0
+    local = local_residual(sampled.phase, residual, used, leave_out=mask)
+    reading = local.left[mask]
+    when = data.time_s[mask]
+    amplitude = sampled.amplitude[mask]
+    largest = int(np.argmax(np.abs(size)))
+    number = int(np.count_nonzero(mask))
+    own = math.sqrt(float(np.mean(reading**2)))
+    rms = local.rms
+    parameters = {
+        "number": Estimate(float(number), 0.0, ""),
+        "share": Estimate(number / data.used, math.sqrt(number) / data.used, ""),
+        "rms": Estimate(
+            own, max(own / math.sqrt(2.0 * number), rms / math.sqrt(number)), data.unit
+        ),
+        "largest": Estimate(float(reading[largest]), rms, data.unit),
+        "largest_time": Estimate(float(when[largest]), 0.0, "s"),
+    }
+    if number == 1:
+        summary = f"one reading, at {when[0]:.6g} s, is wrong by {reading[0]:.3g} {data.unit}"
+    else:
+        summary = (
+            f"{number} single readings between {when[0]:.4g} and {when[-1]:.4g} s are wrong"
+            f" by up to {abs(reading[largest]):.3g} {data.unit}"
+        )
+    if tail.inverse_freedom > 0.03:
+        summary += (
+            f" (the noise of the others has Student tails, nu = {1.0 / tail.inverse_freedom:.2g})"
+        )
+    return Finding(
+        "glitches",
+        p_value,
+        float(np.sum(size**2)),
+        parameters,
+        Location(
+            (float(when[0]), float(when[-1])), (float(amplitude.min()), float(amplitude.max()))
+        ),
+        mask=mask,
+        summary=summary,
+    )

@@ -1,0 +1,229 @@
+"""Jitter: uncertain sampling times, and so noise proportional to the speed."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.codes import Coded, read_codes
+from pendpipe.diagnosis.forensics.finding import Finding, nothing
+from pendpipe.diagnosis.forensics.lattice import rounding_moments, whole_readings
+from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_in_time
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.numerics import tail_of_squares
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Location
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import with_error
+
+_CLIP_SD: Final = 3.0
+"""Standard deviations at which errors are clipped."""
+_CONSTANT: Final = 1e-3
+"""Relative variation of the mean of v^2 over a cycle below which it counts as constant."""
+_AGREE_SD: Final = 2.6
+"""Standard deviations by which the part at twice the frequency may be too small."""
+_DITHERED: Final = 0.7
+"""Noise before rounding, in steps, from which rounding simply adds to the noise."""
+_ROUNDS: Final = 6
+_RELATIVE_STEP: Final = 0.05
+_LARGEST_BLUR: Final = 0.15
+"""Error of the angles in steps above which the rounding errors are unknown."""
+
+
+class Squares(NamedTuple):
+    """Squared errors against the speed; arrays of shape (m,).
+
+    Parameters
+    ----------
+    square
+        In units of the variance `unit`.
+    expected, variance
+        Their mean and variance without jitter.
+    gain
+        Derivative of `expected` by the variance before rounding (1 where dithered).
+    mean, double
+        The parts of v^2 that vary with the amplitude, (omega A)^2/2, and at twice the
+        frequency, -(omega A)^2 cos(2 psi)/2; in units of `speed`.
+    unit
+        Variance of one reading, rad^2.
+    speed
+        Mean of v^2, (rad/s)^2.
+    shared
+        Part of the degrees of freedom used by the local fits.
+    """
+
+    square: FloatArray
+    expected: FloatArray
+    variance: FloatArray
+    gain: FloatArray
+    mean: FloatArray
+    double: FloatArray
+    unit: float
+    speed: float
+    shared: float = 0.0
+
+    @property
+    def inverse(self) -> FloatArray:
+        """Weight of each square, limited for those that rounding fixes."""
+        return 1.0 / np.maximum(self.variance, 0.05 * float(np.mean(self.variance)))
+
+
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
+
+    The score for sigma_t^2 at zero is a sum of squared errors, weighted by v^2 minus its mean; its
+    p-value is that of a weighted sum of squares, scaled for heavier tails than normal. If
+    rounding is not dithered, each square is compared with its expectation at that angle. The part
+    of v^2 at twice the frequency must agree with the whole, or it alone counts: noise that decays
+    with the amplitude is not jitter.
+    """
+    if data.time_noise or data.used < 60:
+        return nothing("jitter")
+    coded = read_codes(data, fit, samples)
+    if coded is not None and coded.ratio < _DITHERED:
+        squares = _rounded(data, fit, samples, coded)
+    else:
+        squares = _dithered(data, fit, noise)
+    if squares is None or len(squares.square) < 50:
+        return nothing("jitter")
+    p_value = _p_value(squares, squares.mean + squares.double)
+    # At constant amplitude the mean of v^2 can't be distinguished from the variance of the noise.
+    if float(np.std(squares.mean)) > _CONSTANT * float(np.mean(squares.mean)):
+        size, covariance = _fitted(squares, [squares.mean, squares.double])
+        spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
+        if size[2] - size[1] < -_AGREE_SD * spread:
+            p_value = max(p_value, _p_value(squares, squares.double, beside=squares.mean))
+    return _described(data, fit, squares, p_value)
+
+
+def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
+    """Return squares of normal errors; None if a misfit of the motion remains in them."""
+    sampled, used = fit.at.sampled, data.weight > 0.0
+    residual = residual_of(data, fit)
+    white = whitened_in_time(residual, noise)
+    local = local_residual(sampled.phase, white, used)
+    if local.smooth():
+        return None
+    scaled = local.scaled[used]
+    unit = noise.white_rms**2
+    mean, double, speed = _speeds(fit, np.flatnonzero(used))
+    ones = np.ones(len(scaled))
+    shared = float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5))
+    return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit, speed, shared)
+
+
+def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
+    """Return squares of rounding errors; None if the angles are not known well enough."""
+    part = whole_readings(data, samples)
+    if part is None or coded.blur > _LARGEST_BLUR:
+        return None
+    index = coded.index - part.start
+    # At rest within a step all errors are equal: they contain no information on noise.
+    moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
+    if np.count_nonzero(moving) < 50:
+        moving[:] = True
+    place = coded.position[moving] - np.round(coded.position[moving])
+    before = math.hypot(coded.ratio, coded.blur)
+    expected, variance = rounding_moments(place, before)
+    more, less = (1.0 + _RELATIVE_STEP) * before, (1.0 - _RELATIVE_STEP) * before
+    gain = rounding_moments(place, more)[0] - rounding_moments(place, less)[0]
+    gain /= more**2 - less**2
+    square = coded.error[moving] ** 2
+    unit = float(np.mean(square))
+    mean, double, speed = _speeds(fit, index[moving])
+    step = coded.lattice.step
+    return Squares(
+        square / unit,
+        expected / unit,
+        variance / unit**2,
+        np.maximum(gain, 0.0),
+        mean,
+        double,
+        unit * step**2,
+        speed,
+    )
+
+
+def _speeds(fit: Fit, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
+    sampled = fit.at.sampled
+    top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
+    double = -top * np.cos(2.0 * sampled.phase[index])
+    speed = float(np.mean(top))
+    return top / speed, double / speed, speed
+
+
+def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
+    """Return the probability of a weighted sum as large, the variance of the noise unknown."""
+    capped = np.minimum(squares.square, _CLIP_SD**2 * squares.expected.mean())
+    columns = [squares.gain] if beside is None else [squares.gain, squares.gain * beside]
+    # Project out the variance (and `beside`), by least squares.
+    basis, inverse = np.stack(columns, axis=1), squares.inverse
+    wanted = squares.gain * weight
+    solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * wanted))
+    rest = (wanted - basis @ solved) * inverse
+    off = capped - squares.expected
+    level = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
+    off = off - level * squares.gain
+    weights = rest * squares.expected
+    # Scatter relative to independent squares of normal numbers.
+    share = (
+        float(np.mean(off**2 * squares.inverse))
+        / float(np.mean(squares.variance * squares.inverse))
+        / (1.0 - squares.shared)
+    )
+    stretch = math.sqrt(
+        share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights))
+    )
+    total = float(rest @ off)
+    return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
+
+
+def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Fit a constant and parts to the variance; return sizes and their covariance."""
+    columns = squares.gain[:, None] * np.stack([np.ones(len(squares.gain)), *parts], axis=1)
+    size = np.zeros(columns.shape[1])
+    matrix: FloatArray = np.eye(columns.shape[1])
+    off = np.minimum(squares.square, 25.0 * squares.expected.mean()) - squares.expected
+    for _ in range(_ROUNDS):
+        model = np.maximum(squares.expected + columns @ size, 0.1 * squares.expected)
+        weight = squares.inverse / (model / squares.expected) ** 2
+        matrix = np.asarray(np.linalg.inv(columns.T @ (weight[:, None] * columns)))
+        size = matrix @ (columns.T @ (weight * off))
+    return size, matrix
+
+
+def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
+    speed = squares.mean + squares.double
+    size, covariance = _fitted(squares, [speed])
+    lowest = 0.1 * squares.expected
+    model = squares.expected + squares.gain * (size[0] + size[1] * speed)
+    plain = squares.expected + squares.gain * _fitted(squares, [])[0][0]
+    model, plain = np.maximum(model, lowest), np.maximum(plain, lowest)
+    gain = np.log(plain / model) + squares.square * (1.0 / plain - 1.0 / model)
+    to_seconds = squares.unit / squares.speed
+    share = max(float(size[1]), 0.0)
+    seconds = math.sqrt(share * to_seconds)
+    sd = math.sqrt(covariance[1, 1])
+    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the size of the square root itself.
+    error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
+    sampled = fit.at.sampled
+    omega = sampled.motion.angular_frequency
+    return Finding(
+        "jitter",
+        p_value,
+        max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
+        {"sigma_t": Estimate(seconds, error, "s")},
+        Location(
+            (float(data.time_s[0]), float(data.time_s[-1])),
+            (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
+            (0.25 * math.pi, 0.75 * math.pi),
+            (omega / math.pi,),
+        ),
+        summary="the noise is largest where the motion is fastest, as if the sampling times"
+        f" were uncertain by {with_error(seconds, error, 's')}",
+    )

@@ -1,0 +1,238 @@
+"""The lattice of a converter's codes, and the distribution of rounded readings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.analysis.distributions import normal_below
+from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.local import Local
+
+_NOISE_RATIOS: Final = (
+    0.03,
+    0.05,
+    0.07,
+    0.1,
+    0.13,
+    0.16,
+    0.2,
+    0.24,
+    0.28,
+    0.33,
+    0.38,
+    0.44,
+    0.5,
+    0.56,
+)
+"""Noise before rounding, in steps, at which the likelihood is computed."""
+_DITHERED: Final = 0.6
+"""Rms of the errors in steps from which rounding is dithered."""
+_FIRST_CODES: Final = 256
+_FEWEST_CODES: Final = 16
+"""Number of different codes that lie on a coarser lattice by chance with 2^-16 at most."""
+_ROUNDS: Final = 4
+_TOLERANCE: Final = 0.05
+"""Tolerance of readings about their codes, in steps."""
+_LARGEST_ROUNDING: Final = 0.6
+"""Largest rounding of a coarser step's readings, in steps of the converter (half, and a margin)."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Readings as integer multiples of a step.
+
+    Parameters
+    ----------
+    step
+        In the unit of the readings.
+    code
+        Of each reading: its value is ``step code + origin``; shape (n,).
+    origin
+        The value of code 0: within half a step of zero.
+    """
+
+    step: float
+    code: IntArray
+    origin: float
+
+    def position(self, value: FloatArray) -> FloatArray:
+        """Return values in steps from code 0."""
+        return np.asarray((value - self.origin) / self.step)
+
+
+def find_lattice(
+    values: FloatArray, step: float | None, slack: float = _TOLERANCE
+) -> Lattice | None:
+    """Number the codes of readings; None if they lie on no lattice within a tolerance `slack`.
+
+    The step is refined over the whole range, so that codes far from zero are numbered right.
+    """
+    if step is None or not step > 0.0:
+        return None
+    levels, inverse = np.unique(values, return_inverse=True)
+    if len(levels) < 3:
+        return None
+    gaps = np.round(np.diff(levels) / step).astype(np.int64)
+    number = np.concatenate([[0], np.cumsum(gaps)])
+    if number[-1] < 2:
+        return None
+    centred = number - number.mean()
+    refined = float(centred @ levels / (centred @ centred))
+    origin = float(np.mean(levels - refined * number))
+    if np.max(np.abs(levels - origin - refined * number)) > slack * refined:
+        return None
+    shift = round(origin / refined)
+    return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
+
+
+def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
+    """Number the codes of a recording's readings (or some of them), as `find_lattice`.
+
+    The coarser step of an earlier stage is rounded to the converter's own.
+    """
+    if samples.step is None or samples.promised_step is None:
+        return find_lattice(values, samples.step)
+    rounded = _LARGEST_ROUNDING * samples.promised_step / samples.step
+    return find_lattice(values, samples.step, max(rounded, _TOLERANCE))
+
+
+def with_true_step(samples: Samples) -> Samples:
+    """Use the step of the observed codes if it is larger than the converter's.
+
+    A converter with k dead bits gives every 2^k-th code: its step is 2^k times its nominal one.
+    If an earlier stage has a step of its own, of any size, the observed codes are multiples of
+    it, each rounded to the nearest code.
+    """
+    if samples.counts or samples.step is None:
+        return samples
+    codes = (samples.values - samples.values[0]) / samples.step
+    whole = np.rint(codes)
+    if np.max(np.abs(codes[:_FIRST_CODES] - whole[:_FIRST_CODES])) > _TOLERANCE:
+        return samples
+    if np.diff(np.unique(whole[:_FIRST_CODES])).min(initial=np.inf) < 2.0:
+        return samples
+    levels = np.unique(whole)
+    times = spacing_of(levels) if len(levels) >= _FEWEST_CODES else None
+    if times is None:
+        return samples
+    step = times * samples.step
+    noise = max(samples.noise_rms, noise_rms(samples.values, step))
+    return replace(samples, step=step, noise_rms=noise, promised_step=samples.step)
+
+
+def spacing_of(levels: FloatArray) -> float | None:
+    """Return the spacing of the observed codes in steps; None if they have none.
+
+    Parameters
+    ----------
+    levels
+        Observed codes (whole numbers), rising.
+
+    Returns
+    -------
+    float or None
+        Whole if all codes are its multiples (from one of them on); else the spacing of a lattice
+        of which they are the roundings.
+    """
+    gaps = np.diff(levels)
+    if len(gaps) < 2 or gaps.min() < 2.0:
+        return None
+    common = int(np.gcd.reduce(gaps.astype(np.int64)))
+    if common > 1:
+        return float(common)
+    # Neighbours are one spacing apart, rounded down or up; others two, three, ...
+    spacing = float(np.mean(gaps[gaps <= 1.5 * gaps.min()]))
+    number = np.append(0.0, np.cumsum(np.round(gaps / spacing)))
+    for _ in range(_ROUNDS):
+        centred = number - number.mean()
+        spacing = float(centred @ levels / (centred @ centred))
+        off = levels - spacing * number
+        if float(np.ptp(off)) < 2.0 * _LARGEST_ROUNDING:
+            return spacing
+        # A gap may have been counted wrong: recount by the line through all of them.
+        number = np.round((levels - off.mean()) / spacing)
+    return None
+
+
+def whole_readings(data: Data, samples: Samples) -> slice | None:
+    """Return the samples that the data are; None if the data are means of several.
+
+    They have the samples' times, or their values if the times have been corrected.
+    """
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    part = slice(first, first + len(data))
+    if part.stop > len(samples):
+        return None
+    if np.allclose(samples.time_s[part], data.time_s, rtol=0.0, atol=1e-9):
+        return part
+    same = samples.values[part] == data.values
+    return part if np.count_nonzero(same) > 0.5 * len(data) else None
+
+
+def noise_before_rounding(local: Local, step: float) -> float:
+    """Estimate the noise before rounding by maximum likelihood, from P(code).
+
+    The likelihood is that of `analysis.fit.rounding`, but the true angle comes from local fits and
+    has their noise. So each reading has its own standard deviation, and outliers (glitches) are
+    left out.
+
+    Parameters
+    ----------
+    local
+        Readings minus their smooth part, which is taken as the true angle.
+    step
+        Of the readings.
+    """
+    if local.rms > _DITHERED * step:
+        # Rounding is dithered: variances add.
+        return math.sqrt(local.rms**2 - step**2 / 12.0)
+    left = local.left[local.used] / step
+    near = np.abs(left) < 5.0 * local.rms / step + 1.0
+    left = left[near]
+    extra = np.maximum(local.leverage[local.used][near], -0.9)
+    best, most = 0.0, -np.inf
+    for ratio in _NOISE_RATIOS:
+        spread = ratio * np.sqrt(1.0 + extra)
+        chance = normal_below((left + 0.5) / spread) - normal_below((left - 0.5) / spread)
+        likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
+        if likelihood > most:
+            best, most = ratio, likelihood
+    return best * step
+
+
+def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance of the squared error due to rounding and noise.
+
+    Parameters
+    ----------
+    fraction
+        Position of the value between codes, in steps: 0 at a code; shape (n,).
+    ratio
+        Noise before rounding, in steps.
+
+    Returns
+    -------
+    square, variance
+        E[e^2] in steps^2 and Var[e^2] in steps^4, e = code - value; shape (n,).
+    """
+    grid = np.linspace(-0.5, 0.5, 65)
+    reach = int(np.ceil(5.0 * ratio)) + 1
+    codes = np.arange(-reach, reach + 1)
+    chance = normal_below((codes + 0.5 - grid[:, None]) / ratio) - normal_below(
+        (codes - 0.5 - grid[:, None]) / ratio
+    )
+    error = codes - grid[:, None]
+    square = np.sum(chance * error**2, axis=1)
+    fourth = np.sum(chance * error**4, axis=1)
+    place = fraction - np.round(fraction)
+    return (
+        np.interp(place, grid, square),
+        np.interp(place, grid, np.maximum(fourth - square**2, 0.0)),
+    )

@@ -1,0 +1,216 @@
+"""Local residuals: the readings minus everything that varies smoothly from cycle to cycle.
+
+The tests of the measurement run before the physics is complete. They use what no motion of the
+pendulum can produce, however wrong its model: in windows of a few cycles an offset and both
+quadratures of the fundamental with their slopes are fitted and subtracted (and the second and
+third harmonic where these are significant).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.numerics import cosines, from_cosines
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.unwrapped import unwrapped
+
+_WINDOW_CYCLES: Final = 2
+_WINDOW_READINGS: Final = 40
+_OUTLIER_SD: Final = 5.0
+"""Standard deviations beyond which a reading is left out of its window's fit."""
+_CHANCE_CORRELATION: Final = 0.1
+"""Correlation of neighbouring errors that noise may have by chance."""
+_HARMONICS_SD: Final = 5.0
+"""Standard deviations at which the harmonics are significant."""
+
+
+@dataclass(frozen=True)
+class Local:
+    """Readings minus their smooth part.
+
+    Parameters
+    ----------
+    left
+        The difference, shape (n,); 0 where a reading is masked.
+    rms
+        Standard deviation of one reading's noise, in the unit of `left`.
+    leverage
+        ``left`` has the variance rms^2 (1 + leverage); negative where the reading took part in
+        the fit. Shape (n,).
+    used
+        Which readings count; shape (n,).
+    """
+
+    left: FloatArray
+    rms: float
+    leverage: FloatArray
+    used: BoolArray
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviation of `left`, shape (n,)."""
+        return np.asarray(self.rms * np.sqrt(np.maximum(1.0 + self.leverage, 0.05)))
+
+    def smooth(self, memory: float = 0.0) -> bool:
+        """Return whether it is smoother than the noise, and so contains a misfit.
+
+        `memory` is the correlation of neighbouring errors that the noise is known to have.
+        """
+        fitted = self.used & (self.leverage < 0.0)
+        scaled = np.where(fitted, np.clip(self.scaled, -4.0, 4.0), 0.0)
+        size = float(scaled @ scaled)
+        correlation = float(scaled[1:] @ scaled[:-1]) / max(size, 1e-300)
+        return correlation > 1.2 * max(memory, 0.0) + _CHANCE_CORRELATION + 4.0 / math.sqrt(
+            max(int(np.count_nonzero(self.used)), 1)
+        )
+
+    @property
+    def scaled(self) -> FloatArray:
+        """`left` in its own standard deviations, shape (n,)."""
+        return self.left / self.spread
+
+
+def residual_of(data: Data, fit: Fit) -> FloatArray:
+    """Return readings minus model, along the motion if out of phase; 0 where masked."""
+    return np.asarray(unwrapped(data, fit.at)[0] * (data.weight > 0.0))
+
+
+def error_of(data: Data, fit: Fit) -> FloatArray:
+    """Return readings minus the motion, rounding errors included; 0 where masked.
+
+    The tests of codes and tails treat rounding errors themselves. Subtracting their mean first
+    (`Data.residual`) would move a reading beyond a code's edge by a whole step, and the motion to
+    the middle of the code.
+    """
+    return residual_of(replace(data, lattice=None), fit)
+
+
+def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
+    """Return S^-1 r in units of its standard deviation, for noise of any colour.
+
+    This compares each reading with its best prediction from all others (unit variance). White
+    noise is simply divided by its standard deviation.
+    """
+    if not noise.uniform:
+        return np.asarray(residual / np.sqrt(noise.variance))
+    if noise.red == 0.0 and noise.memory == 0.0:
+        return residual / noise.rms
+    count = len(residual)
+    inverse = 1.0 / noise.variance
+    filtered = from_cosines(cosines(residual) * inverse)
+    # (S^-1)_jj = (2/n) sum of cos^2(pi k (2 j + 1)/(2 n))/S_k, from a sum of cosines.
+    doubled = np.fft.rfft(inverse, n=2 * count).real
+    odd = 2 * np.arange(count) + 1
+    diagonal = inverse.sum() - inverse[0] + doubled[np.where(odd <= count, odd, 2 * count - odd)]
+    return np.asarray(filtered / np.sqrt(diagonal / count))
+
+
+def local_residual(
+    phase: FloatArray, values: FloatArray, used: BoolArray, *, leave_out: BoolArray | None = None
+) -> Local:
+    """Subtract the smooth part of a residual.
+
+    Parameters
+    ----------
+    phase
+        Of the motion, rising, rad, shape (n,): it divides the record into windows.
+    values
+        The residual, shape (n,), of any scale.
+    used
+        Which readings count; shape (n,).
+    leave_out
+        Readings that may not take part in the fits, shape (n,).
+    """
+    part = used if leave_out is None else used & ~leave_out
+    window = _windows(phase)
+    columns = _columns(phase, window, harmonics=1)
+    local = _fitted(columns, window, values, part, used)
+    far = np.abs(local.scaled) > _OUTLIER_SD
+    if far.any():
+        local = _fitted(columns, window, values, part & ~far, used)
+    if _has_harmonics(phase, window, local, part & ~far):
+        columns = _columns(phase, window, harmonics=3)
+        local = _fitted(columns, window, values, part & ~far, used)
+        again = np.abs(local.scaled) > _OUTLIER_SD
+        if np.any(again != far):
+            local = _fitted(columns, window, values, part & ~again, used)
+    return local
+
+
+def _windows(phase: FloatArray) -> IntArray:
+    """Return each reading's window: whole cycles, with enough readings."""
+    turns = (phase[-1] - phase[0]) / (2.0 * math.pi)
+    cycles = max(_WINDOW_CYCLES, math.ceil(_WINDOW_READINGS * turns / len(phase)))
+    number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles)).astype(np.int64)
+    # An incomplete window at the end joins the one before.
+    last = max(int(turns / cycles + 0.25), 1) - 1
+    return np.asarray(np.minimum(number, last))
+
+
+def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
+    """Return the smooth functions: offset, fundamental and its slope, harmonics; shape (n, p)."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    ends = np.append(starts[1:], len(phase)) - 1
+    middle = 0.5 * (phase[starts] + phase[ends])
+    half = np.maximum(0.5 * (phase[ends] - phase[starts]), 1e-9)
+    along = (phase - middle[window]) / half[window]
+    cosine, sine = np.cos(phase), np.sin(phase)
+    parts = [np.ones(len(phase)), cosine, sine, along * cosine, along * sine]
+    for harmonic in range(2, harmonics + 1):
+        parts += [np.cos(harmonic * phase), np.sin(harmonic * phase)]
+    return np.stack(parts, axis=1)
+
+
+def _fitted(
+    columns: FloatArray, window: IntArray, values: FloatArray, part: BoolArray, used: BoolArray
+) -> Local:
+    """Least squares in every window at once."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    kept = columns * part[:, None]
+    size = columns.shape[1]
+    matrix = np.add.reduceat(kept[:, :, None] * columns[:, None, :], starts)
+    # Regularised for windows with few readings.
+    matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
+    right = np.add.reduceat(kept * values[:, None], starts)
+    inverse = np.linalg.inv(matrix)
+    solved = (inverse @ right[..., None])[..., 0]
+    left = (values - np.sum(columns * solved[window], axis=1)) * used
+    turned = np.matmul(columns[:, None, :], inverse[window])[:, 0, :]
+    hat = np.sum(turned * columns, axis=1)
+    leverage = np.where(part, -np.minimum(hat, 1.0), np.minimum(hat, 10.0))
+    freedom = max(float(np.sum(1.0 + leverage[part])), 1.0)
+    return Local(left, _rms(left[part], freedom), leverage, used)
+
+
+def _rms(left: FloatArray, freedom: float) -> float:
+    """Return the root mean square, with outliers clipped."""
+    scale = math.sqrt(len(left) / freedom)
+    rms = 1.4826 * float(np.median(np.abs(left))) * scale
+    if rms == 0.0:
+        rms = math.sqrt(float(left @ left) / freedom)
+    for _ in range(2):
+        near = np.minimum(np.abs(left), 4.0 * rms / scale)
+        rms = math.sqrt(float(near @ near) / freedom)
+    return max(rms, 1e-300)
+
+
+def _has_harmonics(phase: FloatArray, window: IntArray, local: Local, part: BoolArray) -> bool:
+    """Whether windows contain more of the second or third harmonic than noise would."""
+    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
+    total, number = 0.0, 0
+    for harmonic in (2, 3):
+        for column in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
+            kept = column * part
+            norm = np.add.reduceat(kept * kept, starts)
+            size = np.add.reduceat(kept * local.left, starts)
+            good = norm > 4.0
+            total += float(np.sum(np.minimum(size[good] ** 2 / norm[good] / local.rms**2, 50.0)))
+            number += int(np.count_nonzero(good))
+    return total > number + _HARMONICS_SD * math.sqrt(2.0 * max(number, 1))

@@ -1,0 +1,224 @@
+"""Gauss-Newton steps towards the best values of a model, within their bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.numerics import bounded_least_squares
+from pendpipe.diagnosis.unwrapped import unwrapped
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
+from pendpipe.effects.derivatives import jacobian
+from pendpipe.effects.model import Evaluated, Model
+
+SETTLED: Final = 0.02
+"""Expected fall of chi^2 below which a step is the last."""
+_LARGEST_RATIO: Final = 1.5
+"""By which a scale (a time, a speed, a length) may change in one step."""
+_FRACTIONS: Final = (0.3, 0.1, 0.02)
+"""Fractions of a step to try where the whole step does not lower chi^2."""
+_REFITTED_FRACTIONS: Final = (1.0, 0.3)
+"""The same where the linear values are refitted after the scales have moved."""
+_ENOUGH: Final = 0.5
+"""Part of the expected fall of chi^2 from which no further fraction is line_search."""
+_SHARE_SD: Final = 0.3
+"""Prior about 0.5: one recording hardly constrains the hysteretic share of b."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A model evaluated at some values; shapes are those of `refine.Fit`.
+
+    Parameters
+    ----------
+    value
+        Of the model.
+    at, residual, max_phase_error_rad
+        The model there, the whitened residual, and the largest phase error.
+    model, noise
+        From which the Jacobian is computed when it is needed.
+    """
+
+    value: FloatArray
+    at: Evaluated
+    residual: FloatArray
+    max_phase_error_rad: float
+    model: Model
+    noise: Noise
+
+    @cached_property
+    def chi2(self) -> float:
+        """Sum of squares."""
+        return float(self.residual @ self.residual)
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """The Jacobian."""
+        return _jacobian(self.model, self.noise, self.value, self.at)
+
+
+class GaussNewton:
+    """Gauss-Newton steps of one model on one set of readings."""
+
+    def __init__(self, model: Model, data: Data, noise: Noise) -> None:
+        self._model, self._data, self._noise = model, data, noise
+        self._low, self._high = model.bounds()
+        self._shapes = np.array(_shapes(model), dtype=np.int64)
+        # A shape that must be positive is a scale: a speed, a time or a length.
+        self._scales = self._shapes[self._low[self._shapes] > 0.0]
+        self._stay = np.zeros(model.size, dtype=bool)
+        self._stay[np.setdiff1d(self._shapes, self._scales)] = True
+        self._factored: _Factored | None = None
+
+    def evaluate_within_bounds(self, value: FloatArray) -> Evaluation:
+        """Evaluate the model at values, clipped to the bounds."""
+        return self.evaluate(self._model.settled(np.clip(value, self._low, self._high)))
+
+    def evaluate(self, value: FloatArray) -> Evaluation:
+        """Evaluate the model at exactly these values."""
+        at = self._model.evaluate(value)
+        residual, slip = _residual(self._data, self._noise, at, value)
+        return Evaluation(value, at, residual, slip, self._model, self._noise)
+
+    def step(
+        self, here: Evaluation, free: IntArray, columns: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the best step of the free values for a linear model with these `columns`."""
+        low, high = self._low.copy(), self._high.copy()
+        # The readings are linear in a scale over a fraction of it at most, and while the effect
+        # is still small the step in its scale is arbitrary.
+        scales = self._scales
+        low[scales] = np.maximum(low[scales], here.value[scales] / _LARGEST_RATIO)
+        high[scales] = np.minimum(high[scales], here.value[scales] * _LARGEST_RATIO)
+        columns = here.columns if columns is None else columns
+        if self._factored is None or not self._factored.is_of(columns, free):
+            self._factored = _Factored.of(columns, free)
+        return _step(self._factored, here.residual, here.value, low, high)
+
+    def forget(self) -> None:
+        """Release the factored columns."""
+        self._factored = None
+
+    def line_search(
+        self, here: Evaluation, step: FloatArray, free: IntArray, expected: float
+    ) -> Evaluation | None:
+        """Go along a step as far as it lowers chi^2; return None if no fraction does.
+
+        `expected` is the fall of chi^2 if the model were linear.
+        """
+        enough = here.chi2 + 0.5 * SETTLED
+        whole = self._evaluated(here.value + step)
+        if whole is not None and whole.chi2 < enough:
+            return whole
+        refitted = (self._refitted(here, part * step, free) for part in _REFITTED_FRACTIONS)
+        shorter = (self._evaluated(here.value + part * step) for part in _FRACTIONS)
+        lowest: Evaluation | None = None
+        for way in (refitted, shorter):
+            found = next((there for there in way if there and there.chi2 < enough), None)
+            if found and (lowest is None or found.chi2 < lowest.chi2):
+                lowest = found
+            if lowest and here.chi2 - lowest.chi2 > _ENOUGH * expected:
+                break
+        return lowest
+
+    def _refitted(self, here: Evaluation, step: FloatArray, free: IntArray) -> Evaluation | None:
+        """Move the scales along a step, then refit sizes and baseline at the new scales.
+
+        Two laws of friction that replace each other leave the motion unchanged except in second
+        order: the frequency changes by g^2, which accumulates over the whole record. Other
+        shapes (the frequency of a line, an instant) stay fixed, because chi^2 has many minima
+        along them.
+        """
+        if not np.isin(self._scales, free).any():
+            return None
+        there = self._evaluated(here.value + np.where(self._stay, 0.0, step))
+        if there is None:
+            return None
+        try:
+            further = self.step(there, free[~np.isin(free, self._shapes)])
+        except NoMotionError:
+            return None
+        return self._evaluated(there.value + further)
+
+    def _evaluated(self, value: FloatArray) -> Evaluation | None:
+        try:
+            return self.evaluate_within_bounds(value)
+        except NoMotionError:
+            return None
+
+
+def _shapes(model: Model) -> list[int]:
+    """Return the indices of the values on which the readings do not depend linearly."""
+    return [
+        index
+        for effect, place in model.places()
+        for index in range(place.start + (1 if effect.parameter_free else effect.sizes), place.stop)
+    ]
+
+
+def _residual(
+    data: Data, noise: Noise, at: Evaluated, value: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the whitened residual with the prior's entry, and the largest phase error."""
+    plain, slip = unwrapped(data, at)
+    prior = (0.5 - value[SHARE]) / _SHARE_SD
+    return np.append(noise.whiten(plain), prior), slip
+
+
+def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:
+    columns = np.empty((len(at.reading) + 1, model.size))
+    columns[:-1] = noise.whiten(jacobian(model, value, at))
+    columns[-1] = 0.0
+    columns[-1, SHARE] = 1.0 / _SHARE_SD
+    # If one part of b is held, changing b changes the share.
+    columns[:, B] += share_by_b(value, model.held_parts()) * columns[:, SHARE]
+    return columns
+
+
+@dataclass(frozen=True)
+class _Factored:
+    """QR factors of the free values' columns, scaled to unit length."""
+
+    columns: FloatArray
+    free: IntArray
+    scale: FloatArray
+    basis: FloatArray
+    triangle: FloatArray
+
+    @classmethod
+    def of(cls, columns: FloatArray, free: IntArray) -> _Factored:
+        """Factor them."""
+        part = columns[:, free]
+        if not np.all(np.isfinite(part)):
+            raise NoMotionError("its derivatives are not finite")
+        scale = np.linalg.norm(part, axis=0)
+        scale[scale == 0.0] = 1.0
+        return cls(columns, free, scale, *np.linalg.qr(part / scale))
+
+    def is_of(self, columns: FloatArray, free: IntArray) -> bool:
+        """Whether these columns are the ones factored."""
+        return columns is self.columns and np.array_equal(free, self.free)
+
+
+def _step(
+    factored: _Factored, residual: FloatArray, value: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Solve for the Gauss-Newton step, the best within the bounds."""
+    step, free, scale = np.zeros(len(value)), factored.free, factored.scale
+    right = factored.basis.T @ residual
+    solved = np.linalg.lstsq(factored.triangle, right, rcond=1e-11)[0]
+    floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
+    if np.any(solved < floor) or np.any(solved > ceiling):
+        solved = bounded_least_squares(factored.triangle, right, floor, ceiling)
+    step[free] = solved / scale
+    limit = 0.05 * value[OMEGA]
+    if abs(step[OMEGA]) > limit:
+        step *= limit / abs(step[OMEGA])
+    return step

@@ -1,0 +1,244 @@
+"""Where an effect shows: time, amplitude, phase of the cycle, frequency, harmonic."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.remainder import by_cycle
+from pendpipe.diagnosis.result import Location
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.oscillations import PlaneCoupling
+from pendpipe.quantities import with_error
+
+_INTERVAL_SHARE: Final = 0.9
+"""Part of what an effect explains that its intervals hold."""
+_LARGE_PHASE_RAD: Final = 0.3
+"""Phase difference of two models in rad from which the difference of readings misleads."""
+_HARMONICS: Final = 6
+_HARMONIC_SHARE: Final = 0.1
+
+
+def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
+    """Find where the readings favour the model with an effect over the one without.
+
+    The expected contribution of a reading to Delta chi^2 is the squared difference of the two
+    fitted models over the noise; the intervals hold nine tenths of the sum.
+
+    Parameters
+    ----------
+    before, after
+        Fits without and with the effect.
+    data
+        The readings.
+    effect
+        The effect.
+    """
+    difference = _difference(before, after) * data.weight
+    power = difference**2
+    sampled = after.at.sampled
+    time = _interval(data.time_s, power)
+    amplitude = _interval(sampled.amplitude, power)
+    turned = math.pi if sampled.motion.upwards < 0.0 else 0.0
+    of_cycle = powers_of_cycle(sampled.phase + turned, power)
+    phase = one_arc(of_cycle, _INTERVAL_SHARE)
+    harmonics = _harmonics(sampled.phase, difference)
+    frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
+    lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
+    instant = instant_of(after, effect)
+    if instant is not None:
+        time = instant
+    tone = tone_of(after, effect)
+    if tone is not None:
+        lines, harmonics = (tone,), ()
+    found = Location(time, amplitude, phase, lines, harmonics)
+    summary = _summary(found, data, sampled.amplitude, opposite_arcs(of_cycle))
+    beat = beat_of(after, effect)
+    if beat is not None:
+        summary += f", beating with the motion every {beat:.3g} s"
+    return replace(found, summary=summary)
+
+
+def _difference(before: Fit, after: Fit) -> FloatArray:
+    """Difference of the two models' readings, linearised along the motion where phases differ.
+
+    Far out of phase the difference of readings is as large as the motion and no longer shows where
+    the models diverge. Then it is linearised in ln amplitude and phase,
+    x (change of ln A) + (dx/d phase) (change of phase), as in the fit.
+    """
+    one, other = before.at.sampled, after.at.sampled
+    turn = other.phase - one.phase
+    # Whole turns may be counted differently, and each model has its own phase at release.
+    turn = turn - np.average(turn, weights=other.amplitude**2)
+    if np.max(np.abs(turn)) < _LARGE_PHASE_RAD:
+        return after.at.reading - before.at.reading
+    log_ratio = np.log(np.maximum(other.amplitude, 1e-300) / np.maximum(one.amplitude, 1e-300))
+    moved = other.angle * log_ratio + other.velocity / other.motion.angular_frequency * turn
+    # What the sensor adds to the motion: offset, nonlinearity, a tone.
+    sensor = (after.at.reading - other.angle) - (before.at.reading - one.angle)
+    return np.asarray(moved + sensor)
+
+
+def _interval(argument: FloatArray, power: FloatArray) -> tuple[float, float] | None:
+    """Return the shortest interval of an argument that holds nine tenths of the power."""
+    total = float(power.sum())
+    if not total > 0.0:
+        return None
+    order = np.argsort(argument, kind="stable")
+    cumulative = np.cumsum(power[order]) / total
+    sorted_argument = argument[order]
+    starts = np.concatenate([[0.0], cumulative[:-1]])
+    ends = np.searchsorted(cumulative, starts + _INTERVAL_SHARE, side="left")
+    inside = ends < len(cumulative)
+    if not inside.any():
+        return float(sorted_argument[0]), float(sorted_argument[-1])
+    lengths = sorted_argument[ends[inside]] - sorted_argument[: len(ends)][inside]
+    best = int(np.argmin(lengths))
+    first = int(np.flatnonzero(inside)[best])
+    return float(sorted_argument[first]), float(sorted_argument[ends[first]])
+
+
+def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
+    """Return the multiples of the motion's frequency that hold a tenth of the difference or more.
+
+    Harmonics are fitted cycle by cycle, since the envelope varies slowly.
+    """
+    total = float(np.sum(difference**2))
+    if not total > 0.0:
+        return ()
+    series, _ = by_cycle(difference, phase, _HARMONICS)
+    held = np.sum(series**2, axis=0)
+    # A cosine and a sine for each harmonic; the offset has one coefficient.
+    powers = [held[0], *(held[1::2] + held[2::2])]
+    return tuple(order for order, power in enumerate(powers) if power > _HARMONIC_SHARE * total)
+
+
+def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
+    """Return the 95 % interval of the instant at which a sudden effect happens; else None."""
+    sudden = any(parameter.name == "time" for parameter in effect.parameters)
+    return _interval_of(fit, effect, "s") if sudden else None
+
+
+def tone_of(fit: Fit, effect: Effect) -> float | None:
+    """Return the frequency of a tone, Hz."""
+    interval = _interval_of(fit, effect, "Hz") if effect.spectral else None
+    return None if interval is None else 0.5 * (interval[0] + interval[1])
+
+
+def beat_of(fit: Fit, effect: Effect) -> float | None:
+    """Return the period in s of a tone's beats with the motion; None for a distant frequency.
+
+    A tone of frequency f beats |f - f_0| times a second with a motion of frequency f_0; beyond
+    half of f_0 no beats are seen.
+    """
+    phase, time = fit.at.sampled.phase, fit.at.sampled.time_s
+    own = float(phase[-1] - phase[0]) / float(time[-1] - time[0]) / (2.0 * math.pi)
+    tone = tone_of(fit, effect)
+    if tone is not None:
+        off = abs(tone - own)
+    elif isinstance(effect, PlaneCoupling):
+        detuning = _interval_of(fit, effect, "Hz")
+        off = 0.0 if detuning is None else 0.5 * abs(detuning[0] + detuning[1])
+    else:
+        return None
+    return 1.0 / off if 0.0 < off < 0.5 * own else None
+
+
+def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | None:
+    """Return the 95 % interval of an effect's parameter of that unit."""
+    from pendpipe.diagnosis.values import effect_parameters
+
+    # The instant and the frequency follow the sizes.
+    for found in reversed(effect_parameters(fit, effect).values()):
+        if found.unit == unit:
+            return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
+    return None
+
+
+def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) -> str:
+    """Write one clause; `opposite` names two opposite arcs of the cycle if none holds alone."""
+    clauses = []
+    span = float(data.time_s[-1] - data.time_s[0])
+    if found.time_s is not None:
+        width = found.time_s[1] - found.time_s[0]
+        if width < 0.02 * span:
+            clauses.append(f"at {with_error(0.5 * sum(found.time_s), 0.5 * width / 1.96, 's')}")
+        elif width < 0.8 * span:
+            clauses.append(f"between {found.time_s[0]:.4g} and {found.time_s[1]:.4g} s")
+        else:
+            clauses.append("throughout the record")
+    if found.amplitude_rad is not None:
+        low, high = found.amplitude_rad
+        if high - low < 0.8 * float(np.ptp(amplitude)):
+            clauses.append(f"at amplitudes from {low:.3g} to {high:.3g} {data.unit}")
+    if found.phase_rad is not None:
+        low, high = found.phase_rad
+        clauses.append(f"at phases from {low:.2f} to {high:.2f} rad of the cycle")
+    elif opposite:
+        clauses.append(opposite)
+    if found.harmonics:
+        names = {0: "the offset", 1: "the fundamental"}
+        parts = [names.get(h, f"harmonic {h}") for h in found.harmonics]
+        clauses.append("in " + " and ".join(parts))
+    elif found.frequency_hz:
+        clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
+    return f"it shows {', '.join(clauses)}" if clauses else ""
+
+
+_CYCLE_BINS: Final = 24
+_HALF_CYCLE_BINS: Final = _CYCLE_BINS // 2
+_BIN_RAD: Final = 2.0 * math.pi / _CYCLE_BINS
+_OPPOSITE_SHARE: Final = 0.75
+"""Part that two opposite quarters of the cycle must hold to be named: a misfit of the phase
+has 1/2 + 1/pi = 0.82 there, a uniform one 0.5."""
+
+
+def powers_of_cycle(phase: FloatArray, power: FloatArray) -> FloatArray:
+    """Sum a power over the cycle, in equal steps of the phase from 0 to 2 pi."""
+    number = (np.mod(phase, 2.0 * math.pi) / _BIN_RAD).astype(int) % _CYCLE_BINS
+    return np.asarray(np.bincount(number, weights=power, minlength=_CYCLE_BINS), dtype=np.float64)
+
+
+def one_arc(powers: FloatArray, most: float) -> tuple[float, float] | None:
+    """Return the shortest arc that holds the part `most`, if it is less than half the circle."""
+    total = float(powers.sum())
+    if not total > 0.0:
+        return None
+    for width in range(1, _HALF_CYCLE_BINS):
+        sums = _arc_sums(powers, width)
+        start = int(np.argmax(sums))
+        if sums[start] > most * total:
+            return start * _BIN_RAD, (start + width) * _BIN_RAD
+    return None
+
+
+def opposite_arcs(powers: FloatArray) -> str:
+    """Name two opposite quarters of the cycle that hold three quarters of it; "" if none do.
+
+    A change of phase shows at the zero crossings, a change of amplitude at the turning points:
+    twice in each cycle, so that no single arc describes it.
+    """
+    halves = powers[:_HALF_CYCLE_BINS] + powers[_HALF_CYCLE_BINS:]
+    sums = _arc_sums(halves, _HALF_CYCLE_BINS // 2)
+    start = int(np.argmax(sums))
+    if not sums[start] > _OPPOSITE_SHARE * float(halves.sum()):
+        return ""
+    # The middle of the arc, to the nearest of eight phases.
+    centre = (start + _HALF_CYCLE_BINS // 4) % _HALF_CYCLE_BINS
+    if abs(centre - _HALF_CYCLE_BINS // 2) <= 1:
+        return "mostly at the zero crossings"
+    if min(centre, _HALF_CYCLE_BINS - centre) <= 1:
+        return "mostly at the turning points"
+    first, last = start * _BIN_RAD, (start + _HALF_CYCLE_BINS // 2) * _BIN_RAD
+    return f"mostly at phases from {first:.2f} to {last:.2f} rad of the cycle and half a cycle on"
+
+
+def _arc_sums(powers: FloatArray, width: int) -> FloatArray:
+    """Sum `width` neighbours from each step on, around the circle."""
+    return np.array([np.roll(powers, -start)[:width].sum() for start in range(len(powers))])

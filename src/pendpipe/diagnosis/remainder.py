@@ -1,0 +1,158 @@
+"""The misfit that remains beyond the noise: how large, where, and its effect on errors.
+
+If chi^2 stays far above the noise, the model is still wrong. The rest is then not noise, which is
+independent from reading to reading, but an unknown function of time, described by a few numbers
+(its significant Fourier coefficients). Names and errors are compared with that function, not with
+the noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.numerics import cosines
+from pendpipe.diagnosis.refine import Fit
+
+_INCOMPLETE: Final = 1.14
+"""Residual over noise (chi^2 of 1.3 per degree of freedom) above which a model is incomplete:
+the noise itself is known much better, from between the harmonics."""
+_HARMONICS: Final = 4
+_SIGNIFICANT_POWER: Final = 9.0
+"""Squared normalised coefficient above which it is not noise."""
+_FEWEST_NUMBERS: Final = 2.0
+_PARTS: Final = ("offset", "amplitude", "phase", "harmonics", "between")
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The misfit that remains.
+
+    Parameters
+    ----------
+    excess
+        chi^2 beyond the degrees of freedom; never negative.
+    over_noise
+        Square root of chi^2 per degree of freedom.
+    numbers
+        Number of independent numbers that describe it.
+    shares
+        Parts of `excess` in the offset, the amplitude and the phase of the motion, its higher
+        harmonics, and between them.
+    """
+
+    excess: float
+    over_noise: float
+    numbers: float
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def systematic(self) -> bool:
+        """Whether the model is incomplete."""
+        return self.over_noise > _INCOMPLETE
+
+    @property
+    def error_scale(self) -> float:
+        """Factor on standard deviations: 1 if only noise is left."""
+        if not self.systematic:
+            return 1.0
+        return math.sqrt(max(self.excess / self.numbers, self.over_noise**2, 1.0))
+
+    def worth(self, gain: float, excess: float | None = None) -> float:
+        """Return the significance of a gain of chi^2 beside the remaining misfit.
+
+        For an unknown function of m numbers and unknown size the likelihood is
+        (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), at most itself.
+
+        Parameters
+        ----------
+        gain
+            Delta chi^2.
+        excess
+            The remaining misfit; by default the present one.
+        """
+        if not self.systematic:
+            return gain
+        left = self.excess if excess is None else excess
+        return min(gain, self.numbers * math.log1p(max(gain, 0.0) / max(left, 1.0)))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its part of ``diagnosis.json``."""
+        return {
+            "over_noise": self.over_noise,
+            "independent_numbers": self.numbers,
+            "error_factor": self.error_scale,
+            "systematic": self.systematic,
+            "shares": dict(self.shares),
+        }
+
+
+def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
+    """Analyse a fit's residual by cycle and harmonic, and by its change over cycles."""
+    freedom = max(data.used - len(fit.free), 1)
+    excess = max(fit.chi2 - freedom, 0.0)
+    over = math.sqrt(fit.chi2 / freedom)
+    if over <= _INCOMPLETE:
+        return Remainder(excess, over, float(freedom))
+    series, rest = by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
+    powers = [_powers(row) for row in series.T] + [_powers(rest)]
+    known = [float(np.sum(power - 1.0)) for power in powers[:-1]]
+    between = float(np.sum(rest**2)) - (np.count_nonzero(rest) - series.size)
+    parts = np.array([known[0], known[1], known[2], sum(known[3:]), between])
+    parts = np.maximum(parts, 0.0)
+    shares = parts / max(float(parts.sum()), 1e-300)
+    loud = np.concatenate(powers)
+    loud = loud[loud > _SIGNIFICANT_POWER]
+    # Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
+    numbers = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
+    return Remainder(
+        excess,
+        over,
+        min(max(numbers, _FEWEST_NUMBERS), float(freedom)),
+        dict(zip(_PARTS, shares.tolist(), strict=True)),
+    )
+
+
+def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
+    """Return the residual in standard deviations of a reading."""
+    sd = noise.white_rms if noise.uniform else np.sqrt(noise.variance)
+    return np.asarray(data.residual(fit.at.reading) * data.weight / sd)
+
+
+def by_cycle(
+    residual: FloatArray, phase: FloatArray, harmonics: int = _HARMONICS
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients of offset, cosine, sine and harmonics in each cycle, and the rest.
+
+    Shape (cycles, 1 + 2 harmonics). Within a cycle the functions are orthonormal, so that noise
+    gives each coefficient the variance 1.
+    """
+    number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
+    ends = np.searchsorted(number, np.arange(number[-1] + 2))
+    width, rest = 1 + 2 * harmonics, residual.copy()
+    found = np.zeros((len(ends) - 1, width))
+    for cycle, (first, last) in enumerate(pairwise(ends.tolist())):
+        size = min(width, (last - first) // 2)
+        if size < 1:
+            continue
+        part = phase[first:last]
+        waves = [np.ones(len(part))]
+        for harmonic in range(1, harmonics + 1):
+            waves += [np.cos(harmonic * part), np.sin(harmonic * part)]
+        basis, mixing = np.linalg.qr(np.stack(waves[:size], axis=1))
+        basis *= np.sign(np.diag(mixing))
+        found[cycle, :size] = basis.T @ residual[first:last]
+        rest[first:last] -= basis @ found[cycle, :size]
+    return found, rest
+
+
+def _powers(row: FloatArray) -> FloatArray:
+    return np.asarray(cosines(row) ** 2)

@@ -1,0 +1,257 @@
+"""The result of a diagnosis, and its form on disk (``diagnosis.json``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.held_out import HeldOut
+    from pendpipe.diagnosis.remainder import Remainder
+    from pendpipe.diagnosis.small_swings import SmallSwings
+    from pendpipe.estimate import Estimate
+
+FILE_NAME: Final = "diagnosis.json"
+Verdict = Literal["consistent", "missing-physics", "not-analysable"]
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A model's parameters, and how well it describes the readings."""
+
+    parameters: Mapping[str, Estimate]
+    residual_rms_rad: float
+    chi2_per_dof: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+        return {
+            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
+            "residual_rms_rad": self.residual_rms_rad,
+            "chi2_per_dof": self.chi2_per_dof,
+        }
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where an effect shows: time, amplitude, phase of the cycle, frequency, harmonic, code.
+
+    Parameters
+    ----------
+    time_s, amplitude_rad, phase_rad
+        Intervals that hold nine tenths of what the effect explains. The phase is 0 at a turning
+        point on the positive side. None where the effect shows everywhere.
+    frequency_hz, harmonics
+        Frequencies, and multiples of the motion's frequency.
+    adc_codes
+        Codes of the converter.
+    summary
+        One clause.
+    """
+
+    time_s: tuple[float, float] | None = None
+    amplitude_rad: tuple[float, float] | None = None
+    phase_rad: tuple[float, float] | None = None
+    frequency_hz: tuple[float, ...] = ()
+    harmonics: tuple[int, ...] = ()
+    adc_codes: tuple[int, ...] = ()
+    summary: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+
+        def pair(interval: tuple[float, float] | None) -> list[float] | None:
+            return None if interval is None else [float(end) for end in interval]
+
+        return {
+            "summary": self.summary,
+            "time_s": pair(self.time_s),
+            "amplitude_rad": pair(self.amplitude_rad),
+            "phase_rad": pair(self.phase_rad),
+            "frequency_hz": list(self.frequency_hz),
+            "harmonics": list(self.harmonics),
+            "adc_codes": list(self.adc_codes),
+        }
+
+
+@dataclass(frozen=True, repr=False)
+class FoundEffect:
+    """One effect that the baseline lacks.
+
+    Parameters
+    ----------
+    identifier, name, kind, equation
+        As the catalogue declares them.
+    parameters
+        Its own, in the extended model.
+    delta_chi2
+        By how much chi^2 rises without it.
+    p_value
+        Global, when it was found.
+    probability
+        Of this effect, among its class and "none of these".
+    indistinguishable
+        The rest of its class: identifier and probability.
+    discriminating_test
+        The one further measurement that would decide.
+    location
+        Where it shows.
+    curve
+        For an unnamed effect: the curve with its band.
+    """
+
+    identifier: str
+    name: str
+    kind: str
+    equation: str
+    parameters: Mapping[str, Estimate]
+    delta_chi2: float
+    p_value: float
+    probability: float
+    indistinguishable: tuple[tuple[str, float], ...]
+    discriminating_test: str
+    location: Location
+    curve: Mapping[str, Any] | None = None
+
+    def __repr__(self) -> str:
+        return f"FoundEffect({self.identifier}, probability {self.probability:.2f})"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contract's form."""
+        found: dict[str, Any] = {
+            "id": self.identifier,
+            "name": self.name,
+            "kind": self.kind,
+            "equation": self.equation,
+            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
+            "delta_chi2": self.delta_chi2,
+            "p_value_global": self.p_value,
+            "probability": self.probability,
+            "indistinguishable_from": [
+                {"id": identifier, "probability": probability}
+                for identifier, probability in self.indistinguishable
+            ],
+            "deciding_measurement": self.discriminating_test,
+            "location": self.location.as_json(),
+        }
+        if self.curve is not None:
+            found["curve"] = dict(self.curve)
+        return found
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """Where model and recording differ, and what is missing. It prints as one paragraph.
+
+    Parameters
+    ----------
+    baseline_name, baseline, improved
+        The model that was asked for, and the one with the effects that were found.
+    noise_rms_rad
+        Of one reading, never below step/sqrt(12).
+    verdict, p_value
+        Global: of the largest score over the whole catalogue.
+    effects
+        In the order in which they were added.
+    held_out
+        None where nothing was added.
+    unexplained_rms_rad, unexplained_p_value
+        What the improved model leaves.
+    remainder
+        The same in parts: its size over the noise, and where it lies.
+    small_swings
+        How the frequency differs from the improved model's at the smallest amplitudes, if it does.
+    statement
+        One paragraph.
+    """
+
+    baseline_name: str
+    baseline: FittedModel
+    improved: FittedModel
+    noise_rms_rad: float
+    verdict: Verdict
+    p_value: float
+    effects: tuple[FoundEffect, ...]
+    held_out: HeldOut | None
+    unexplained_rms_rad: float
+    unexplained_p_value: float
+    statement: str
+    warnings: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+    remainder: Remainder | None = None
+    small_swings: SmallSwings | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.statement
+
+    def __repr__(self) -> str:
+        names = ", ".join(effect.identifier for effect in self.effects)
+        return f"Diagnosis({self.verdict}{': ' if names else ''}{names}, p = {self.p_value:.2g})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``diagnosis.json``."""
+        held = self.held_out
+        return {
+            "schema_version": 1,
+            "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+            "noise_rms_rad": self.noise_rms_rad,
+            "verdict": self.verdict,
+            "p_value": self.p_value,
+            "effects": [effect.as_json() for effect in self.effects],
+            "improved": self.improved.as_json(),
+            "held_out": {
+                "log_density_before": None if held is None else held.before,
+                "log_density_after": None if held is None else held.after,
+                "gain": 0.0 if held is None else held.gain,
+                "gain_sd": 0.0 if held is None else held.gain_sd,
+            },
+            "unexplained": {
+                "residual_rms_rad": self.unexplained_rms_rad,
+                "p_value": self.unexplained_p_value,
+            },
+            "remainder": None if self.remainder is None else self.remainder.as_json(),
+            "small_amplitudes": None if self.small_swings is None else self.small_swings.as_json(),
+            "statement": self.statement,
+            "figures": list(self.figures),
+            "warnings": list(self.warnings),
+            "provenance": dict(self.provenance),
+        }
+
+
+def not_analysable(
+    baseline: str, reason: str, provenance: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return ``diagnosis.json`` of a recording that can't be analysed.
+
+    It has every key of a real diagnosis, so that a program need not ask which are there;
+    numbers that do not exist are None.
+
+    Parameters
+    ----------
+    baseline
+        The model that was asked for.
+    reason
+        Why the recording can't be analysed, one line.
+    provenance
+        Goes into the result.
+    """
+    nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
+    densities = ("log_density_before", "log_density_after", "gain", "gain_sd")
+    return {
+        "schema_version": 1,
+        "baseline": {"name": baseline, **nothing},
+        "noise_rms_rad": None,
+        "verdict": "not-analysable",
+        "reason": reason,
+        "p_value": None,
+        "effects": [],
+        "improved": dict(nothing),
+        "held_out": dict.fromkeys(densities),
+        "unexplained": {"residual_rms_rad": None, "p_value": None},
+        "statement": f"This recording can't be analysed: {reason}.",
+        "figures": [],
+        "warnings": [],
+        "provenance": dict(provenance or {}),
+    }

@@ -1,0 +1,338 @@
+"""The diagnosis of one recording, from its readings to the answer."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.fixed import check_fixed
+from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.samples import Samples, prepare
+from pendpipe.diagnosis import Progress, silent
+from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.forensics.lattice import with_true_step
+from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.held_out import HeldOut, held_out
+from pendpipe.diagnosis.likelier import swap_in_likelier
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.released_parameters import released_parameters
+from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, FittedModel, FoundEffect
+from pendpipe.diagnosis.search import Search, search
+from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
+from pendpipe.diagnosis.statement import statement
+from pendpipe.diagnosis.values import parameters_of
+from pendpipe.diagnosis.weighing import Weighed, effect_named, fault_named
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.errors import NotAnalysableError
+from pendpipe.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LEVEL: Final = 0.01
+"""The false-alarm probability: how often a recording that lacks nothing is reported."""
+
+
+@dataclass(frozen=True, repr=False)
+class Outcome:
+    """A diagnosis with the fits and readings behind it. It prints as one paragraph.
+
+    Parameters
+    ----------
+    diagnosis
+        The answer.
+    search, beginning
+        The fits, and the readings with the start values: what the figures are drawn from.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pendpipe.recording import Recording
+    >>> time_s = np.arange(900) / 15.0
+    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
+    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
+    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
+    >>> found.verdict
+    'consistent'
+    >>> print(str(found)[:33])
+    Eq. 8 describes this recording: t
+    """
+
+    diagnosis: Diagnosis
+    search: Search
+    beginning: Beginning
+
+    @property
+    def verdict(self) -> str:
+        """``"consistent"`` or ``"missing-physics"``."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """What is missing, in the order in which it was found."""
+        return self.diagnosis.effects
+
+    def __str__(self) -> str:
+        return self.diagnosis.statement
+
+    def __repr__(self) -> str:
+        return self.diagnosis.statement
+
+    def _repr_html_(self) -> str:
+        return f"<p>{html.escape(self.diagnosis.statement)}</p>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``diagnosis.json``."""
+        return self.diagnosis.to_dict()
+
+    def save(self, folder: str | Path, *, figures: bool = True) -> dict[str, Any]:
+        """Write ``diagnosis.json`` and the figures.
+
+        Parameters
+        ----------
+        folder
+            Made if it is not there.
+        figures
+            Whether to draw them.
+
+        Returns
+        -------
+        dict
+            What ``diagnosis.json`` holds.
+
+        Raises
+        ------
+        InputError
+            If the folder can't be written.
+        """
+        from pendpipe.files import make_folder, write_json
+
+        place, diagnosis = Path(folder), self.diagnosis
+        make_folder(place)
+        if figures:
+            from pendpipe.figures.diagnosis import draw_diagnosis
+
+            drawn = draw_diagnosis(self, place)
+            diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
+        content = diagnosis.to_dict()
+        write_json(place / FILE_NAME, content)
+        return content
+
+    def plot(self) -> Figure:
+        """Draw the decay with both models, and what each of them leaves.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from pendpipe.figures.diagnosis_data import shown
+        from pendpipe.figures.diagnosis_decay import draw
+
+        return draw(shown(self))
+
+
+def diagnose_recording(
+    recording: Recording,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    seed: int = 0,
+    level: float = LEVEL,
+    place: str | Path = "recording",
+    provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Outcome:
+    """Find where Eq. 8 and a recording differ, and what effect is missing.
+
+    Parameters
+    ----------
+    recording
+        Angles, displacements, or volts with a known constant; the free decay in it is found.
+    baseline
+        ``"eq8"``, or ``"viscous"`` for Eq. 3.
+    fixed
+        Parameters that are held, by name, so that a prediction is tested.
+    seed
+        Of the random draws that count the trials of the scans.
+    level
+        The false-alarm probability: an effect is reported where the global p-value is below it.
+    place
+        Named in error messages.
+    provenance
+        Goes into the result.
+    progress
+        Receives one line for each step.
+
+    Raises
+    ------
+    InputError
+        If a parameter can't be held, or the recording can't be analysed.
+    """
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+
+    check_fixed(fixed or {}, baseline)
+    progress("finding the free decay and its turning points")
+    points, part = measure_recording(recording.as_motion(place=place), place)
+    return diagnose_decay(
+        part,
+        points,
+        baseline=baseline,
+        fixed=fixed,
+        seed=seed,
+        level=level,
+        place=place,
+        provenance=provenance,
+        progress=progress,
+        whole=recording,
+    )
+
+
+# Trial models far from the motion overflow; they are computed and rejected.
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")
+def diagnose_decay(
+    part: Recording,
+    points: TurningPoints,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    seed: int = 0,
+    level: float = LEVEL,
+    place: str | Path = "recording",
+    provenance: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+    whole: Recording | None = None,
+) -> Outcome:
+    """Diagnose a free decay whose turning points are known.
+
+    Parameters
+    ----------
+    part, points
+        The free decay, and its turning points.
+    baseline, fixed, seed, level, place, provenance, progress
+        As for `diagnose_recording`.
+    whole
+        The recording that the decay was cut from; only its time stamps are used.
+
+    Raises
+    ------
+    InputError
+        If a parameter can't be held, or the decay can't be analysed.
+    """
+    fixed = fixed or {}
+    check_fixed(fixed, baseline)
+    samples = with_true_step(prepare(part, place))
+    try:
+        found, weighed, beginning = _searched(
+            samples, points, baseline, fixed, level, seed, progress
+        )
+    except NoMotionError as error:
+        remedy = "cut it with --start and --stop, or change what is held with --fix"
+        raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
+    effects = _in_order(found, weighed)
+    gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
+    stamps = (*([gap] if gap else []), *found.clock_notes)
+    noise_rms = max(found.noise.rms, found.data.step / 12.0**0.5)
+    before = _fitted_model(found.baseline, found)
+    same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
+    after = before if same else _fitted_model(found.improved, found)
+    if effects:
+        progress("predicting cycles that are left out of the fit")
+    held = _held_out(found, beginning) if effects else None
+    swings = _small_swings(found)
+    diagnosis = Diagnosis(
+        baseline,
+        before,
+        after,
+        noise_rms,
+        "missing-physics" if effects else "consistent",
+        found.p_value,
+        effects,
+        held,
+        after.residual_rms_rad,
+        found.unexplained,
+        statement(
+            baseline,
+            before,
+            after,
+            effects,
+            held,
+            noise_rms,
+            found.p_value,
+            found.unexplained,
+            level,
+            unit=found.data.unit,
+            remainder=found.remainder,
+            swings=swings,
+            notes=stamps,
+        ),
+        warnings=(*points.notes, *stamps),
+        remainder=found.remainder,
+        small_swings=swings,
+        provenance=dict(provenance or {}),
+    )
+    return Outcome(diagnosis, found, beginning)
+
+
+def _searched(
+    samples: Samples,
+    points: TurningPoints,
+    baseline: Baseline,
+    fixed: Mapping[str, float],
+    level: float,
+    seed: int,
+    progress: Progress,
+) -> tuple[Search, tuple[Weighed, ...], Beginning]:
+    from pendpipe.effects.catalogue import CATALOGUE
+
+    beginning = begin(samples, points, baseline=baseline, fixed=fixed)
+    found = search(
+        beginning,
+        samples,
+        CATALOGUE,
+        baseline=baseline,
+        level=level,
+        seed=seed,
+        released=released_parameters(fixed),
+        progress=progress,
+    )
+    return *swap_in_likelier(found, beginning, progress), beginning
+
+
+def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, ...]:
+    """List effects and measurement faults in the order in which they were added."""
+    effects = [
+        (number, effect_named(found, step, each))
+        for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
+    ]
+    faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
+    # The sort is stable: a fault goes before the effect that followed it.
+    return tuple(each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0]))
+
+
+def _small_swings(found: Search) -> SmallSwings | None:
+    """Compare the frequency at small amplitudes with the named effects' model, without curves."""
+    if not found.named.remainder.systematic:
+        return None
+    swings = small_swings(found.named.fit, found.data, found.noise)
+    return swings if swings is not None and swings.significant else None
+
+
+def _fitted_model(fit: Fit, found: Search) -> FittedModel:
+    data = found.data
+    residual = data.residual(fit.at.reading)[data.weight > 0.0]
+    dof = max(data.used - len(fit.free), 1)
+    return FittedModel(
+        parameters_of(fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
+    )
+
+
+def _held_out(found: Search, beginning: Beginning) -> HeldOut:
+    return held_out(
+        found.baseline, found.improved, found.data, found.noise, beginning.held, found.held
+    )

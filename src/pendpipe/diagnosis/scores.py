@@ -1,0 +1,289 @@
+"""Score all effects at once: one inner product each, whitened and projected.
+
+Every effect has a derivative of the readings by its size along the fitted motion. The part that
+the model's own parameters can reproduce is projected out; the score is the inner product of the
+rest, at unit length, with the whitened residual: the locally most powerful test. A scan over an
+effect's shape is many such columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pendpipe.analysis.distributions import chi2_beyond
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit, pulled
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.effects import Effect
+from pendpipe.effects.curves import Curve
+from pendpipe.effects.derivatives import responses
+from pendpipe.effects.effect import Span
+
+_VISIBLE = 1e-4
+"""Part of a derivative that must remain after the projection for the effect to be visible."""
+
+_RESOLVED_SD = 4.0
+"""Standard deviations at which a coefficient of a curve must be visible to be kept."""
+
+
+_COLUMNS_AT_ONCE = 32
+
+
+class Candidate(NamedTuple):
+    """An effect of one shape, and the position of its columns."""
+
+    effect: Effect
+    shape: tuple[float, ...]
+    first: int
+    width: int
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Unit columns of all candidates, orthogonal to the model's tangent space.
+
+    Parameters
+    ----------
+    basis
+        Orthonormal, of the model's tangent space, shape (n + 1, p).
+    columns
+        Shape (n + 1, k), float32: a candidate's columns are orthonormal among themselves.
+    candidates
+        The effects and shapes to which the columns belong.
+    lengths
+        Length of each candidate's first column for a unit of its size, shape (candidates,):
+        it converts a score to a size.
+    """
+
+    basis: FloatArray
+    columns: NDArray[np.float32]
+    candidates: tuple[Candidate, ...]
+    lengths: FloatArray
+
+    def scores(self, residual: FloatArray) -> FloatArray:
+        """Return the sum of squares of each candidate's inner products; shape (candidates, ...).
+
+        A size that can't be negative (a friction) scores with a positive sign only.
+        """
+        products = self.columns.T @ residual.astype(np.float32)
+        signed = [c.first for c in self.candidates if c.effect.one_sided]
+        products[signed] = np.maximum(products[signed], 0.0)
+        squares = products.astype(np.float64) ** 2
+        starts = [candidate.first for candidate in self.candidates]
+        return np.asarray(np.add.reduceat(squares, starts, axis=0))
+
+    def rows(self) -> dict[str, list[int]]:
+        """Return the indices of the candidates of each effect, by its key."""
+        found: dict[str, list[int]] = {}
+        for index, candidate in enumerate(self.candidates):
+            found.setdefault(candidate.effect.key, []).append(index)
+        return found
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Degrees of freedom of each candidate."""
+        return np.array([candidate.width for candidate in self.candidates], dtype=np.float64)
+
+
+def tangent_basis(fit: Fit) -> FloatArray:
+    """Return an orthonormal basis of the derivatives by the fitted values.
+
+    Values at a bound are included, unless the readings pull them far beyond it.
+    """
+    known = pulled(fit)
+    part = fit.jacobian[:, [index for index in fit.free if index not in known]]
+    scale = np.linalg.norm(part, axis=0)
+    scale[scale == 0.0] = 1.0
+    left, small = np.linalg.qr(part / scale)
+    mixing, sizes, _ = np.linalg.svd(small)
+    return np.asarray(left @ mixing[:, sizes > 1e-9 * sizes[0]])
+
+
+def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
+    """Compute the columns of all effects along a fitted motion.
+
+    A few shapes at a time, stored in single precision: in double precision a long record would
+    take hundreds of megabytes.
+    """
+    shapes = [_shapes(effect, fit.at.span) for effect in effects]
+    most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
+    kept = _Kept(tangent_basis(fit), most)
+    for effect, rows in zip(effects, shapes, strict=True):
+        if isinstance(effect, ReleasedParameter):
+            kept.add(effect, rows, effect.sensitivity(fit)[None])
+            continue
+        some = max(_COLUMNS_AT_ONCE // effect.sizes, 1)
+        for first in range(0, len(rows), some):
+            part = rows[first : first + some]
+            kept.add(effect, part, _whitened(fit, noise, effect, part))
+    return kept.bank()
+
+
+def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
+    if isinstance(effect, ReleasedParameter):
+        return [()]
+    return [tuple(float(number) for number in row) for row in effect.shapes(span)]
+
+
+def _whitened(
+    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[tuple[float, ...]]
+) -> FloatArray:
+    """Derivatives of the whitened readings by each size of each shape, shape (columns, n + 1)."""
+    small = effect.small(fit.at.span)
+    changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
+    raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
+    raw /= small
+    raw[~np.isfinite(raw.sum(axis=1))] = 0.0
+    rows = np.zeros((len(raw), len(fit.jacobian)))
+    rows[:, :-1] = noise.whiten(raw.T).T
+    return rows
+
+
+class _Kept:
+    """Collects the unit columns that differ from the model's own."""
+
+    def __init__(self, basis: FloatArray, most: int) -> None:
+        self.basis = basis
+        self._single = basis.astype(np.float32)
+        self._rows = np.empty((most, len(basis)), dtype=np.float32)
+        self._filled = 0
+        self._candidates: list[Candidate] = []
+        self._lengths: list[float] = []
+
+    def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
+        """Project out the model's tangent space, and keep the rest at unit length."""
+        if isinstance(effect, Curve):
+            self._add_curve(effect, shapes[0], columns)
+            return
+        before = np.sqrt(np.einsum("kn,kn->k", columns, columns))
+        before[before == 0.0] = np.inf
+        unit = (columns / before[:, None]).astype(np.float32)
+        length = self._project(unit)
+        # A second projection removes the rounding errors of single precision.
+        self._project(unit)
+        width = len(columns) // len(shapes)
+        seen = (length > _VISIBLE).reshape(-1, width).all(axis=1)
+        for second in range(1, width):
+            for first in range(second):
+                seen &= _orthogonal(unit[first::width], unit[second::width])
+        if width > 1:
+            # The difference of two almost parallel rows is small, so that rounding matters again.
+            self._project(unit)
+        for index in np.flatnonzero(seen).tolist():
+            own = slice(index * width, (index + 1) * width)
+            size = float(length[own][0] * before[own][0])
+            self._keep(effect, shapes[index], unit[own], size)
+
+    def _project(self, unit: NDArray[np.float32]) -> FloatArray:
+        """Project out the basis in place and normalise; return the length that remained."""
+        unit -= (unit @ self._single) @ self._single.T
+        left = np.sqrt(np.einsum("kn,kn->k", unit, unit))
+        unit /= np.where(left > 0.0, left, 1.0)[:, None]
+        return np.asarray(left, dtype=np.float64)
+
+    def _add_curve(self, curve: Curve, shape: tuple[float, ...], columns: FloatArray) -> None:
+        left = columns - (columns @ self.basis) @ self.basis.T
+        left -= (left @ self.basis) @ self.basis.T
+        curve, part = _visible(curve, left)
+        if len(part):
+            unit = np.linalg.qr(part.T)[0].T
+            self._keep(curve, shape, unit, float(np.linalg.norm(part[0])))
+
+    def _keep(
+        self, effect: Effect, shape: tuple[float, ...], unit: NDArray[Any], length: float
+    ) -> None:
+        first, last = self._filled, self._filled + len(unit)
+        self._rows[first:last] = unit
+        self._filled = last
+        self._candidates.append(Candidate(effect, shape, first, len(unit)))
+        self._lengths.append(length)
+
+    def bank(self) -> Bank:
+        """Return everything that was kept."""
+        columns = self._rows[: self._filled].T
+        return Bank(self.basis, columns, tuple(self._candidates), np.array(self._lengths))
+
+
+def _orthogonal(first: NDArray[np.float32], second: NDArray[np.float32]) -> BoolArray:
+    """Project unit rows out of others in place; return where something remains."""
+    apart = np.ones(len(first), dtype=bool)
+    for _ in range(2):
+        second -= np.einsum("kn,kn->k", first, second)[:, None] * first
+        left = np.sqrt(np.einsum("kn,kn->k", second, second))
+        apart &= left > _VISIBLE
+        second /= np.where(left > 0.0, left, 1.0)[:, None]
+    return apart
+
+
+def _sizes(
+    effect: Effect, shape: Sequence[float], index: int, small: float
+) -> tuple[FloatArray, FloatArray]:
+    low = np.concatenate([np.zeros(effect.sizes), np.asarray(shape, dtype=np.float64)])
+    high = low.copy()
+    high[index] = small
+    return low, high
+
+
+def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
+    """Keep the combinations of a curve's basis functions that the record resolves."""
+    mixtures, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
+    mixing = mixtures[:, lengths > _RESOLVED_SD]
+    return curve.reduced(mixing), mixing.T @ part
+
+
+def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
+    """Return the probability that chance alone does better, for each candidate by itself."""
+    found = np.empty_like(scores)
+    for width in np.unique(freedom).astype(int).tolist():
+        found[freedom == width] = chi2_beyond(scores[freedom == width], width)
+    return found
+
+
+def finer_shape(
+    base: Fit, noise: Noise, effect: Effect, shape: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Return the shape of highest score among those near a scan's best (`Effect.finer`).
+
+    A fit alone would end beside it: the response to a knock, say, depends on its phase, so that
+    chi^2 has a minimum in each half cycle, while the scan's shapes are farther apart.
+    """
+    shapes = [tuple(row) for row in effect.finer(base.at.span, shape)] if shape else []
+    if not shapes:
+        return shape
+    shapes.append(shape)
+    products, length = products_and_lengths(base, noise, effect, shapes)
+    length[length == 0.0] = np.inf
+    return shapes[int(np.argmax(np.abs(products) / length))]
+
+
+def products_and_lengths(
+    base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Score shapes of an effect's first size on a fit's residual.
+
+    Returns
+    -------
+    products, lengths
+        Inner products of the residual with the derivative by the size, projected, and the
+        lengths of that; shape (shapes,). The size is product/length^2, and lowers chi^2 by
+        (product/length)^2.
+    """
+    span = base.at.span
+    small = effect.small(span)
+    sizes = np.zeros(effect.sizes)
+    changed = sizes.copy()
+    changed[0] = small
+    changes = [(np.append(sizes, shape), np.append(changed, shape)) for shape in shapes]
+    pendulum = base.model.pendulum(base.value)
+    raw = responses(effect, changes, base.at, pendulum).T / small
+    columns = np.zeros((len(raw) + 1, len(shapes)))
+    columns[:-1] = noise.whiten(raw)
+    basis = tangent_basis(base)
+    columns -= basis @ (basis.T @ columns)
+    return columns.T @ base.residual, np.linalg.norm(columns, axis=0)

@@ -1,0 +1,319 @@
+"""Add one effect after another, until nothing significant is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.diagnosis import Progress, silent
+from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import Detection, more_leads
+from pendpipe.diagnosis.drift_or_red_noise import reconsider_red_noise
+from pendpipe.diagnosis.evidence import MISSHAPEN
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.large_first import large_first
+from pendpipe.diagnosis.naming import refit_leads
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.one_curve import prefer_one_curve
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.remainder import Remainder, remainder_of
+from pendpipe.diagnosis.review import (
+    credible,
+    describe_rest,
+    fit_without,
+    stands_apart,
+    withdraw_doubtful,
+)
+from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross
+from pendpipe.diagnosis.task import Task, undrawn
+from pendpipe.diagnosis.two_names import prefer_two_names
+from pendpipe.diagnosis.wrong_parameters import prefer_parameters, reconsider_curve
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
+from pendpipe.effects.baseline import C
+from pendpipe.effects.curves import FOLLOW_UP_CURVES
+from pendpipe.quantities import compact
+
+_MOST_EFFECTS: Final = 6
+_NEEDED_CHI2: Final = 9.0
+"""Delta chi^2 below which an effect is dropped once others have been added."""
+_GROSS_SHARE: Final = 0.15
+"""Part of a gross misfit that an effect must explain to be added."""
+_LESS_FRICTION: Final = (0.9, 0.7, 0.4)
+"""Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
+_LARGE_AMPLITUDE_SHARE: Final = 0.5
+"""The same while the large amplitudes alone are fitted: only what dominates there."""
+
+
+class Reviewed(NamedTuple):
+    """A model, and its remaining misfit."""
+
+    fit: Fit
+    remainder: Remainder
+
+
+@dataclass(frozen=True)
+class Search:
+    """The result of a search.
+
+    Parameters
+    ----------
+    data, noise
+        The readings (with masks) and the final estimate of their noise.
+    baseline
+        The baseline's fit, with that noise.
+    improved
+        The extended model's fit (the baseline's where nothing was found).
+    steps
+        One for each effect.
+    faults
+        Of the measurement, found by their own tests.
+    p_value
+        Global, on the baseline: of the catalogue's largest score, and of the tests.
+    unexplained
+        Global p-value of the final residual.
+    detection
+        The first scan: of the baseline's residual.
+    held
+        Indices of values that are not fitted in the extended model.
+    remainder
+        Misfit of the extended model beyond the noise.
+    named
+        The model with the named effects only, without the curve for the rest: probabilities of
+        names refer to it.
+    clock_notes
+        What the tests of the time stamps found, a clause each.
+    """
+
+    data: Data
+    noise: Noise
+    baseline: Fit
+    improved: Fit
+    steps: tuple[Step, ...]
+    faults: tuple[Fault, ...]
+    p_value: float
+    unexplained: float
+    detection: Detection
+    held: tuple[int, ...]
+    remainder: Remainder
+    named: Reviewed
+    clock_notes: tuple[str, ...] = ()
+
+
+def search(
+    beginning: Beginning,
+    samples: Samples,
+    catalogue: Sequence[Effect],
+    *,
+    baseline: str,
+    level: float,
+    seed: int,
+    released: Sequence[ReleasedParameter] = (),
+    progress: Progress = silent,
+) -> Search:
+    """Fit the baseline, and add what improves it most, until chance explains the rest.
+
+    Parameters
+    ----------
+    beginning
+        Readings, baseline and start values.
+    samples
+        The readings as they were recorded.
+    catalogue
+        The effects that may be missing.
+    baseline
+        Its name.
+    level
+        The significance level (global p-value).
+    seed
+        Of the random draws that count trials.
+    released
+        The held parameters that may be wrong.
+    progress
+        Receives one line for each step.
+    """
+    data, held = beginning.data, list(beginning.held)
+    progress(f"fitting {baseline} to {data.used} readings")
+    white = first_noise(beginning)
+    fit = refine(beginning.model, data, white, beginning.value, held=held)
+    state = State(fit, data, white, held, beginning.value, fit.value)
+    state.settle(fit)
+    forensics = Forensics(samples, level)
+    task = Task(catalogue, released, baseline, level, seed, forensics, progress)
+    large_first(beginning, state, lambda part: _add_one(part, task, _LARGE_AMPLITUDE_SHARE))
+    _add_all(state, task)
+    if reconsider_curve(state, task):
+        _add_all(state, task)
+    named, remainder = _reviewed(state, task)
+    forensics.after(state, progress)
+    assert state.first is not None
+    assert state.now is not None
+    return Search(
+        state.data,
+        state.noise,
+        _baseline_alone(state, beginning),
+        replace(state.fit, error_scale=remainder.error_scale),
+        tuple(state.steps),
+        tuple(state.faults),
+        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
+        min(state.now.p_value / CATALOGUE_SHARE, 1.0),
+        state.first,
+        tuple(state.held),
+        remainder,
+        named or Reviewed(state.fit, remainder),
+        tuple(forensics.clock_notes),
+    )
+
+
+def _add_all(state: State, task: Task) -> None:
+    """Add effects until chance explains the rest; one curve may replace several effects."""
+    while len(state.steps) < _MOST_EFFECTS:
+        task.forensics.before(state, task.progress)
+        if not _add_one(state, task):
+            break
+    _prune(state, task.progress)
+    if task.forensics.again(state, task.progress):
+        _prune(state, task.progress)
+    prefer_one_curve(state, task.progress)
+
+
+def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
+    """Withdraw names that the remaining misfit makes doubtful, and describe it by a curve.
+
+    Returns
+    -------
+    Reviewed or None
+        The model of the named effects alone, if a curve was added to it.
+    Remainder
+        Misfit of the final model.
+    """
+    before = state.fit
+    withdraw_doubtful(state, task.level, task.progress)
+    remainder = remainder_of(state.fit, state.data, state.noise)
+    if state.fit is not before or len(state.steps) >= _MOST_EFFECTS:
+        task.scanned(state)
+    if not remainder.systematic or _ends_with_curve(state):
+        return None, remainder
+    assert state.now is not None
+    named = Reviewed(replace(state.fit, error_scale=remainder.error_scale), remainder)
+    if describe_rest(state, state.now, state.now.p_value / CATALOGUE_SHARE):
+        task.scanned(state)
+    return named, remainder_of(state.fit, state.data, state.noise)
+
+
+def _baseline_alone(state: State, beginning: Beginning) -> Fit:
+    """Refit the baseline with the final noise, at the recorded times."""
+    model, data = state.fit.model.bare(), state.data
+    # Readings at the end may have been left out meanwhile.
+    read = beginning.data.first(len(data))
+    if np.array_equal(data.time_s, read.time_s):
+        if not state.fit.model.effects and sorted(state.held) == sorted(beginning.held):
+            return state.fit
+    else:
+        model = model.at_times(read.time_s)
+        data = replace(data, time_s=read.time_s, uniform=read.uniform)
+    starts = [state.bare, beginning.value]
+    for share in _LESS_FRICTION:
+        starts.append(state.bare.copy())
+        starts[-1][C] *= share
+    fault = NoMotionError("it stops")
+    for start in starts:
+        try:
+            return refine(model, data, state.noise, start, held=beginning.held)
+        except NoMotionError as found:
+            fault = found
+    raise fault
+
+
+def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
+    """Scan the catalogue and add the best effect if it is needed; return whether one was added.
+
+    It must explain a `share` of a gross misfit.
+    """
+    gross, threshold, progress = is_gross(state.fit, state.data), task.threshold, task.progress
+    effects = task.scanned(state)
+    assert state.now is not None
+    if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
+        reconsider_red_noise(state, effects, task.level, task.seed, progress)
+    if state.now.p_value > threshold or _ends_with_curve(state):
+        return False
+    progress(
+        f"chance does not explain the residual ({printed(state.now.p_value)}): refitting leads"
+    )
+    closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
+    found = replace(state.now, leads=(*state.now.leads, *closer))
+    rivals = refit_leads(
+        state.fit,
+        state.data,
+        state.noise,
+        found,
+        held=state.held,
+        gross=gross,
+        origin=state.origin,
+    )
+    if rivals:
+        rivals = prefer_parameters(state, rivals)
+    if not gross and rivals:
+        rivals = prefer_two_names(state, rivals, task)
+    if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
+        return False
+    if not rivals or rivals[0].gain <= max(_NEEDED_CHI2, share * state.fit.chi2 if gross else 0.0):
+        return False
+    step = Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit)
+    if gross and state.steps and not credible(step, state, task.level):
+        return False
+    if share == _LARGE_AMPLITUDE_SHARE and rivals[0].lead.effect.kind == "unnamed":
+        return False
+    state.steps.append(step)
+    winner = rivals[0]
+    unit, fits = state.data.unit, (state.fit, winner.fit)
+    before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
+    progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
+    if isinstance(winner.lead.effect, ReleasedParameter):
+        state.held = winner.lead.effect.without(state.held)
+    state.settle(winner.fit)
+    return True
+
+
+def _rms(fit: Fit, data: Data) -> float:
+    """Root mean square of the readings that count less the model."""
+    residual = data.residual(fit.at.reading)[data.weight > 0.0]
+    return float(np.sqrt(np.mean(residual**2)))
+
+
+def _prune(state: State, progress: Progress) -> None:
+    """Drop effects that are no longer needed beside later ones.
+
+    A curve in time can imitate any effect and so drops none. Another curve misfits between its
+    knots by a few per cent of its gain: a name that explains no more than that may be an artefact.
+    """
+    if _ends_with_curve(state) and state.steps[-1].winner.lead.effect.in_time:
+        return
+    between = 0.0
+    if _ends_with_curve(state) and len(state.steps) > 1:
+        without = fit_without(state, state.steps[-1])
+        between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
+    # The last effect has others after it only if a fault was found after it.
+    joined = any(fault.behind == len(state.steps) for fault in state.faults)
+    for step in list(state.steps if joined and not _ends_with_curve(state) else state.steps[:-1]):
+        effect = step.winner.lead.effect
+        without = None if isinstance(effect, ReleasedParameter) else fit_without(state, step)
+        if without is None:
+            continue
+        needed = _NEEDED_CHI2 if stands_apart(effect, state.fit) else max(_NEEDED_CHI2, between)
+        if without.chi2 - state.fit.chi2 < needed:
+            progress(f"{effect.name} is no longer needed")
+            state.fit = without
+            state.steps.remove(step)
+
+
+def _ends_with_curve(state: State) -> bool:
+    """Whether the last effect is a curve without a name: no name is added after it."""
+    return bool(state.steps) and state.steps[-1].winner.lead.effect.kind == "unnamed"

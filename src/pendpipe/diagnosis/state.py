@@ -1,0 +1,150 @@
+"""The state of a search, and the joint estimate of a fit and its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.data import Data, with_lattice
+from pendpipe.diagnosis.detect import Detection
+from pendpipe.diagnosis.evidence import Rival
+from pendpipe.diagnosis.forensics.finding import Finding
+from pendpipe.diagnosis.instants import with_better_instants
+from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.effects.baseline import OMEGA
+
+GROSS: Final = 2.0
+"""chi^2 per degree of freedom above which first-order scores are meaningless."""
+_LARGE_PHASE_ERROR: Final = 0.1
+"""Phase error in rad above which they are meaningless too."""
+_MISJUDGED: Final = 1.6
+"""Largest factor by which the first estimate of the noise may be too small; more is a misfit."""
+_ESTIMATE_AGAIN: Final = 0.95
+"""Ratio of noise estimates below which the noise is estimated again."""
+_ROUNDS: Final = 3
+_LEAST_STEP: Final = 0.1
+"""Smallest plausible noise of a rounded reading, over the step."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One added effect.
+
+    Parameters
+    ----------
+    rivals
+        All refitted effects, the winner first.
+    p_value
+        Global, when it was found.
+    before
+        The model to which it was added.
+    """
+
+    rivals: tuple[Rival, ...]
+    p_value: float
+    before: Fit
+
+    @property
+    def winner(self) -> Rival:
+        """The effect that was added."""
+        return self.rivals[0]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A significant finding of a test of the measurement, and its global p-value.
+
+    `behind` is the number of effects added before it; `mask` marks all readings left out for it,
+    None for none.
+    """
+
+    finding: Finding
+    p_value: float
+    behind: int = 0
+    mask: BoolArray | None = None
+
+
+@dataclass
+class State:
+    """The state of a search.
+
+    Parameters
+    ----------
+    fit, data, noise
+        The present model, the readings (masked, with corrected times), and their noise.
+    held
+        Indices of values that are not fitted.
+    origin
+        The start values of the search.
+    bare
+        The values of the baseline fitted alone.
+    """
+
+    fit: Fit
+    data: Data
+    noise: Noise
+    held: list[int]
+    origin: FloatArray
+    bare: FloatArray
+    steps: list[Step] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    first: Detection | None = None
+    now: Detection | None = None
+
+    def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
+        """Accept a new fit, and estimate the noise from it."""
+        data, noise = data or self.data, noise or self.noise
+        fit = with_better_instants(fit, data, noise, self.held)
+        self.fit, self.data, self.noise = settled(fit, data, noise, self.held)
+        if not fit.model.effects:
+            self.bare = self.fit.value
+
+
+def is_gross(fit: Fit, data: Data) -> bool:
+    """Return whether a misfit is too large for a linear approximation."""
+    return fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > _LARGE_PHASE_ERROR
+
+
+def first_noise(beginning: Beginning) -> Noise:
+    """Return white noise, estimated from differences without the motion."""
+    data = beginning.data
+    slope = None
+    if data.time_noise:
+        slope = beginning.model.evaluate(beginning.value).sampled.velocity
+    return white_noise(data, beginning.noise_rms, slope)
+
+
+def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
+    """Estimate the noise from a fit's residual."""
+    frequency = fit.value[OMEGA] / (2.0 * np.pi)
+    residual = data.residual(fit.at.reading)
+    return estimate_noise(data, residual, frequency, _LEAST_STEP * data.step, red=red)
+
+
+def settled(
+    fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
+) -> tuple[Fit, Data, Noise]:
+    """Estimate the noise again if the model is good enough, and refit with it."""
+    if data.time_noise or fit.max_phase_error_rad > _LARGE_PHASE_ERROR:
+        return fit, data, noise
+    finer = with_lattice(data, fit.at.reading)
+    left = noise_of_residual(fit, finer, red=red)
+    misjudged = not fit.model.effects and left.white_rms < _MISJUDGED * noise.white_rms
+    if is_gross(fit, data) and not misjudged:
+        return fit, data, noise
+    better = refine(fit.model, finer, left, fit.value, held=held)
+    # A misfit that is gross for the first estimate of the noise may itself be noise.
+    if is_gross(fit, data) and is_gross(better, finer):
+        return fit, data, noise
+    for _ in range(_ROUNDS):
+        again = noise_of_residual(better, finer, red=red)
+        if again.rms > _ESTIMATE_AGAIN * left.rms:
+            break
+        left, better = again, refine(fit.model, finer, again, better.value, held=held)
+    return better, finer, left

@@ -1,0 +1,285 @@
+"""The answer as one paragraph of plain English that can be copied into a report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+from pendpipe.diagnosis.chance import printed
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact, with_error
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.held_out import HeldOut
+    from pendpipe.diagnosis.remainder import Remainder
+    from pendpipe.diagnosis.result import FittedModel, FoundEffect
+    from pendpipe.diagnosis.small_swings import SmallSwings
+
+_PROBABLE: Final = 0.5
+"""Probability from which an effect is reported without "possibly"."""
+_CERTAIN: Final = 0.95
+"""Probability from which an effect without rivals needs no further measurement."""
+_IMPROBABLE: Final = 0.01
+"""Probability below which a rival is not named beside more probable ones."""
+_SIGNIFICANT: Final = 3.0
+"""Standard deviations from which a change of a parameter is reported as a bias."""
+_NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
+_KINDS = {
+    "dynamics": "from the model of the pendulum",
+    "measurement": "from the model of the measurement",
+    "unnamed": "from the model, and not in the catalogue",
+}
+_MEANINGS = {
+    "circular-error": "the restoring torque follows sin x, not x",
+    "presliding-friction": "the bearing yields elastically before it slides",
+    "ac-coupling": "the sensor loses slow signals",
+    "jitter": "the sampling times are uncertain",
+    "second-mode": "another part of the apparatus oscillates too",
+}
+"""What the names mean that a newcomer may not know."""
+_UNNAMED = {
+    "unnamed-damping": "a loss of unknown form",
+    "unnamed-restoring": "a restoring torque of unknown form",
+    "unnamed-drive": "an unknown drive",
+    "unnamed-measurement": "an unknown error of the sensor",
+}
+_PARAMETERS = {
+    "a": "quadratic damping rate a",
+    "b": "linear damping rate b",
+    "c": "Coulomb damping rate c",
+    "amplitude": "initial amplitude",
+    "offset": "offset",
+}
+_PARTS = {
+    "offset": "in the offset",
+    "amplitude": "in the amplitude",
+    "phase": "in the phase",
+    "harmonics": "in the higher harmonics",
+    "between": "between the harmonics",
+}
+
+
+def statement(
+    baseline: str,
+    before: FittedModel,
+    after: FittedModel,
+    effects: Sequence[FoundEffect],
+    held: HeldOut | None,
+    noise_rms: float,
+    p_value: float,
+    unexplained: float,
+    level: float,
+    *,
+    unit: str = "rad",
+    remainder: Remainder | None = None,
+    swings: SmallSwings | None = None,
+    notes: Sequence[str] = (),
+) -> str:
+    """Write the paragraph.
+
+    It answers in this order: does the baseline describe the recording, what is missing and how
+    sure is that, what cannot be distinguished from it and what to measure next, how much of the
+    misfit it explains, what it changes in period and Q, what is left.
+
+    Parameters
+    ----------
+    baseline
+        ``"eq8"`` or ``"viscous"``.
+    before, after
+        The baseline and the extended model.
+    effects
+        What was found.
+    held
+        How well both models predict cycles that they were not fitted to.
+    noise_rms
+        Of one reading.
+    p_value, unexplained
+        Global p-values of the baseline and of what the extended model leaves.
+    level
+        The significance level.
+    unit
+        Of the readings.
+    remainder, swings
+        What the extended model leaves, and the frequency at the smallest amplitudes.
+    notes
+        Properties of the time stamps, a clause each.
+    """
+    model = _NAMES.get(baseline, baseline)
+    stamps = [f"Note: {'; '.join(notes)}."] if notes else []
+    if not effects:
+        nothing = (
+            f"{_capital(model)} describes this recording: the residual of"
+            f" {compact(before.residual_rms_rad, unit)} rms agrees with the noise"
+            f" ({compact(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
+            f" than chance would ({printed(unexplained)})."
+        )
+        return " ".join([nothing, *stamps])
+    times = before.residual_rms_rad / noise_rms
+    text = [
+        f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
+        f" {compact(before.residual_rms_rad, unit)} rms, {_factor(times)} times the noise of"
+        f" {compact(noise_rms, unit)}.",
+        *(_effect(effect) for effect in effects),
+        _improvement(len(effects), before, after, held, unit),
+        _changes(before.parameters, after.parameters, unit),
+        _rest(unexplained, level, remainder),
+    ]
+    if swings is not None:
+        text.append(swings.sentence(unit))
+    return " ".join([*(part for part in text if part), *stamps])
+
+
+def _effect(effect: FoundEffect) -> str:
+    """What one effect is, how sure that is, where it shows, and what would decide."""
+    if effect.kind == "parameter":
+        lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
+    else:
+        missing = "Missing" if effect.probability > _PROBABLE else "Possibly missing"
+        name = f"{missing} {_KINDS.get(effect.kind, 'from the model')}: {effect.name}"
+        meaning = _MEANINGS.get(effect.identifier)
+        lead = f"{name}, that is, {meaning}" if meaning else name
+    numbers = [f"{name} = {each}" for name, each in effect.parameters.items()]
+    lead += f" ({'; '.join([f'probability {_percent(effect.probability)}', *numbers])})"
+    if effect.location.summary:
+        lead += f"; {effect.location.summary}"
+    if effect.indistinguishable:
+        rivals = _listed(_rivals(effect.indistinguishable), "or")
+        lead += f". This recording alone cannot distinguish it from {rivals}"
+    elif effect.probability > _CERTAIN or effect.kind == "unnamed":
+        return f"{lead}."
+    return _ended(f"{lead}. What to measure next: {effect.discriminating_test}")
+
+
+def _improvement(
+    number: int, before: FittedModel, after: FittedModel, held: HeldOut | None, unit: str
+) -> str:
+    """How much of the misfit the effects explain, and whether they predict."""
+    old, new = before.residual_rms_rad, after.residual_rms_rad
+    this = "this" if number == 1 else "these effects"
+    text = f"Including {this} reduces the residual from {compact(old, unit)}"
+    text += f" to {compact(new, unit)} rms"
+    if old > 1.05 * new > 0.0:
+        text += f", by a factor of {_factor(old / new)}"
+    if held is None or not math.isfinite(held.gain):
+        return text + "."
+    sd = held.gain_sd if math.isfinite(held.gain_sd) else None
+    by = with_error(abs(held.gain), sd)
+    if held.gain < 0.0:
+        return (
+            f"{text}, but cycles left out of the fit are predicted worse, by {by} in"
+            " log-likelihood: the extended model fails this test."
+        )
+    better = f"and cycles left out of the fit are predicted better, by {by} in log-likelihood"
+    return f"{text}, {better}."
+
+
+def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str) -> str:
+    """What it changes in the small-angle period, in Q, and in the other parameters."""
+    parts, period = [], "small-angle period" if unit == "rad" else "period"
+    for name, of in ((period, _period), ("Q limit (pi f/b)", _quality_factor)):
+        old, new = of(before), of(after)
+        if old is None or new is None:
+            continue
+        if _biased(old, new):
+            parts.append(f"the {name} from {_like(old, new)} to {new}")
+        else:
+            parts.append(f"the {name} by less than its error ({new})")
+    moved = [
+        f"{_PARAMETERS[name]} {_like(before[name], new)} instead of {new}"
+        for name, new in after.items()
+        if name in _PARAMETERS and _biased(before[name], new)
+    ]
+    text = f"This changes {_listed(parts, 'and')}." if parts else ""
+    if moved:
+        text += f" Without it the fit was biased: {'; '.join(moved)}."
+    return text.strip()
+
+
+def _period(parameters: Mapping[str, Estimate]) -> Estimate | None:
+    """The period at small angles, 1/f."""
+    frequency = parameters.get("frequency")
+    if frequency is None or not frequency.value > 0.0:
+        return None
+    return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
+
+
+def _quality_factor(parameters: Mapping[str, Estimate]) -> Estimate | None:
+    """The limit of Q that the linear damping rate alone sets; None where b is not resolved."""
+    frequency, linear = parameters.get("frequency"), parameters.get("b")
+    if frequency is None or linear is None or not linear.value > 2.0 * linear.sd:
+        return None
+    value = math.pi * frequency.value / linear.value
+    return Estimate(value, value * linear.sd / linear.value, "")
+
+
+def _biased(old: Estimate, new: Estimate) -> bool:
+    return new.sd > 0.0 and abs(old.value - new.value) > _SIGNIFICANT * new.sd
+
+
+def _like(old: Estimate, new: Estimate) -> str:
+    """A value with the digits of another's error, without an error of its own."""
+    value, _, rest = with_error(old.value, new.sd).strip("(").partition(" ± ")
+    return value + rest.partition(")")[2]
+
+
+def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
+    """What is left, and what that means for probabilities and errors."""
+    if remainder is None or not remainder.systematic:
+        if unexplained > level:
+            return f"The remaining residual is consistent with noise ({printed(unexplained)})."
+        return f"A small misfit remains unexplained ({printed(unexplained)})."
+    shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
+    where = ", ".join(f"{_percent(share)} {_PARTS[name]}" for name, share in shares if share > 0.05)
+    times, enlarged = _factor(remainder.over_noise), _factor(remainder.error_scale)
+    return (
+        f"The remaining residual is still {times} times the noise ({where}), so the model is"
+        f" incomplete: the errors given here are enlarged by a factor of {enlarged}, and the"
+        " probabilities are lowered accordingly."
+    )
+
+
+def _percent(share: float) -> str:
+    """A probability in per cent."""
+    if share > 0.995:
+        return "> 99 %"
+    return f"{100.0 * share:.0f} %" if share > _IMPROBABLE else "< 1 %"
+
+
+def _factor(ratio: float) -> str:
+    """A ratio to two digits, without a power of ten."""
+    return f"{float(f'{ratio:.2g}'):.0f}" if ratio > 9.95 else f"{ratio:.2g}"
+
+
+def _rivals(indistinguishable: Sequence[tuple[str, float]]) -> list[str]:
+    """The names of rivals with their probabilities; improbable ones only if there are no others."""
+    probable = [pair for pair in indistinguishable if pair[1] > _IMPROBABLE]
+    others = [] if len(probable) in (0, len(indistinguishable)) else ["others below 1 %"]
+    shown = probable or indistinguishable
+    return [*(f"{_rival(name)} ({_percent(share)})" for name, share in shown), *others]
+
+
+def _rival(identifier: str) -> str:
+    """The name behind an identifier."""
+    from pendpipe.effects.catalogue import by_identifier
+
+    if identifier in _UNNAMED:
+        return _UNNAMED[identifier]
+    if identifier.startswith("parameter-"):
+        return f"another value of {identifier.removeprefix('parameter-').replace('_', ' ')}"
+    return by_identifier(identifier).name
+
+
+def _listed(items: Sequence[str], last: str) -> str:
+    """Join items to "x, y and z"."""
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} {last} {items[-1]}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith("?") else f"{text}."

@@ -1,0 +1,90 @@
+"""What a search is to do, and the effects that it may choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+from pendpipe.diagnosis import Progress
+from pendpipe.diagnosis.chance import CATALOGUE_SHARE
+from pendpipe.diagnosis.detect import detect, prepare
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.state import State
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.sensor import SoftClipping
+from pendpipe.effects.curves import CURVES, Curve
+
+
+def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
+    """Return the effects that a baseline may lack, and curves for what has no name.
+
+    What happens at an instant may happen twice: a second one is a copy, so that the model can
+    tell their values apart.
+    """
+    value = fit.value
+    present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
+    used = {effect.identifier for effect in fit.model.effects}
+    named = [
+        copy(effect) if effect.identifier in used else effect
+        for effect in catalogue
+        if effect.has_signature
+        and baseline not in effect.inside
+        and (unit == "rad" or not effect.angular)
+        and all(present[name] for name in effect.needs)
+        and (effect.identifier not in used or effect.local)
+    ]
+    bent = SoftClipping()
+    clipped = any(effect.key == bent.key for effect in fit.model.effects)
+    return [*named, *([] if clipped else [bent]), *undrawn(CURVES, fit)]
+
+
+def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:
+    """Return the curves along a fitted motion, without those in its model."""
+    present = {effect.key for effect in fit.model.effects}
+    made = [curve(fit.at.span) for curve in curves]
+    return [curve for curve in made if curve.key not in present]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a search is to do.
+
+    Parameters
+    ----------
+    catalogue, released
+        The effects that may be missing, and the held parameters that may be wrong.
+    baseline, level, seed
+        As in `search`.
+    forensics
+        The tests of the measurement.
+    progress
+        Receives one line for each step.
+    """
+
+    catalogue: Sequence[Effect]
+    released: Sequence[ReleasedParameter]
+    baseline: str
+    level: float
+    seed: int
+    forensics: Forensics
+    progress: Progress
+
+    @property
+    def threshold(self) -> float:
+        """The catalogue's part of the significance level."""
+        return self.level * CATALOGUE_SHARE
+
+    def scanned(self, state: State) -> list[Effect]:
+        """Score all that may be missing on a state's residual (into `state.now`)."""
+        effects = [
+            *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
+            *(entry for entry in self.released if entry not in state.fit.model.effects),
+        ]
+        self.progress(f"scanning {len(effects)} effects")
+        scanner = prepare(state.fit, state.data, state.noise, effects)
+        state.now = detect(scanner, state.fit, seed=self.seed, known=state.now)
+        state.first = state.first or state.now
+        return effects

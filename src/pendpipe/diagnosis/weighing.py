@@ -1,0 +1,249 @@
+"""Final probabilities of each effect and its rivals, beside all other effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.evidence import MISSHAPEN, Rival, of_one_class, probabilities
+from pendpipe.diagnosis.instants import with_instants
+from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refits import useful_chi2
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.result import FoundEffect
+from pendpipe.diagnosis.review import stands_apart
+from pendpipe.diagnosis.search import Search
+from pendpipe.diagnosis.state import Fault, Step, is_gross
+from pendpipe.diagnosis.values import curve_values, effect_parameters
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
+from pendpipe.effects.baseline import BASELINE
+from pendpipe.effects.curves import Curve
+from pendpipe.effects.model import Model
+
+_CLEAN_CHARGE: Final = 5.0
+"""Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
+without rivals in thirteen is wrong, as on opened challenges."""
+_LISTED_FROM: Final = 0.05
+"""Probability from which an unnamed curve is listed among the rivals."""
+_SEEN_IN_RESIDUAL: Final = ("jitter", "broadband-drive", "coloured-noise")
+"""Faults detected in a residual: the misfit of a curve can look like any of them."""
+_SAME_GAIN: Final = 0.02
+"""Relative change of a gain below which the rivals are not refitted."""
+
+
+class Weighed(NamedTuple):
+    """An effect and its rivals, beside all other effects.
+
+    Parameters
+    ----------
+    without
+        The fit without it.
+    gain
+        Its Delta chi^2.
+    mates
+        The effects that the recording cannot distinguish from it, the best of each identifier.
+    weights
+        Probabilities of the effect, of its mates, and of none of them.
+    """
+
+    without: Fit
+    gain: float
+    mates: tuple[Rival, ...]
+    weights: FloatArray
+
+
+def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
+    """Compare one effect with its rivals, beside all other effects."""
+    effect = step.winner.lead.effect
+    found = beside(found, effect)
+    without, rivals = _rivalry(found, beginning, step)
+    gain = without.chi2 - found.improved.chi2
+    own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
+    own = _weighed(found, own, gain, gain)
+    others = [
+        _weighed(found, rival, rival.gain, gain)
+        for rival in rivals
+        if rival.identifier != effect.identifier
+    ]
+    mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
+    # An effect that every pendulum has gets its prior against rivals and against "none of these".
+    # A curve that can follow anything gets no credit for leaving only noise.
+    follows = isinstance(effect, Curve) and effect.of_anything
+    none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _clean_charge(found))
+    weights = probabilities([own, *mates], none)
+    if not stands_apart(effect, found.improved):
+        weights = weights * _explained(found, effect, gain)
+    return Weighed(without, gain, tuple(mates), weights)
+
+
+def beside(found: Search, effect: Effect) -> Search:
+    """Return the search in which an effect is assessed: without a curve, unless it is one."""
+    if effect.kind == "unnamed":
+        return found
+    # A curve added to the named effects could imitate any of them.
+    return replace(found, improved=found.named.fit, remainder=found.named.remainder)
+
+
+def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
+    """Return one effect with its final values, probability and location."""
+    effect = step.winner.lead.effect
+    found = beside(found, effect)
+    without, gain, mates, weights = weighed
+    return FoundEffect(
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
+        with_instants(
+            effect_parameters(found.improved, effect, found.data.unit),
+            effect,
+            without,
+            found.noise,
+            found.improved.error_scale,
+        ),
+        gain,
+        step.p_value,
+        float(weights[0]),
+        tuple(
+            (mate.identifier, float(weight))
+            for mate, weight in zip(mates, weights[1:], strict=False)
+            if weight > _LISTED_FROM or not mate.drawn
+        ),
+        effect.discriminating_test,
+        locate(without, found.improved, found.data, effect),
+        curve_values(found.improved, effect, found.data.unit)
+        if isinstance(effect, Curve)
+        else None,
+    )
+
+
+def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
+    """Return the best of each identifier, the best first (several curves share one)."""
+    best: dict[str, Rival] = {}
+    for rival in sorted(rivals, key=lambda rival: -rival.evidence):
+        best.setdefault(rival.identifier, rival)
+    return list(best.values())
+
+
+def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
+    """Return a rival with the evidence of its gain beside a remaining misfit."""
+    if not found.remainder.systematic:
+        return rival
+    # m ln(excess) counts, for m independent numbers of the remaining misfit; differences within
+    # the tolerance of the catalogue's forms don't count.
+    behind, left = max(best - gain, 0.0), found.remainder.excess + MISSHAPEN * max(best, 0.0)
+    worth = -found.remainder.numbers * math.log1p(behind / max(left, 1.0))
+    return replace(rival, gain=worth, evidence=worth + rival.prior)
+
+
+def _explained(found: Search, effect: Effect, gain: float) -> float:
+    """Return the part of the misfit that an effect explains, an upper limit of its probability.
+
+    What an unnamed curve describes beside it is not explained.
+    """
+    curves = [step.winner for step in found.steps if step.winner.drawn]
+    open_still = sum(each.gain for each in curves if each.lead.effect is not effect)
+    if found.remainder.systematic:
+        open_still += found.remainder.excess
+    return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
+
+
+def fault_named(found: Search, fault: Fault) -> FoundEffect:
+    """Return a fault of the measurement found by its own test."""
+    from pendpipe.effects.catalogue import by_identifier
+
+    finding = fault.finding
+    effect = by_identifier(finding.identifier)
+    doubt = math.exp(-0.5 * _clean_charge(found))
+    # Effects that give exactly the same codes are equally probable.
+    each = 1.0 / (1.0 + len(finding.also) + doubt)
+    if finding.identifier in _SEEN_IN_RESIDUAL:
+        each *= _explained(found, effect, finding.delta_chi2)
+    return FoundEffect(
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
+        finding.parameters,
+        finding.delta_chi2,
+        fault.p_value,
+        each,
+        tuple((name, each) for name in finding.also),
+        effect.discriminating_test,
+        replace(finding.location, summary=finding.summary),
+    )
+
+
+def _clean_charge(found: Search) -> float:
+    """Return the charge against "none of these" if the model leaves only noise."""
+    return _CLEAN_CHARGE if found.unexplained > 0.01 else 0.0
+
+
+def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
+    """Return the fit without one effect, and the rivals that could replace it."""
+    effect = step.winner.lead.effect
+    held = list(found.held)
+    model, value = found.improved.model.dropping(effect, found.improved.value)
+    if isinstance(effect, ReleasedParameter) and effect.index is not None:
+        held.append(effect.index)
+        value[effect.index] = beginning.value[effect.index]
+    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
+    without = _refined(model, found, held, value, bare, step.before.value) or step.before
+    gain = without.chi2 - found.improved.chi2
+    same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
+    if len(found.steps) == 1 and same and not is_gross(without, found.data):
+        return without, step.rivals
+    # Refit even rivals that were far behind in the search: noise and other effects have changed.
+    useful = without.chi2
+    if not found.remainder.systematic:
+        useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
+    rivals = []
+    for rival in step.rivals:
+        own = rival.lead.effect.key == effect.key
+        fit = found.improved if own else refitted(without, found, held, rival, useful)
+        if fit is not None:
+            rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
+    return without, rivals
+
+
+def _refined(
+    model: Model,
+    found: Search,
+    held: Sequence[int],
+    *starts: FloatArray,
+    useful: float = math.inf,
+) -> Fit | None:
+    """Return the best fit of a model from several starts; None if it has no motion from any."""
+    fits = []
+    for start in starts:
+        if len(start) != model.size:
+            continue
+        try:
+            fits.append(refine(model, found.data, found.noise, start, held=held, useful=useful))
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+        if fits[-1].converged and not is_gross(fits[-1], found.data):
+            break
+    return min(fits, key=lambda fit: fit.chi2, default=None)
+
+
+def refitted(
+    without: Fit, found: Search, held: Sequence[int], rival: Rival, useful: float = math.inf
+) -> Fit | None:
+    """Refit a rival in the final model, from its earlier result, as far as it is useful."""
+    effect = rival.lead.effect
+    if isinstance(effect, ReleasedParameter):
+        held = effect.without(held)
+    own = rival.fit.value[len(rival.fit.value) - effect.count :]
+    start = np.concatenate([without.value, own])
+    return _refined(
+        without.model.adding(effect), found, held, start, rival.fit.value, useful=useful
+    )

@@ -1,0 +1,29 @@
+"""All tests of the measurement one after the other, as a search makes them on a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pendpipe.diagnosis.forensics import TESTS, Finding
+
+from .decays import Fitted
+
+_SURE = 1e-3
+"""p-value from which a finding's readings are left out of the tests that follow."""
+
+
+def examine(record: Fitted) -> list[Finding]:
+    """Make every test; what is found and what is not."""
+    data, findings = record.data, []
+    for find in TESTS.values():
+        finding = find(data, record.fit, record.noise, record.samples)
+        findings.append(finding)
+        if finding.p_value > _SURE:
+            continue
+        if finding.mask is not None:
+            data = data.masked((data.weight == 0.0) | finding.mask)
+        if finding.time_s is not None:
+            # To first order, the readings that the false stamps' moments would have had.
+            late = data.time_s - finding.time_s
+            data = replace(data, values=data.values + record.fit.at.sampled.velocity * late)
+    return findings

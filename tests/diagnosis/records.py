@@ -1,0 +1,139 @@
+"""Short recordings with an effect that Eq. 8 lacks, and their diagnoses, each made once."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from copy import copy
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise, white_noise
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
+
+FREQUENCY_HZ = 0.9
+OMEGA_RAD_S = 2.0 * math.pi * FREQUENCY_HZ
+NOISE_RAD = 1e-4
+INTERVAL_S = 1.0 / 15.0
+TIME_S = np.arange(1500) * INTERVAL_S
+TRUTH = np.array([7.2e-3, 9.6e-3, 1.3e-4, 0.4, OMEGA_RAD_S, 0.15, -0.3, 0.01])
+"""a, b, c, share, omega, angle and time of the release, offset."""
+LINEAR = np.array([0.0, 9.6e-3, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.01])
+"""The same pendulum with viscous friction alone."""
+
+INSTANT_S, LATER_S, TONE_HZ = 41.3, 70.2, 3.3
+VALUES: dict[str, tuple[float, ...]] = {
+    "circular-error": (1.0,),
+    "frequency-drift": (6e-6, 40.0),
+    "equilibrium-step": (4e-4, INSTANT_S),
+    "tone-pickup": (2e-4, 1.5e-4, TONE_HZ),
+    "sensor-quadratic": (0.02,),
+    "sensor-cubic": (0.2,),
+}
+"""Effects of ten standard deviations or more."""
+
+
+def white(seed: int, count: int = len(TIME_S), rms: float = NOISE_RAD) -> FloatArray:
+    return np.asarray(rms * np.random.default_rng(seed).standard_normal(count))
+
+
+def other_engine(values: FloatArray, time_s: FloatArray = TIME_S) -> FloatArray:
+    """Eq. 8 by the compiled engine, which the diagnosis does not use."""
+    a, b, c, share, omega, angle, start_s, offset = (float(value) for value in values)
+    law = Eq8(omega, a, share * b, (1.0 - share) * b, c)
+    return sample(law, Release(start_s, angle, offset), time_s)
+
+
+def with_effects(*identifiers: str, base: FloatArray = TRUTH) -> FloatArray:
+    """Readings without noise."""
+    effects = tuple(by_identifier(identifier) for identifier in identifiers)
+    values = [number for identifier in identifiers for number in VALUES[identifier]]
+    return Model(TIME_S, INTERVAL_S, effects).reading(np.append(base, values))
+
+
+def recording(readings: FloatArray, seed: int) -> Recording:
+    count = len(readings)
+    return Recording(TIME_S[:count], readings + white(seed, count), "angle_rad")
+
+
+def beginning_of(record: Recording) -> Beginning:
+    """What a diagnosis starts from, as in `diagnose_recording`."""
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+
+    points, part = measure_recording(record, "the test")
+    return begin(prepare(part, "the test"), points, baseline="eq8", fixed={})
+
+
+def prepared(
+    readings: FloatArray, time_s: FloatArray = TIME_S, rms: float = NOISE_RAD
+) -> tuple[Data, Noise]:
+    """Readings with white noise of known size."""
+    data = Data(time_s, readings, INTERVAL_S, True, np.ones(len(time_s)))
+    return data, white_noise(data, rms)
+
+
+def stribeck_record() -> tuple[Model, Data, Noise, FloatArray]:
+    """A model with Stribeck's friction, its readings and their noise, and its values.
+
+    Coulomb and quadratic losses take its place, and the refits of other losses creep.
+    """
+    time_s = np.arange(3600) * INTERVAL_S
+    truth = np.array([2e-4, 1.2e-3, 1e-6, 0.5, 6.09, 0.0389, -0.25, 0.006, 0.0063, 0.0345])
+    model = Model(time_s, INTERVAL_S, (by_identifier("stribeck-friction"),))
+    data, noise = prepared(model.reading(truth) + white(5, 3600, 2e-5), time_s, 2e-5)
+    return model, data, noise, truth
+
+
+@functools.cache
+def null_fit(seed: int = 3) -> tuple[Fit, Data, Noise]:
+    """Eq. 8 fitted to itself with noise, from the truth."""
+    data, noise = prepared(other_engine(TRUTH) + white(seed))
+    return refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH), data, noise
+
+
+def _dropped() -> FloatArray:
+    """Three readings are missing at 46.7 s, without a gap in the times."""
+    whole = other_engine(TRUTH)
+    return np.concatenate([whole[:700], whole[703:]])
+
+
+def _two_steps() -> FloatArray:
+    """The equilibrium jumps one way, and by half of it back."""
+    step = by_identifier("equilibrium-step")
+    size, instant_s = VALUES["equilibrium-step"]
+    values = (size, instant_s, -0.5 * size, LATER_S)
+    return Model(TIME_S, INTERVAL_S, (step, copy(step))).reading(np.append(TRUTH, values))
+
+
+_READINGS: dict[str, Callable[[], FloatArray]] = {
+    "null": lambda: other_engine(TRUTH),
+    "dropped-samples": _dropped,
+    "two steps": _two_steps,
+    "two": lambda: with_effects("equilibrium-step", "tone-pickup"),
+    "linear": lambda: other_engine(LINEAR),
+}
+
+
+@functools.cache
+def diagnosed(name: str, seed: int = 1) -> Outcome:
+    """The diagnosis of an effect's recording, or of one of the others above."""
+    make = _READINGS.get(name, lambda: with_effects(name))
+    return diagnose_recording(recording(make(), seed))
+
+
+def classes_found(outcome: Outcome) -> list[set[str]]:
+    """The identifiers of each found effect's class."""
+    return [
+        {effect.identifier, *(name for name, _ in effect.indistinguishable)}
+        for effect in outcome.diagnosis.effects
+    ]

@@ -1,0 +1,101 @@
+"""What looked like a fault before the physics was known is tested again with it."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import diagnose_recording, silent
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.forensics.finding import Finding
+from pendpipe.diagnosis.instants import with_better_instants
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.state import Fault, State
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
+
+from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, prepared, white
+
+LEVEL, ODD = 0.01, 812
+
+
+def blamed(error: float) -> tuple[Forensics, State]:
+    """A search with the right model, and one reading that was masked as a glitch."""
+    readings = other_engine(TRUTH) + white(21)
+    # Its own noise taken off: it is wrong by just so much.
+    readings[ODD] = other_engine(TRUTH)[ODD] + error * NOISE_RAD
+    data, _ = prepared(readings)
+    mask = np.arange(len(readings)) == ODD
+    data = data.masked(mask)
+    noise = white_noise(data, NOISE_RAD)
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    state = State(fit, data, noise, [], TRUTH, fit.value)
+    state.faults = [Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask)]
+    samples = prepare(Recording(TIME_S, readings, "angle_rad"), "the test")
+    return Forensics(samples, LEVEL), state
+
+
+@pytest.mark.parametrize("error", [0.5, 3.0, -3.5])
+def test_a_reading_that_noise_explains_in_the_end_returns(error: float) -> None:
+    forensics, state = blamed(error)
+    before = state.fit
+    assert forensics.again(state, silent)
+    assert state.faults == []
+    assert state.data.used == len(TIME_S)
+    assert np.array_equal(state.noise.weight, state.data.weight)
+    # It counts again; and the record is no more suspicious than its tests say now.
+    assert state.fit.chi2 > before.chi2 or abs(error) < 1.0
+    assert forensics.p_value(state.faults) > LEVEL
+
+
+@pytest.mark.parametrize("error", [12.0, -30.0])
+def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: float) -> None:
+    forensics, state = blamed(error)
+    assert not forensics.again(state, silent)
+    (fault,) = state.faults
+    assert state.data.weight[ODD] == 0.0
+    assert state.data.used == len(TIME_S) - 1
+    assert fault.p_value < LEVEL
+    assert forensics.p_value(state.faults) == fault.p_value
+    largest = fault.finding.parameters["largest"].value
+    assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
+
+
+@functools.cache
+def clipped_at(level_rad: float) -> FloatArray:
+    return np.minimum(other_engine(TRUTH) + white(5), level_rad)
+
+
+def test_clipping_is_reported_once() -> None:
+    """A nonlinear sensor is tried first; with the clipped readings masked it is not needed."""
+    level = 0.9 * float(other_engine(TRUTH).max())
+    record = Recording(TIME_S, clipped_at(level), "angle_rad")
+    found = diagnose_recording(record).diagnosis
+    (effect,) = found.effects
+    assert effect.identifier == "clipping"
+    assert effect.parameters["upper_level"].value == pytest.approx(level, rel=1e-6)
+    assert effect.parameters["number"].value == np.count_nonzero(clipped_at(level) == level)
+    assert effect.delta_chi2 > 1e3
+    assert found.p_value < 1e-6
+
+
+@pytest.mark.parametrize("off", [-1.2, -0.6, 0.0, 0.7, 1.2])
+def test_lost_samples_are_placed_between_the_right_readings(off: float) -> None:
+    """A quarter of a cycle lost; the fit is begun `off` intervals from the instant."""
+    lost, instant = 0.27, TIME_S[700] + 0.5 * INTERVAL_S
+    dropped = by_identifier("dropped-samples")
+    model = Model(TIME_S, INTERVAL_S, (dropped,))
+    truth = np.concatenate([TRUTH, [lost, instant]])
+    data, noise = prepared(model.reading(truth) + white(8))
+    start = truth + np.array([*np.zeros(len(TRUTH)), 0.0, off * INTERVAL_S])
+    found = with_better_instants(refine(model, data, noise, start), data, noise, ())
+    assert found.chi2 / data.used == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / data.used))
+    assert found.value[-2] == pytest.approx(lost, abs=5e-4)
+    # A reading within the jump is the same on both sides of a turning point.
+    assert abs(found.value[-1] - instant) < INTERVAL_S

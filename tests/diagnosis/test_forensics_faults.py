@@ -1,0 +1,349 @@
+"""Each fault of the measurement is found, measured, and not taken for another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import silent
+from pendpipe.diagnosis.data import gather
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.forensics import TESTS, Finding, find_lost_samples
+from pendpipe.diagnosis.forensics.glitches import find_in_misfit
+from pendpipe.diagnosis.forensics.lost_samples import LostSamples
+from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.state import State
+from pendpipe.effects.catalogue import CATALOGUE
+from pendpipe.effects.catalogue.restoring import CubicStiffness
+from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
+
+from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
+from .examine import examine
+from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
+from .records import null_fit
+
+FOUND = 1e-3
+
+
+@pytest.fixture(scope="module")
+def clean() -> FloatArray:
+    return AIR.model().reading(AIR.values())
+
+
+def generator(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng([17, seed])
+
+
+def found(record: Fitted) -> dict[str, Finding]:
+    findings = examine(record)
+    return {
+        name: finding
+        for name, finding in zip(TESTS, findings, strict=True)
+        if finding.p_value < FOUND
+    }
+
+
+@pytest.mark.parametrize("fault", list(FAULTS))
+def test_a_fault_is_found_and_no_other(fault: str, clean: FloatArray) -> None:
+    test, make = FAULTS[fault]
+    findings = found(make(clean, generator(1)))
+    assert list(findings) == [test]
+    assert findings[test].delta_chi2 > 10.0
+    assert findings[test].summary
+    told = findings[test].parameters
+    effects = [effect for effect in CATALOGUE if effect.identifier == test]
+    declared = {p.name: p.unit_in("rad") for effect in effects for p in effect.parameters}
+    assert all(told[name].unit == unit for name, unit in declared.items() if name in told)
+
+
+def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
+    where = np.array([5, 700, 701, 2000, 3998])
+    readings = clean + white(generator(), AIR.count)
+    readings[where] += np.array([1.0, -1.0, 1.0, 1.0, -1.0]) * 15.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+    assert finding.parameters["number"].value == len(where)
+    assert finding.parameters["rms"].value == pytest.approx(15.0 * NOISE, rel=0.15)
+    assert finding.location.time_s == (AIR.times()[5], AIR.times()[3998])
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
+def test_few_glitches_of_one_size_are_not_taken_for_a_tail(number: int, clean: FloatArray) -> None:
+    """Seven standard deviations: one is as rare as 3e-12, and two make no tail."""
+    where = np.linspace(300, AIR.count - 300, number).astype(int)
+    readings = clean + white(generator(3), AIR.count)
+    readings[where] = clean[where] + 7.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+
+
+def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:
+    noisy, where = FAULTS["memory 0.5"].make(clean, generator()), [300, 2500]
+    readings = noisy.data.values.copy()
+    readings[where] += 20.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where
+
+
+def test_a_step_of_the_offset_is_not_a_glitch(clean: FloatArray) -> None:
+    readings = clean + white(generator(), AIR.count)
+    readings[1500:] += 10.0 * NOISE
+    finding = found(fitted(AIR, readings)).get("glitches")
+    assert finding is None or finding.mask is None or np.count_nonzero(finding.mask) < 3
+
+
+def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None:
+    readings = rounded(np.clip(clean + white(generator(), AIR.count), -0.125, 0.13), STEP_16)
+    finding = found(fitted(AIR, readings))["clipping"]
+    assert finding.parameters["upper_level"].value == pytest.approx(0.13, abs=STEP_16)
+    assert finding.parameters["lower_level"].value == pytest.approx(-0.125, abs=STEP_16)
+    assert finding.mask is not None
+    assert np.array_equal(finding.mask, (readings > 0.1299) | (readings < -0.1249))
+    ends = [round(level / STEP_16) for level in (0.13, -0.125)]
+    assert finding.location.adc_codes == pytest.approx(ends, abs=1)
+
+
+@pytest.mark.parametrize("codes", [(20,), (-40, -7, 11)])
+def test_codes_that_never_occur_are_named(codes: tuple[int, ...], clean: FloatArray) -> None:
+    exact = np.round((clean + 10.0 * white(generator(), AIR.count)) / STEP_12).astype(np.int64)
+    finding = found(fitted(AIR, STEP_12 * (exact - np.isin(exact, codes))))["missing-codes"]
+    assert finding.location.adc_codes == codes
+    missed = np.mean(np.isin(exact, codes))
+    assert finding.parameters["share"].value == pytest.approx(missed, abs=4e-3)
+    assert finding.parameters["found"].value == 0.0
+
+
+@pytest.mark.parametrize("bit", [2, 4])
+def test_a_stuck_bit_is_named(bit: int, clean: FloatArray) -> None:
+    code = np.round((clean + white(generator(), AIR.count)) / STEP_16).astype(np.int64)
+    finding = found(fitted(AIR, STEP_16 * (code & ~(1 << bit))))["missing-codes"]
+    assert finding.parameters["bit"].value == bit
+
+
+def test_a_coarse_step_is_reported_only_where_it_matters(clean: FloatArray) -> None:
+    noise = generator().standard_normal(AIR.count)
+    coarse = fitted(AIR, rounded(clean + 0.1 * STEP_12 * noise, STEP_12))
+    finding = TESTS["coarse-quantisation"](coarse.data, coarse.fit, coarse.noise, coarse.samples)
+    assert finding.p_value < 1e-10
+    # The amplitude ends at 12 steps.
+    assert finding.kind == "fault"
+    assert finding.parameters["step"].value == pytest.approx(STEP_12, rel=1e-6)
+    assert finding.parameters["noise_over_step"].value == pytest.approx(0.1, rel=0.3)
+    fine = fitted(AIR, rounded(clean + 0.1 * STEP_16 * noise, STEP_16))
+    finding = TESTS["coarse-quantisation"](fine.data, fine.fit, fine.noise, fine.samples)
+    assert finding.kind == "property"
+
+
+@pytest.mark.parametrize("sigma_t", [1.5e-4, 1e-3])
+@pytest.mark.parametrize("step", [0.0, STEP_16, 0.25 * STEP_12])
+def test_jitter_is_measured(sigma_t: float, step: float, clean: FloatArray) -> None:
+    pulls = []
+    for seed in range(4):
+        draw = generator(seed)
+        readings = clean + white(draw, AIR.count)
+        readings = readings + sigma_t * speed(clean) * draw.standard_normal(AIR.count)
+        record = fitted(AIR, rounded(readings, step) if step else readings)
+        finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
+        estimate = finding.parameters["sigma_t"]
+        pulls.append((estimate.value - sigma_t) / estimate.sd)
+    assert np.mean(np.abs(pulls)) < 2.0
+
+
+def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> None:
+    draw = generator()
+    envelope = 0.15 * np.exp(-AIR.times() / 60.0)
+    readings = clean + white(draw, AIR.count) * (1.0 + 10.0 * envelope)
+    assert "jitter" not in found(fitted(AIR, readings))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_constant_amplitude_shows_no_jitter_and_stops_nothing(seed: int) -> None:
+    """As in a recording that is driven first: the mean of v^2 looks like the noise's variance."""
+    held = Pendulum(quality_factor=1e10, quadratic=0.0, coulomb=0.0)
+    clean = held.model().reading(held.values())
+    record = fitted(held, clean + white(generator(seed), held.count))
+    finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
+    assert finding.p_value > 1e-4
+
+
+def test_gain_noise_is_no_jitter(clean: FloatArray) -> None:
+    draw = generator()
+    readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + white(draw, AIR.count)
+    assert "jitter" not in found(fitted(AIR, readings))
+
+
+def test_colour_is_measured(clean: FloatArray) -> None:
+    finding = found(FAULTS["memory 0.5"].make(clean, generator(3)))["coloured-noise"]
+    # AR(1) of 0.5: at 0.9 Hz of 20, S/mean = 0.75/(1.25 - cos(2 pi 0.045)) = 2.57; the band
+    # reaches to three times that.
+    assert 1.9 < finding.parameters["density_ratio"].value < 2.8
+
+
+def test_a_random_torque_is_measured(clean: FloatArray) -> None:
+    pulls = []
+    for seed in range(4):
+        finding = found(FAULTS["torque of 1e-8"].make(clean, generator(seed)))["broadband-drive"]
+        estimate = finding.parameters["acceleration_density"]
+        pulls.append((estimate.value - 1e-8) / estimate.sd)
+    assert np.mean(np.abs(pulls)) < 2.0
+
+
+def test_missing_stiffness_is_not_a_random_torque() -> None:
+    stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (CubicStiffness(),))
+    readings = stiff.reading(np.append(AIR.values(), 3e-3)) + white(generator(), AIR.count)
+    record = fitted(AIR, readings)
+    assert record.fit.chi2 > 1.1 * AIR.count
+    assert found(record) == {}
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_time_stamps_are_used_where_they_are_right(share: float, clean: FloatArray) -> None:
+    draw = generator()
+    stamps = AIR.times() + draw.uniform(-5e-4, 5e-4, AIR.count)
+    true = stamps + share * (AIR.times() - stamps)
+    readings = Model(true, 1.0 / AIR.rate_hz).reading(AIR.values()) + white(draw, AIR.count)
+    record = fitted(AIR, readings, stamps)
+    finding = TESTS["time-stamps"](record.data, record.fit, record.noise, record.samples)
+    estimate = finding.parameters["share"]
+    assert estimate.value == pytest.approx(share, abs=4.0 * estimate.sd)
+    assert (finding.time_s is not None) == (share == 1.0)
+    if finding.time_s is not None:
+        assert finding.time_s == pytest.approx(AIR.times(), abs=5e-5)
+
+
+def test_gaps_in_the_time_stamps_are_noted_and_are_not_a_fault(clean: FloatArray) -> None:
+    kept = np.ones(AIR.count, dtype=bool)
+    kept[1000:1050] = kept[3000] = False
+    record = fitted(AIR, (clean + white(generator(), AIR.count))[kept], AIR.times()[kept])
+    assert not found(record)
+    note = gap_note(record.samples.time_s, 0.5 / FREQUENCY_HZ, counts=False)
+    assert note is not None
+    assert f"2 gaps, the longest of {51 / AIR.rate_hz:.4g} s" in note
+
+
+@pytest.mark.parametrize("lost", [{1234: 1}, {200: 1, 900: 1, 1500: 2, 2600: 1}, {1500: -1}])
+def test_lost_samples_are_found_before_they_spoil_the_rest(lost: dict[int, int]) -> None:
+    longer = Pendulum(count=AIR.count + 10)
+    motion, row = longer.model().reading(longer.values()), np.arange(AIR.count)
+    for place, number in lost.items():
+        row = row + number * (row >= place)
+    readings = motion[row] + white(generator(), AIR.count)
+    record = fitted(AIR, readings)
+    candidates = find_lost_samples(record.data, record.fit)
+    assert [candidate.number for candidate in candidates] == list(lost.values())
+    begun = np.flatnonzero(np.diff(row) != 1) + 1
+    for candidate, place in zip(candidates, begun, strict=True):
+        assert candidate.measured == pytest.approx(candidate.number, abs=0.1)
+        assert candidate.time_s == pytest.approx(AIR.times()[place], abs=2.1 / AIR.rate_hz)
+
+
+def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
+    """Means of several readings, as the diagnosis takes them of a very long record."""
+    record = fitted(pendulum, readings)
+    data = gather(
+        record.samples.time_s,
+        readings,
+        step=record.samples.step,
+        unit="rad",
+        counts=False,
+        period_s=1.0 / FREQUENCY_HZ,
+        noise_rms=record.samples.noise_rms,
+        most=5000,
+    )
+    assert len(data) < pendulum.count // 3
+    model = Model(data.time_s, data.interval_s)
+    noise = white_noise(data, record.noise.rms * math.sqrt(len(data) / pendulum.count))
+    fit = refine(model, data, noise, pendulum.values())
+    return Fitted(data, fit, noise, record.samples)
+
+
+def test_codes_are_tested_after_a_corrected_clock() -> None:
+    """Ten samples are lost in the middle; the data's times are right, the samples' are not."""
+    longer = Pendulum(count=AIR.count + 10)
+    kept = np.delete(np.arange(longer.count), slice(2000, 2010))
+    noise = 1e-3 * generator().standard_normal(longer.count)
+    noisy = longer.model().reading(longer.values()) + noise
+    exact = np.round(noisy / STEP_12).astype(np.int64)
+    readings = (STEP_12 * (exact + np.isin(exact, (20,))))[kept]
+    corrected = fitted(AIR, readings, longer.times()[kept])
+    samples = replace(corrected.samples, time_s=AIR.times()[: len(kept)])
+    finding = TESTS["missing-codes"](corrected.data, corrected.fit, corrected.noise, samples)
+    assert finding.location.adc_codes == (20,)
+
+
+FAST = Pendulum(rate_hz=400.0, count=20_000)
+
+
+def test_the_codes_of_averaged_readings_are_tested() -> None:
+    noisy = FAST.model().reading(FAST.values()) + 1e-3 * generator().standard_normal(FAST.count)
+    exact = np.round(noisy / STEP_12).astype(np.int64)
+    findings = found(folded(FAST, STEP_12 * (exact + np.isin(exact, (30,)))))
+    assert list(findings) == ["missing-codes"]
+    assert findings["missing-codes"].location.adc_codes == (30,)
+
+
+def test_the_range_of_averaged_readings_is_tested() -> None:
+    noisy = FAST.model().reading(FAST.values()) + white(generator(), FAST.count)
+    record = folded(FAST, rounded(np.minimum(noisy, 0.15), STEP_16))
+    findings = found(record)
+    assert list(findings) == ["clipping"]
+    clipping = findings["clipping"]
+    assert clipping.parameters["upper_level"].value == pytest.approx(0.15, abs=STEP_16)
+    assert clipping.mask is not None
+    assert clipping.mask.shape == record.data.values.shape
+    assert 20 < np.count_nonzero(clipping.mask) < 0.1 * len(record.data)
+
+
+def test_a_sensor_that_bends_at_its_end_makes_no_glitches(clean: FloatArray) -> None:
+    """Wrong readings at random places are masked; those at the tops are left to the sensor."""
+    bent = clean - 1e-3 * np.exp((clean - clean.max()) / 1e-3)
+    finding = found(fitted(AIR, bent + white(generator(), AIR.count))).get("glitches")
+    assert finding is None
+    where = np.array([700, 1501, 2600])
+    readings = clean + white(generator(), AIR.count)
+    readings[where] -= 12.0 * NOISE
+    finding = found(fitted(AIR, readings))["glitches"]
+    assert finding.mask is not None
+    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+
+
+def test_glitches_need_no_model(clean: FloatArray) -> None:
+    """The clock is wrong by a hundredth; single readings are found, a shifted stretch is none."""
+    noisy = clean + white(generator(), AIR.count)
+    right = fitted(AIR, noisy)
+    off = right.fit.model.evaluate(1.01 * right.fit.value)
+    far = replace(right.fit, evaluation=replace(right.fit.evaluation, at=off))
+    where = np.array([420, 1501, 3300])
+    for wrong, expected in ((where, where.tolist()), (np.arange(1500, 1508), [])):
+        readings = noisy.copy()
+        readings[wrong] += 30.0 * NOISE
+        data = replace(right.data, values=readings)
+        finding = find_in_misfit(data, far, right.noise, right.samples)
+        found_at = [] if finding.mask is None else np.flatnonzero(finding.mask).tolist()
+        assert found_at == expected
+        assert (finding.p_value < 1e-3) == bool(expected)
+
+
+def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After a loss longer than the motion there is nothing to compare: the record stays."""
+    fit, data, noise = null_fit()
+    late = LostSamples(float(data.time_s[-20]), 10**9, 1e9, 1.0)
+    monkeypatch.setattr("pendpipe.diagnosis.faults.find_lost_samples", lambda *_: [late])
+    state = State(fit, data, noise, [], fit.value, fit.value)
+    samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
+    Forensics(samples, 0.01).before(state, silent)
+    assert np.array_equal(state.data.time_s, data.time_s)
+    assert "dropped-samples" not in [fault.finding.identifier for fault in state.faults]

@@ -1,0 +1,148 @@
+"""The reported effect is the likelier one in the end, whichever was added first."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnosis import diagnose_recording, likelier
+from pendpipe.diagnosis.likelier import swap_in_likelier
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.run import Outcome
+from pendpipe.diagnosis.search import Search
+from pendpipe.diagnosis.state import Step
+from pendpipe.diagnosis.weighing import Weighed, weigh
+from pendpipe.effects.baseline import B
+
+from .records import TRUTH, diagnosed, other_engine, recording
+from .test_one_curve import pulled
+
+
+@functools.cache
+def magnet() -> Outcome:
+    """A torque outside the catalogue, described by a curve."""
+    return diagnose_recording(recording(pulled(), 5))
+
+
+@functools.cache
+def wrong_loss() -> Outcome:
+    """A prediction with a wrong b: nothing is missing."""
+    given = {"b": 1.1 * float(TRUTH[B])}
+    return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+
+
+def having_taken(outcome: Outcome, name: str) -> Search:
+    """The same search as if it had added another of the refitted effects."""
+    found = outcome.search
+    (step,) = found.steps
+    first = next(rival for rival in step.rivals if rival.identifier == name)
+    rest = tuple(rival for rival in step.rivals if rival is not first)
+    held = found.held
+    if step.winner.lead.effect.kind == "parameter":
+        held = (*held, B)
+    # Its refit was judged by the noise of that moment.
+    fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
+    return replace(
+        found,
+        improved=fit,
+        steps=(replace(step, rivals=(first, *rest)),),
+        held=held,
+        named=found.named._replace(fit=fit),
+    )
+
+
+def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
+    """Return the final leader if another was added first, and all probabilities."""
+    found, (weighed,) = swap_in_likelier(having_taken(outcome, name), outcome.beginning)
+    (step,) = found.steps
+    own, *others = weighed.weights[:-1].tolist()
+    mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
+    return step, own, mates, found
+
+
+@pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
+def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
+    """All fit a pendulum whose torque is sin x; the prior knows that it is."""
+    step, own, mates, found = led(diagnosed("circular-error"), taken)
+    assert step.winner.identifier == "circular-error"
+    assert own > max(mates.values())
+    assert taken in mates
+    assert [effect.identifier for effect in found.improved.model.effects] == ["circular-error"]
+    assert found.improved.chi2 == pytest.approx(diagnosed("circular-error").search.improved.chi2)
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("frequency-drift", "cubic-stiffness"),
+        ("frequency-drift", "clock-drift"),
+        ("sensor-cubic", "sensor-cubic"),
+    ],
+)
+def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
+    step, own, mates, _ = led(diagnosed(name), taken)
+    assert step.winner.identifier == taken
+    assert 1.5 * own >= max(mates.values())
+
+
+@pytest.mark.parametrize(
+    ("odds", "leads"),
+    [(1.0, "circular-error"), (19.0, "circular-error"), (21.0, "unnamed-restoring")],
+)
+def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
+    odds: float, leads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Curves can follow any law: names precede them unless the recording excludes the name."""
+
+    def weighed(*asked: Any) -> Weighed:
+        found = weigh(*asked)
+        curve = [mate for mate in found.mates if mate.identifier == "unnamed-restoring"]
+        return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
+
+    monkeypatch.setattr(likelier, "weigh", weighed)
+    outcome = diagnosed("circular-error")
+    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
+    assert [effect.identifier for effect in found.improved.model.effects] == [leads]
+    assert found.steps[0].winner.identifier == leads
+
+
+def test_the_likelier_of_two_curves_is_reported() -> None:
+    step, own, mates, _ = led(magnet(), "unnamed-measurement")
+    assert step.winner.identifier == "unnamed-restoring"
+    assert own > max(mates.values())
+
+
+def test_a_wrong_parameter_replaces_missing_physics() -> None:
+    """It is fitted then, and comes out right."""
+    taken = next(
+        rival.identifier
+        for rival in wrong_loss().search.steps[0].rivals
+        if rival.lead.effect.kind != "parameter"
+    )
+    step, _, _, found = led(wrong_loss(), taken)
+    assert step.winner.identifier == "parameter-b"
+    assert B not in found.held
+    sd = float(found.improved.covariance()[B, B]) ** 0.5
+    assert abs(found.improved.value[B] - TRUTH[B]) < 4.0 * sd
+
+
+def test_the_next_effect_is_compared_beside_the_new_leader(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without the second effect the model is that of the new first alone."""
+    outcome = diagnosed("two")
+    first = outcome.search.steps[0]
+    other = first.rivals[1]
+    monkeypatch.setattr(likelier, "_likelier", lambda _, step, __: other if step is first else None)
+    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
+    assert found.steps[0].winner is other
+    assert found.steps[1].before is other.fit
+    assert found.steps[1].winner is outcome.search.steps[1].winner
+    assert {effect.identifier for effect in found.improved.model.effects} == {
+        other.identifier,
+        found.steps[1].winner.identifier,
+    }

@@ -1,0 +1,43 @@
+"""A progressive window finds the motion where a start over the whole record is turns away."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.progressive_window import progressive_start
+from pendpipe.diagnosis.refine import refine
+from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.catalogue.restoring import CircularError
+from pendpipe.effects.model import Model
+
+RATE_HZ, NOISE_RAD, LINEAR = 20.0, 1e-3, 0.012
+OMEGA_TRUE = 6.1
+TIME_S = np.arange(2400) / RATE_HZ
+
+
+def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_off() -> None:
+    """The first cycles' own frequency is omega (1 - A^2/16): over 120 s that is 11 turns off."""
+
+    def rate(_: float, state: np.ndarray) -> list[float]:
+        x, v = state
+        return [v, -(OMEGA_TRUE**2) * math.sin(x) - 2.0 * LINEAR * v]
+
+    solved = solve_ivp(
+        rate, (0.0, TIME_S[-1]), [1.4, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
+    )
+    values = solved.y[0] + NOISE_RAD * np.random.default_rng(4).standard_normal(len(TIME_S))
+    data = Data(TIME_S, values, 1.0 / RATE_HZ, True, np.ones(len(TIME_S)))
+    model = Model(TIME_S, 1.0 / RATE_HZ, (CircularError(),), order=20)
+    slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)
+    start = np.array([0.0, LINEAR, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
+    value = progressive_start(model, data, NOISE_RAD, start)
+    fit = refine(model, data, white_noise(data, NOISE_RAD), value)
+    assert fit.chi2 / len(TIME_S) == pytest.approx(1.0, abs=0.1)
+    sd = math.sqrt(fit.covariance()[OMEGA, OMEGA])
+    assert abs(fit.value[OMEGA] - OMEGA_TRUE) < 5.0 * sd

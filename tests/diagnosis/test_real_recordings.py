@@ -1,0 +1,142 @@
+"""What is known of real recordings is found in them without being given.
+
+They are read where they lie (``../shared/recordings``). Here mostly single laws are fitted, which
+is quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found of it.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.recorded import measure_recording
+from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.location import beat_of
+from pendpipe.diagnosis.progressive_window import progressive_start
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.small_swings import small_swings
+from pendpipe.diagnosis.state import first_noise
+from pendpipe.effects.baseline import A, C
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.formats import read
+from pendpipe.recording import Recording
+
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"
+pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")
+
+RIG = "profcarter-adip/adip_pend_data.mat"
+STRING = "jiarui-phy180/AAAtAmp3.txt"
+SHIP = "kvlcc2-roll-decay/model_test_21337.csv"
+SPRING = "filo0509-spring/molla_durissima_discopieno_14.91945_0.2016_1.csv"
+VIDEO = "tylertian-phy180/lab1_data.txt"
+ROD, GAP = "yfysiks-encoder/data2_14.csv", "yfysiks-encoder/data2_12.csv"
+
+
+def whole(name: str) -> Recording:
+    return read(SHARED / name).as_motion()
+
+
+@functools.cache
+def beginning_of(name: str) -> Beginning:
+    points, part = measure_recording(whole(name), name)
+    return begin(prepare(part, name), points, baseline="eq8", fixed={})
+
+
+@functools.cache
+def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
+    """Eq. 8 with some effects (underscores for hyphens) from start values, to a recording."""
+    found = beginning_of(name)
+    model, value, noise = found.model, found.value, first_noise(found)
+    for identifier, start in effects.items():
+        model = model.adding(by_identifier(identifier.replace("_", "-")))
+        value = np.append(value, start)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        value = progressive_start(model, found.data, noise.white_rms, value, held=found.held)
+        return refine(model, found.data, noise, value, held=found.held)
+
+
+def values(fit: Fit, identifier: str) -> FloatArray:
+    """An effect's values in a fit."""
+    place = next(place for effect, place in fit.model.places() if effect.identifier == identifier)
+    return fit.value[place]
+
+
+@pytest.mark.parametrize("name", [RIG, STRING])
+def test_a_pendulum_has_the_circular_error_of_its_geometry(name: str) -> None:
+    switched = fitted(name, circular_error=(1.0,))
+    free = fitted(name, cubic_stiffness=(-0.16,))
+    # A cubic torque in its place is the first term of sin x = x - x^3/6, and a little less.
+    assert values(free, "cubic-stiffness")[0] == pytest.approx(-1.0 / 6.0, rel=0.05)
+    # The frequency follows sin x over all cycles to a few tenths of a radian of phase.
+    assert values(switched, "circular-error")[0] == 1.0
+    assert switched.max_phase_error_rad < 0.2
+
+
+def test_a_ships_righting_moment_hardens() -> None:
+    fit = fitted(SHIP, cubic_stiffness=(0.0,))
+    # dT/T = -(3/8) k3 A^2, of which the coefficient is known to be about -0.27.
+    k3 = values(fit, "cubic-stiffness")[0]
+    assert k3 > 0.0
+    assert -0.375 * k3 == pytest.approx(-0.27, abs=0.08)
+
+
+def test_a_ship_hardens_rather_than_drifts() -> None:
+    """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
+    named = diagnose_recording(whole(SHIP)).diagnosis.effects
+    assert named[0].identifier == "cubic-stiffness"
+    assert named[0].parameters["k3"].value == pytest.approx(0.27 / 0.375, abs=0.25)
+    less = dict(named[0].indistinguishable)
+    assert all(
+        less.get(name, 0.0) < named[0].probability for name in ("clock-drift", "frequency-drift")
+    )
+
+
+def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
+    fit = fitted(SPRING, presliding_friction=(0.0, 0.02), tone_pickup=(0.0, 0.0, 1.005))
+    tone = by_identifier("tone-pickup")
+    beat = beat_of(fit, tone)
+    assert beat is not None
+    # The readings' spectrum has lines at 1.3451 and 1.0060 Hz.
+    assert beat == pytest.approx(1.0 / (1.3451 - 1.0060), rel=0.02)
+    # The smaller one's amplitude there is 0.4 mm.
+    assert np.hypot(*values(fit, "tone-pickup")[:2]) == pytest.approx(0.4e-3, rel=0.2)
+
+
+def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
+    found = beginning_of(ROD)
+    small = small_swings(fitted(ROD, circular_error=(1.0,)), found.data, first_noise(found))
+    assert small is not None
+    assert small.significant
+    assert small.amplitude < 0.04
+    assert 0.005 < small.excess < 0.1
+    assert "stiffer" in small.sentence("rad")
+
+
+def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
+    fit = fitted(RIG, circular_error=(1.0,))
+    # Known: quadratic drag and Coulomb friction in near equal measure, at 1.2 rad and below.
+    drag, friction = fit.value[A] * 1.2, fit.value[C] / 1.2
+    assert 0.2 < friction / drag < 5.0
+
+
+def test_the_sine_precedes_a_clock_that_fits_slightly_better() -> None:
+    """At 0.7 rad and without Eq. 3's quadratic drag a drift of the clock gains more."""
+    named = diagnose_recording(whole(VIDEO), baseline="viscous").diagnosis.effects
+    assert [effect.identifier for effect in named[:2]] == ["circular-error", "quadratic-drag"]
+    assert named[0].probability > 0.5
+
+
+def test_a_gap_of_the_time_stamps_is_noted_with_its_time_and_length() -> None:
+    recording = whole(GAP)
+    note = gap_note(recording.time_s, 0.72, counts=True)
+    assert note is not None
+    assert "13.24 s after 241.5" in note
+    before = recording.time_s < 200.0
+    assert gap_note(recording.time_s[before], 0.72, counts=True) is None

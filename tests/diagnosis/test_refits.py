@@ -1,0 +1,53 @@
+"""Refits side by side: which are carried to the end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.evidence import Rival, of_one_class
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refits import OF_A_CURVE, side_by_side, useful_chi2
+from pendpipe.effects.catalogue import by_identifier
+
+from .records import null_fit, stribeck_record
+
+
+@pytest.mark.parametrize("gain", [0.0, 20.0, 100.0, 400.0, 1e4])
+def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
+    fit, _, _ = null_fit()
+    lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
+    best = Rival(lead, fit, gain, gain)
+    at_the_limit = gain - useful_chi2(0.0, gain, drawn=False)
+    behind = replace(best, gain=at_the_limit, evidence=at_the_limit)
+    assert not of_one_class(best, behind)
+
+
+@pytest.mark.parametrize("gain", [20.0, 400.0, 1e4])
+def test_an_effect_that_with_another_may_replace_a_curve_is_useful(gain: float) -> None:
+    assert useful_chi2(0.0, gain, drawn=True) >= (1.0 - OF_A_CURVE) * gain
+
+
+def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
+    """Otherwise only those that come near the best: here the true friction."""
+    model, data, noise, truth = stribeck_record()
+    base = refine(model.bare(), data, noise, truth[:-2])
+    names = {"stribeck-friction": (float(truth[-1]),), "damping-drift": (100.0,)}
+    leads = [Lead(by_identifier(name), shape, 0.0, 0.0) for name, shape in names.items()]
+    whole = side_by_side(base, data, noise, leads, (), gross=True)
+    near = side_by_side(base, data, noise, leads, (), gross=False)
+    for lead, fit in whole:
+        assert fit is not None
+        start = np.concatenate([base.value, [0.0], lead.shape])
+        alone = refine(base.model.adding(lead.effect), data, noise, start)
+        assert fit.chi2 == pytest.approx(alone.chi2, abs=0.1)
+    (_, best), (_, rival) = near
+    assert best is not None
+    assert rival is not None
+    assert whole[0][1] is not None
+    assert best.chi2 == pytest.approx(whole[0][1].chi2, abs=1.0)
+    assert rival.chi2 > best.chi2 + 50.0
+    assert not rival.converged

@@ -1,0 +1,72 @@
+"""The misfit beyond the noise, and its consequences for names and errors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.remainder import Remainder, remainder_of
+from pendpipe.effects.model import Model
+
+from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, null_fit, other_engine, prepared, white
+
+
+def left_by(extra: FloatArray) -> tuple[Fit, Remainder]:
+    """Eq. 8 fitted to itself, noise, and something more."""
+    data, noise = prepared(other_engine(TRUTH) + white(4) + extra)
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    return fit, remainder_of(fit, data, noise)
+
+
+def test_noise_alone_leaves_nothing_and_enlarges_no_error() -> None:
+    found = remainder_of(*null_fit())
+    assert not found.systematic
+    assert found.error_scale == 1.0
+    assert found.worth(20.0) == 20.0
+    assert found.over_noise == pytest.approx(1.0, abs=4.0 / math.sqrt(2 * len(TIME_S)))
+
+
+@pytest.mark.parametrize(
+    ("where", "extra"),
+    [
+        ("harmonics", 4e-4 * np.cos(3.0 * 2.0 * np.pi * 0.9 * TIME_S)),
+        ("offset", 6e-4 * np.sin(2.0 * np.pi * 0.02 * TIME_S)),
+        ("between", 4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S)),
+    ],
+)
+def test_the_misfit_is_located_where_it_was_put(where: str, extra: FloatArray) -> None:
+    """Its mean square adds to the noise's, and nine tenths of it are there."""
+    _, found = left_by(extra)
+    expected = math.sqrt(1.0 + np.mean(extra**2) / NOISE_RAD**2)
+    assert found.systematic
+    assert found.over_noise == pytest.approx(expected, rel=0.05)
+    assert found.shares[where] > 0.9
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+
+
+def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
+    _, small = left_by(4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
+    _, large = left_by(8e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
+    assert large.error_scale == pytest.approx(2.0 * small.error_scale, rel=0.2)
+    assert small.error_scale > small.over_noise
+    assert large.numbers < 30.0
+
+
+@given(
+    gain=st.floats(0.0, 1e6),
+    more=st.floats(1.0, 10.0),
+    excess=st.floats(1.0, 1e6),
+    numbers=st.floats(2.0, 500.0),
+)
+def test_a_gain_is_worth_no_more_than_itself_and_a_larger_one_no_less(
+    gain: float, more: float, excess: float, numbers: float
+) -> None:
+    left = Remainder(excess, 3.0, numbers)
+    assert 0.0 <= left.worth(gain) <= gain
+    assert left.worth(more * gain) >= left.worth(gain)

@@ -1,0 +1,273 @@
+"""The diagnosis as a whole: the right effect, the right size, and nothing from noise."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.values import effect_parameters
+from pendpipe.effects.baseline import OFFSET, OMEGA, B, pendulum_of
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+from .decays import rounded
+from .records import (
+    FREQUENCY_HZ,
+    LATER_S,
+    LINEAR,
+    NOISE_RAD,
+    TIME_S,
+    TRUTH,
+    VALUES,
+    classes_found,
+    diagnosed,
+    other_engine,
+    recording,
+    white,
+)
+
+NAMES = tuple(VALUES)
+
+
+def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> None:
+    seeds = range(1, 9)
+    alarms = sum(diagnosed("null", seed).diagnosis.p_value < 0.01 for seed in seeds)
+    assert alarms <= binom.ppf(0.999, len(seeds), 0.01)
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: int) -> None:
+    found = diagnosed("null", seed).diagnosis
+    assert (found.verdict == "consistent") == (found.p_value > 0.01) == (found.effects == ())
+    assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=4.0 / np.sqrt(2 * 1500))
+    for name, truth in (("frequency", FREQUENCY_HZ), ("offset", TRUTH[OFFSET])):
+        estimate = found.baseline.parameters[name]
+        assert abs(estimate.value - truth) < 4.0 * estimate.sd
+
+
+def test_a_coarse_step_that_does_no_harm_leaves_the_record_consistent() -> None:
+    """Noise far below the step, and amplitudes far above it: p is that of the verdict."""
+    step = 7.9e-5
+    readings = rounded(other_engine(TRUTH) + white(1, rms=0.05 * step), step)
+    found = diagnose_recording(Recording(TIME_S, readings, "angle_rad", resolution=step)).diagnosis
+    assert found.verdict == "consistent"
+    assert found.p_value > 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_is_named(name: str) -> None:
+    """It leads, or is in the leader's class; and nothing else is reported."""
+    outcome = diagnosed(name)
+    assert outcome.diagnosis.verdict == "missing-physics"
+    assert len(outcome.diagnosis.effects) == 1
+    assert name in classes_found(outcome)[0]
+    assert outcome.diagnosis.effects[0].p_value < 0.01
+    assert outcome.diagnosis.p_value < 0.01
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if not by_identifier(name).parameter_free])
+def test_its_parameters_are_those_that_were_put_in(name: str) -> None:
+    """Even where another effect of its class leads."""
+    rivals = diagnosed(name).search.steps[0].rivals
+    rival = next(rival for rival in rivals if rival.identifier == name)
+    found = effect_parameters(rival.fit, rival.lead.effect)
+    for parameter, truth in zip(rival.lead.effect.parameters, VALUES[name], strict=True):
+        estimate = found[parameter.name]
+        assert estimate.sd > 0.0
+        assert abs(estimate.value - truth) < 4.0 * estimate.sd
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_improved_model_leaves_noise(name: str) -> None:
+    found = diagnosed(name).diagnosis
+    assert found.unexplained_p_value > 0.001
+    assert found.improved.chi2_per_dof == pytest.approx(1.0, abs=4.0 * np.sqrt(2 / 1500))
+    assert found.improved.chi2_per_dof < found.baseline.chi2_per_dof
+    assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=0.08)
+    assert found.effects[0].delta_chi2 > 30.0
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "truth"),
+    [
+        ("circular-error", "frequency", TRUTH[OMEGA] / (2.0 * np.pi)),
+        ("sensor-quadratic", "offset", TRUTH[OFFSET]),
+        ("equilibrium-step", "offset", TRUTH[OFFSET]),
+    ],
+)
+def test_the_missing_effect_had_biased_the_fit(name: str, parameter: str, truth: float) -> None:
+    found = diagnosed(name).diagnosis
+    before, after = found.baseline.parameters[parameter], found.improved.parameters[parameter]
+    assert abs(before.value - truth) > 5.0 * before.sd
+    assert abs(after.value - truth) < 4.0 * after.sd
+    assert abs(after.value - truth) < abs(before.value - truth)
+
+
+def test_lost_samples_are_counted_where_they_were_lost() -> None:
+    outcome = diagnosed("dropped-samples")
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["dropped-samples"]
+    effect = outcome.diagnosis.effects[0]
+    assert effect.parameters["samples"].value == 3.0
+    assert effect.location.time_s is not None
+    low, high = effect.location.time_s
+    assert low - 0.6 < 700 / 15.0 < high + 0.6
+    assert outcome.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+
+
+def test_two_effects_are_both_named() -> None:
+    outcome = diagnosed("two")
+    classes = classes_found(outcome)
+    assert len(classes) == 2
+    assert sum("equilibrium-step" in names for names in classes) == 1
+    assert sum("tone-pickup" in names for names in classes) == 1
+    assert outcome.diagnosis.unexplained_p_value > 0.001
+
+
+def test_what_happens_twice_is_reported_twice_each_with_its_own_size_and_instant() -> None:
+    effects = diagnosed("two steps").diagnosis.effects
+    assert [effect.identifier for effect in effects] == ["equilibrium-step"] * 2
+    size, instant_s = VALUES["equilibrium-step"]
+    for effect, sign, at_s in zip(effects, (1.0, -0.5), (instant_s, LATER_S), strict=True):
+        jump, time_s = effect.parameters["J"], effect.parameters["time"]
+        assert abs(jump.value - sign * size) < 4.0 * jump.sd
+        assert abs(time_s.value - at_s) < 4.0 * time_s.sd
+
+
+def test_a_viscous_baseline_lacks_coulomb_friction() -> None:
+    truth = LINEAR.copy()
+    truth[2] = 3e-4
+    outcome = diagnose_recording(recording(other_engine(truth), 3), baseline="viscous")
+    effect = outcome.diagnosis.effects[0]
+    assert effect.identifier == "coulomb-friction"
+    (estimate,) = effect.parameters.values()
+    assert abs(estimate.value - 3e-4) < 4.0 * estimate.sd
+    assert len(outcome.diagnosis.effects) == 1
+
+
+def test_a_viscous_pendulum_is_consistent_with_a_viscous_baseline() -> None:
+    outcome = diagnose_recording(recording(other_engine(LINEAR), 4), baseline="viscous")
+    assert outcome.diagnosis.verdict == "consistent"
+    linear = outcome.diagnosis.baseline.parameters["b"]
+    assert abs(linear.value - LINEAR[B]) < 4.0 * linear.sd
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_wrong_prediction_of_the_loss_is_corrected_to_the_truth(factor: float) -> None:
+    """If only b was given, and wrong, b is released and comes out right."""
+    given = {"b": factor * float(TRUTH[B])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["parameter-b"]
+    assert outcome.diagnosis.effects[0].kind == "parameter"
+    found = outcome.diagnosis.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+def test_a_right_prediction_is_consistent() -> None:
+    given = {"a": float(TRUTH[0]), "b": float(TRUTH[B]), "c": float(TRUTH[2])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert outcome.diagnosis.verdict == "consistent"
+    assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
+
+
+def quality_factor(rate: float) -> float:
+    """Of a part of b, 1/s, by itself."""
+    return float(np.pi * FREQUENCY_HZ / rate)
+
+
+@pytest.mark.parametrize("part", ["hysteretic", "viscous"])
+def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
+    """One part given by itself, and too large, is reported; b was free to be larger only."""
+    name = f"quality_factor_{part}"
+    given = {name: quality_factor(1.2 * float(TRUTH[B]))}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert [effect.identifier for effect in outcome.diagnosis.effects] == [f"parameter-{name}"]
+    least = outcome.diagnosis.baseline.parameters["b"]
+    assert least.at_bound
+    assert least.value == pytest.approx(1.2 * TRUTH[B], rel=1e-4)  # by the apparent frequency
+    found = outcome.diagnosis.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+@pytest.mark.parametrize(("part", "share"), [("hysteretic", 0.4), ("viscous", 0.6)])
+def test_a_part_of_the_loss_is_held_while_the_other_is_fitted(part: str, share: float) -> None:
+    rate = share * float(TRUTH[B])
+    given = {f"quality_factor_{part}": quality_factor(rate)}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert outcome.diagnosis.verdict == "consistent"
+    fit = outcome.search.baseline
+    kept = getattr(pendulum_of(fit.value), part)
+    assert kept == pytest.approx(rate, rel=1e-4)  # by the apparent frequency
+    found = outcome.diagnosis.baseline.parameters["b"]
+    assert 0.0 < abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
+    given = {"quality_factor_viscous": quality_factor(1.1 * float(LINEAR[B]))}
+    record = recording(other_engine(LINEAR), 4)
+    outcome = diagnose_recording(record, baseline="viscous", fixed=given)
+    names = [effect.identifier for effect in outcome.diagnosis.effects]
+    assert names == ["parameter-quality_factor_viscous"]
+    held = outcome.diagnosis.baseline.parameters["b"]
+    assert held.sd == 0.0
+
+
+@pytest.mark.parametrize("given", [{"c": 1.0}, {"mass": 1.0}, {"b": -0.1}])
+def test_what_cannot_be_held_is_refused_in_one_line(given: dict[str, float]) -> None:
+    """A friction that stops the pendulum at once, no parameter, and a gain of energy."""
+    with pytest.raises(InputError, match="; "):
+        diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
+def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> None:
+    for effect in diagnosed(name).diagnosis.effects:
+        rest = sum(probability for _, probability in effect.indistinguishable)
+        assert effect.probability > 0.0
+        assert effect.probability + rest <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
+def test_the_result_is_json_without_nan(name: str) -> None:
+    content = diagnosed(name).diagnosis.to_dict()
+    again = json.loads(json.dumps(content, allow_nan=False))
+    assert set(again) >= {
+        "schema_version",
+        "baseline",
+        "noise_rms_rad",
+        "verdict",
+        "p_value",
+        "effects",
+        "improved",
+        "held_out",
+        "unexplained",
+        "statement",
+        "figures",
+        "provenance",
+    }
+    for effect in again["effects"]:
+        assert set(effect) >= {
+            "id",
+            "name",
+            "kind",
+            "equation",
+            "parameters",
+            "delta_chi2",
+            "p_value_global",
+            "probability",
+            "indistinguishable_from",
+            "deciding_measurement",
+            "location",
+        }
+        assert effect["deciding_measurement"]
+        assert effect["location"]["summary"]
+
+
+def test_the_seed_decides_the_draws_and_nothing_else() -> None:
+    record = recording(other_engine(TRUTH), 1)
+    again = diagnose_recording(record).diagnosis
+    assert again.to_dict() == diagnosed("null").diagnosis.to_dict()

@@ -1,0 +1,103 @@
+"""The rivals that share the probability of an effect: those that the final noise allows."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.chance import Chance, Trials
+from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.evidence import Rival, class_width, evidence, probabilities
+from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.run import Outcome
+from pendpipe.diagnosis.weighing import weigh
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.curves import CURVES
+from pendpipe.effects.model import Model
+
+from .records import (
+    INSTANT_S,
+    INTERVAL_S,
+    TIME_S,
+    TRUTH,
+    null_fit,
+    recording,
+)
+
+JUMP_RAD = 1e-3
+"""Ten times the noise of a reading: so large that the jump is taken for red noise at first."""
+
+
+@functools.cache
+def jumped() -> Outcome:
+    """The equilibrium jumps; the estimate of the noise changes with the model."""
+    model = Model(TIME_S, INTERVAL_S, (by_identifier("equilibrium-step"),))
+    return diagnose_recording(recording(model.reading(np.append(TRUTH, [JUMP_RAD, INSTANT_S])), 3))
+
+
+def rival(effect: Effect, worth: float) -> Rival:
+    """An effect that gains so much, its scan not counted."""
+    return Rival(Lead(effect, (), 0.0, 0.0), null_fit()[0], worth, worth)
+
+
+def test_a_jump_that_was_seen_through_red_noise_has_no_rival_when_that_is_gone() -> None:
+    """Its gain grows by more than ten, and the distances from it as much."""
+    (step,) = jumped().search.steps
+    (effect,) = jumped().diagnosis.effects
+    assert effect.identifier == "equilibrium-step"
+    assert effect.delta_chi2 > 10.0 * step.winner.gain
+    assert effect.indistinguishable == ()
+    assert effect.probability > 0.9
+
+
+@pytest.mark.parametrize("place", range(1, 4))
+def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
+    place: int,
+) -> None:
+    found = jumped().search
+    (step,) = found.steps
+    weighed = weigh(found, jumped().beginning, step)
+    one = step.rivals[place]
+    own = one.fit.value[len(TRUTH) :]
+    start = np.append(weighed.without.value, own)
+    model = weighed.without.model.adding(one.lead.effect)
+    fit = refine(model, found.data, found.noise, start, held=found.held)
+    behind = fit.chi2 - found.improved.chi2
+    assert behind > step.winner.gain - one.gain
+    width = class_width(replace(step.winner, gain=weighed.gain))
+    assert (one.identifier in {mate.identifier for mate in weighed.mates}) == (behind < width)
+
+
+@pytest.mark.parametrize("loss", [1.0, 30.0, 3e4])
+def test_a_negative_gain_stays_negative(loss: float) -> None:
+    """Later, under a smaller noise, it must not be credited with what it had lost."""
+    fit, _, _ = null_fit()
+    lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
+    worth = evidence(lead, fit, -loss, Chance(Trials(1.0, 0.0), {}))
+    assert worth == pytest.approx(-loss)
+    later = Rival(lead, fit, -loss, worth).reaching(fit, -0.5 * loss)
+    assert later.evidence == pytest.approx(-0.5 * loss)
+
+
+@pytest.mark.parametrize("gain", [1e4, 1e5, 1e6])
+def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
+    """Circular error has a higher prior than a cubic torque; but not if it is far behind."""
+    cubic = rival(by_identifier("cubic-stiffness"), gain)
+    near, far = (rival(by_identifier("circular-error"), gain - behind) for behind in (0.0, 101.0))
+    own, other, _ = probabilities([cubic, near], gain - 5.0)
+    assert other > 2.0 * own
+    own, other, _ = probabilities([cubic, far], gain - 5.0)
+    assert other <= own
+
+
+def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
+    """A real law differs from the catalogue's form by more than that at a gain of 10^5."""
+    curve = rival(CURVES[0](null_fit()[0].at.span), 1e5)
+    name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
+    drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)
+    assert named > drawn
