@@ -248,7 +248,11 @@ def _of_one_run(
     """Of runs side by side, each with its own time column, keep one; name the others."""
     if time is None:
         return channels, ""
-    clocks = [c.number for c in channels if roles[c.number] == "time" and _moves(c)]
+    clocks = [
+        c.number
+        for c in channels
+        if _moves(c) and (roles[c.number] == "time" or _same_as(time.values, c.values))
+    ]
     if any(c.number < time.number and _WORTH[roles[c.number]] > 0.5 for c in channels):
         return channels, ""  # several clocks of one run, behind its readings
     end = min((number for number in clocks if number > time.number), default=None)
@@ -260,6 +264,12 @@ def _of_one_run(
     wanted = [c.number - time.number for c in mine]
     others = [c.label for c in channels if any(c.number - number in wanted for number in clocks)]
     return mine, listed(others, 6)
+
+
+def _same_as(clock: FloatArray, values: FloatArray) -> bool:
+    """Say whether a column without a name repeats the clock, as far as it goes."""
+    filled = np.isfinite(values)
+    return len(clock) == len(values) and bool(np.array_equal(values[filled], clock[filled]))
 
 
 def _evenness(finite: FloatArray) -> float:
@@ -299,7 +309,7 @@ def _readings(
     equals = [entry[1] for entry in candidates if entry[0] == most]
     chosen, why = _of_equals(equals, swings)
     clock = time.values if time is not None else None
-    if len(chosen) == 1:
+    if len(chosen) == 1 and not why:
         chosen, why = _not_a_derivative(chosen[0], alive, clock, roles, why)
     labels = " and ".join(f"'{column.label}'" for column in chosen)
     others = [column.label for column in channels if column not in chosen]

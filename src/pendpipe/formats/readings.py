@@ -182,8 +182,7 @@ def _by_size(
     """Judge by how far it swings, and by whether the period follows the amplitude."""
     named = choice.roles.get(column.number) == "angle"
     # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
-    turns = _jumps_of_a_turn(finite) and float(np.ptp(finite)) < 2.02 * np.pi
-    if turns:
+    if _jumps_of_a_turn(finite):
         return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
     if reach > 1.1 * np.pi:
         slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 170 else None
@@ -216,19 +215,37 @@ def _by_size(
 
 
 def _by_step(finite: FloatArray) -> _Guess | None:
-    """Read the unit off the step: a part of a turn, or a printed digit of the other unit."""
+    """Read the unit off the step: a printed digit of the other unit, or a part of a turn."""
+    if _printed_digit(finite, 1.0) is None:
+        for unit, scale, name, other in (
+            (_RADIAN, 180 / np.pi, "radians", "degrees"),
+            (_DEGREE, np.pi / 180, "degrees", "radians"),
+        ):
+            digit = _printed_digit(finite, scale)
+            if digit is not None:
+                return _Guess(unit, f"is taken to be in {name} (its step is {digit:.4g} {other})")
     step = resolution(finite)
     if step is None or _is_round(step):
         return None
-    in_degrees = step * 180 / np.pi
-    if step < 0.1 and _is_round(in_degrees):
-        return _Guess(_RADIAN, f"is taken to be in radians (its step is {in_degrees:.4g} degrees)")
     for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
         parts = turn / step
         whole = round(parts)
         near = abs(parts - whole) < 1e-6 * whole + 1e-4
         if near and 100 <= whole <= 1 << 20 and (whole % 4 == 0 or whole % 50 == 0):
             return _Guess(unit, f"is taken to be in {name} (its step is a turn over {whole})")
+    return None
+
+
+def _printed_digit(finite: FloatArray, scale: float) -> float | None:
+    """Find the decimal place of which all readings, times `scale`, are multiples."""
+    some = scale * finite[:: max(1, len(finite) // 2000)]
+    if len(some) < 20:
+        return None
+    for place in range(7):
+        whole = some * 10.0**place
+        # Of readings that have no such digit a few in a hundred are this near to one.
+        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
+            return 10.0**-place
     return None
 
 
@@ -273,7 +290,9 @@ def _ratio(one: FloatArray, other: FloatArray) -> float | None:
 
 
 def _jumps_of_a_turn(values: FloatArray) -> bool:
-    """Say whether neighbouring readings (radians) lie a turn apart."""
+    """Say whether readings (radians) stay within a turn, and neighbours lie a turn apart."""
+    if len(values) < 2 or np.ptp(values) > 2.02 * np.pi:
+        return False
     jumps = np.abs(np.diff(values))
     return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
 

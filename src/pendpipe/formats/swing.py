@@ -178,4 +178,4 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     if not 0.0 < both < _ABSURD:
         return None
     product = float(rate @ other)
-    return product / float(rate @ rate) if abs(product) > 0.8 * np.sqrt(both) else None
+    return product / float(rate @ rate) if abs(product) > 0.9 * np.sqrt(both) else None

@@ -137,6 +137,8 @@ def _without_cut_row(
     final, rows = layout.split(lines[last]), [layout.split(line) for line in others]
     short = len(final) < min(map(len, rows))
     ended = last < len(lines) - 1
+    if not ended and not final[-1] and all(row[-1] for row in rows):
+        short = True
     if not short and not ended and len(final) == len(rows[-1]) and layout.is_number(final[-1]):
         sizes = [_size(row[-1], layout) for row in rows if layout.is_number(row[-1])]
         letters, decimals = _size(final[-1], layout)

@@ -1,0 +1,481 @@
+"""Kinds of files that laboratories write, each made here, and what must be read from them."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from scipy.io import savemat
+
+from pendpipe.cli import main
+from pendpipe.errors import InputError
+from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.recording import Recording
+
+from .decays import Floats, swing
+
+TIME, ANGLE = swing(1500, 30.0, 0.5)
+RATE = np.gradient(ANGLE, TIME)
+
+
+def text(*columns: Floats, sign: str = ",", digits: int = 6, head: str = "") -> str:
+    rows = zip(*columns, strict=True)
+    return head + "".join(sign.join(f"{x:.{digits}f}" for x in row) + "\n" for row in rows)
+
+
+def read_text(tmp_path: Path, content: str | bytes, name: str = "a.txt") -> Recording:
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read(path)
+
+
+def same(recording: Recording, values: Floats = ANGLE, time: Floats = TIME) -> None:
+    np.testing.assert_allclose(recording.time_s - recording.time_s[0], time - time[0], atol=2e-3)
+    np.testing.assert_allclose(recording.values, values, atol=2e-4)
+
+
+# --- the times -----------------------------------------------------------------------------
+
+
+def test_times_of_three_digits_are_counted_from_the_rows(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.2E}\t{x:.5f}\n" for t, x in zip(TIME, ANGLE, strict=True))
+    recording = read_text(tmp_path, "t\ttheta\n" + rows)
+    assert len(recording) == len(TIME)
+    np.testing.assert_allclose(recording.time_s, TIME, atol=0.01)
+    assert any("rows are counted at 30" in note for note in recording.notes)
+
+
+def test_frames_that_are_missing_among_such_times_are_found(tmp_path: Path) -> None:
+    kept = np.delete(np.arange(len(TIME)), [100, 101, 640])
+    rows = "".join(f"{TIME[row]:.2E}\t{ANGLE[row]:.5f}\n" for row in kept)
+    recording = read_text(tmp_path, "t\ttheta\n" + rows)
+    # The place of a lost frame is known to a few rows, their number exactly.
+    np.testing.assert_allclose(recording.time_s, TIME[kept], atol=0.08)
+    assert recording.time_s[-1] == pytest.approx(TIME[-1], abs=0.04)
+    assert any("with 3 missing" in note for note in recording.notes)
+
+
+def test_the_newest_row_may_stand_first(tmp_path: Path) -> None:
+    recording = read_text(tmp_path, text(TIME[::-1], ANGLE[::-1], head="t,theta\n"))
+    same(recording)
+    assert any("newest row" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(("factor", "name"), [(1.0, "seconds"), (1e3, "milliseconds")])
+def test_a_clock_may_count_since_1970(tmp_path: Path, factor: float, name: str) -> None:
+    stamps = np.rint(factor * 1e3 * (1.7e9 + TIME)) / 1e3
+    recording = read_text(tmp_path, text(stamps, ANGLE, head="TM,theta\n"))
+    same(recording)
+    assert any(f"{name} since 1970" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize("form", ["0:{m}:{s:.3f}", "'0:{m}:{s:.3f}", "{m:02d}:{s:06.3f}"])
+def test_a_time_of_day_may_be_written_in_any_length(tmp_path: Path, form: str) -> None:
+    rows = [
+        form.format(m=int(t // 60), s=t % 60) + f"\t{x:.6f}"
+        for t, x in zip(TIME, ANGLE, strict=True)
+    ]
+    same(read_text(tmp_path, "time\ttheta (rad)\n" + "\n".join(rows) + "\n"))
+
+
+def test_rows_with_the_time_of_an_older_row_are_left_out(tmp_path: Path) -> None:
+    lines = text(TIME, ANGLE, -ANGLE, head="t,theta,other\n").splitlines()
+    for row in (300, 500, 900):
+        lines[row] = lines[row - 2]
+    recording = read_text(tmp_path, "\n".join(lines) + "\n")
+    assert len(recording) == len(TIME) - 3
+    assert any("3 row(s) that repeat the time" in note for note in recording.notes)
+
+
+def test_steps_of_ten_are_seconds_and_said_first(tmp_path: Path) -> None:
+    slow = np.arange(0, 15000, 10.0)
+    unnamed = read_text(tmp_path, text(slow, np.sin(2 * np.pi * slow / 217), digits=4))
+    assert unnamed.time_s[-1] == slow[-1]
+    assert any("a period of 217" in guess for guess in unnamed.weak_guesses)
+
+
+def test_microcontroller_milliseconds_are_a_guess(tmp_path: Path) -> None:
+    rows = "".join(f"{round(1e3 * t)},{x:.5f}\n" for t, x in zip(TIME, ANGLE, strict=True))
+    recording = read_text(tmp_path, "t,theta (rad)\n" + rows)
+    same(recording)
+    assert any("milliseconds" in guess for guess in recording.weak_guesses)
+
+
+def test_a_clock_that_rounds_is_no_gap(tmp_path: Path) -> None:
+    time = np.rint(1e3 * np.arange(1500) * 0.0503) / 1e3
+    (tmp_path / "a.csv").write_text(text(time, ANGLE, digits=3, head="t (s),theta (rad)\n"))
+    assert inspect(tmp_path / "a.csv").gaps == ()
+
+
+def test_runs_below_one_another_are_not_one_run(tmp_path: Path) -> None:
+    half = len(TIME) // 2
+    rows = text(
+        np.tile(TIME[:half], 2),
+        np.concatenate((ANGLE[:half], 0.8 * ANGLE[:half])),
+        head="t (s),theta (rad)\n",
+    )
+    recording = read_text(tmp_path, rows)
+    assert len(recording) == half
+    assert "2 runs stand below one another" in recording.weak_guesses[0]
+
+
+# --- the column ----------------------------------------------------------------------------
+
+
+def test_a_header_with_commas_may_stand_over_rows_with_tabs(tmp_path: Path) -> None:
+    drive = np.where(TIME < 10, np.sin(5 * TIME), 0.0)
+    rows = text(TIME, drive, ANGLE, sign="\t", head="--- torsione ---\nTempo,Forzante,Pendolo\n")
+    same(read_text(tmp_path, rows))
+
+
+def test_without_names_the_drive_is_not_the_pendulum(tmp_path: Path) -> None:
+    drive = np.where(TIME < 30, np.sin(5 * TIME), 0.0)
+    recording = read_text(tmp_path, text(TIME, drive, ANGLE))
+    same(recording)
+    assert "whose swing decays" in " ".join((*recording.notes, *recording.weak_guesses))
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_without_names_the_derivative_is_not_the_pendulum(
+    tmp_path: Path, order: tuple[int, int]
+) -> None:
+    columns = (ANGLE, RATE)
+    recording = read_text(tmp_path, text(TIME, columns[order[0]], columns[order[1]]))
+    same(recording)
+    assert any("whose derivative" in note for note in recording.notes)
+
+
+def test_neither_row_counter_nor_error_is_the_reading(tmp_path: Path) -> None:
+    count = np.arange(len(TIME), dtype=float)
+    error = 1e-3 * (1 + np.abs(RATE))
+    head = "Pt#,Seconds,X',Laser\n"
+    recording = read_text(tmp_path, text(count, TIME, error, 1e-3 * ANGLE, head=head))
+    np.testing.assert_allclose(recording.values, 1e-3 * ANGLE, atol=1e-6)
+
+
+def test_runs_side_by_side_are_offered_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = ["t1;theta1;omega1;t2;theta2;omega2"]
+    for row in range(len(TIME)):
+        one = f"{TIME[row]:.4f};{ANGLE[row]:.6f};{RATE[row]:.4f}"
+        two = f"{TIME[row]:.4f};{2 * ANGLE[row]:.6f};{2 * RATE[row]:.4f}" if row < 900 else ";;"
+        rows.append(f"{one};{two}")
+    path.write_text("\n".join(rows) + "\n")
+    same(read(path))
+    assert any("--column: theta2" in note for note in read(path).notes)
+    for options in (ReadOptions(column="theta2"), ReadOptions(channel="theta2")):
+        same(read(path, options), 2 * ANGLE[:900], TIME[:900])
+
+
+def test_pixels_from_a_corner_are_no_angle_about_it(tmp_path: Path) -> None:
+    x, y = 640 + 60 * ANGLE, 480 - 3 * ANGLE**2
+    recording = read_text(tmp_path, text(TIME, x, y, digits=2, head="t,x,y\n"))
+    assert (recording.quantity, recording.unit) == ("reading", "1")
+    assert "analysed in its own" in recording.weak_guesses[0]
+    np.testing.assert_allclose(recording.values, x, atol=0.01)
+
+
+# --- the unit ------------------------------------------------------------------------------
+
+
+def test_a_step_of_an_encoder_or_of_the_other_unit_gives_the_unit(tmp_path: Path) -> None:
+    small = 0.2 * ANGLE
+    count = 2 * np.pi / 4096
+    recording = read_text(tmp_path, text(TIME, count * np.rint(small / count), digits=9))
+    assert any("a turn over 4096" in note for note in recording.notes)
+    same(recording, small, TIME) if count < 2e-4 else None
+    count = 360 / 4096
+    recording = read_text(tmp_path, text(TIME, count * np.rint(np.degrees(small) / count)))
+    np.testing.assert_allclose(recording.values, small, atol=1e-3)
+    assert not any("--unit" in guess for guess in recording.weak_guesses)
+    printed = np.radians(np.rint(1e5 * np.degrees(small)) / 1e5)
+    recording = read_text(
+        tmp_path, text(TIME, printed, digits=12, head="x\ty\n".replace("\t", ","))
+    )
+    assert any("its step is 1e-05 degrees" in note for note in recording.notes)
+    assert recording.quantity == "angle_rad"
+
+
+@pytest.mark.parametrize("factor", [1.0, 180 / np.pi])
+def test_the_period_gives_the_unit_of_a_large_swing(tmp_path: Path, factor: float) -> None:
+    recording = read_text(tmp_path, text(TIME, factor * ANGLE, sign=" "))
+    same(recording)
+    assert not recording.weak_guesses
+
+
+def test_an_angle_beside_it_or_its_rate_gives_the_unit(tmp_path: Path) -> None:
+    small = np.degrees(0.03 * ANGLE)
+    rate = np.radians(np.gradient(small, TIME))
+    recording = read_text(tmp_path, text(TIME, small, rate, head="t,theta,omega (rad/s)\n"))
+    np.testing.assert_allclose(recording.values, 0.03 * ANGLE, atol=1e-6)
+    assert not recording.weak_guesses
+
+
+def test_what_nothing_gives_away_is_the_first_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text(TIME, 0.1 * ANGLE, head="t,theta\n"))
+    assert main(["inspect", str(path)]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == "a guess: 'theta' has no unit: taken to be radians (--unit)"
+    assert not read(path, ReadOptions(unit="rad")).weak_guesses
+
+
+def test_a_header_that_contradicts_the_period_is_doubted_first(tmp_path: Path) -> None:
+    time, angle = swing(1500, 30.0, 1.1)
+    recording = read_text(tmp_path, text(time, angle, head="t (s),theta (deg)\n"))
+    np.testing.assert_allclose(recording.values, angle, atol=1e-6)
+    assert "headed in degrees" in recording.weak_guesses[0]
+
+
+@pytest.mark.parametrize("amplitude", [8.0, 150.0])
+def test_a_torsion_pendulum_may_swing_beyond_pi(tmp_path: Path, amplitude: float) -> None:
+    wheel = amplitude * np.exp(-0.05 * TIME) * np.cos(3 * TIME)
+    recording = read_text(tmp_path, text(TIME, wheel, head="t (s),theta (rad)\n"))
+    np.testing.assert_allclose(recording.values, wheel, atol=1e-5)
+    assert recording.unit == "rad"
+
+
+@pytest.mark.parametrize("level", [np.pi, 5.46, -1.2])
+def test_it_may_hang_anywhere(tmp_path: Path, level: float) -> None:
+    recording = read_text(tmp_path, text(TIME, ANGLE + level, head="t (s),theta (rad)\n"))
+    values = recording.values
+    np.testing.assert_allclose(values - values.mean(), ANGLE - ANGLE.mean(), atol=1e-5)
+
+
+# --- containers ----------------------------------------------------------------------------
+
+
+def test_simulinks_structure_with_time_and_nested_structures(tmp_path: Path) -> None:
+    signals = np.zeros((2,), dtype=[("values", object), ("label", object)])
+    signals[0] = ((np.ones((len(TIME), 1))), "Switch")
+    signals[1] = (ANGLE[:, None], "PendPos")
+    log = {"time": TIME[:, None], "signals": signals, "blockName": "model/Scope"}
+    savemat(tmp_path / "a.mat", {"ScopeData": log})
+    same(read(tmp_path / "a.mat"))
+    savemat(
+        tmp_path / "b.mat", {"Fe": {"Out": {"Time": TIME, "Acc": np.vstack([ANGLE, 0.8 * ANGLE])}}}
+    )
+    recording = read(tmp_path / "b.mat")
+    assert (recording.quantity, recording.unit) == ("reading", "1")
+    np.testing.assert_allclose(recording.values, ANGLE)
+
+
+def test_cassy_as_text_and_as_labx(tmp_path: Path) -> None:
+    head = (
+        "\ufeffMIN=0\t-1\t-3,2\r\r\nMAX=50\t1\t3,2\r\r\nSCALE=50\t0,5\t1\r\r\nDEC=1\t3\t2\r\r\n"
+        'DEF="Zeit" t / s\t"Spannung" U / V\t"Winkel" &j / rad\r\r\n'
+    )
+    rows = text(TIME, 0 * TIME, ANGLE, sign="\t").replace(".", ",").replace("\n", "\r\r\n")
+    same(read_text(tmp_path, head + rows))
+
+    def channel(name: str, symbol: str, unit: str, values: Floats) -> str:
+        cells = "".join(f"<value>{x:.6f}</value>" for x in values)
+        return (
+            f"<channels count='1'><channel><quantity>{name}</quantity><symbol>{symbol}</symbol>"
+            f"<unit>{unit}</unit><values>{cells}</values></channel></channels>"
+        )
+
+    count = np.arange(1.0, len(TIME) + 1)
+    xml = (
+        "<?xml version='1.0' encoding='utf-8'?><cassylab xml:lang='de-DE'><allchannels count='3'>"
+        + channel("Index", "n", "", count)
+        + channel("Zeit", "t", "s", TIME)
+        + channel("Winkel", "&amp;b", "rad", ANGLE)
+        + "</allchannels></cassylab>"
+    )
+    same(read_text(tmp_path, xml, "a.labx"))
+    assert inspect(tmp_path / "a.labx").format == "cassy-labx"
+
+
+def test_logger_pro(tmp_path: Path) -> None:
+    def column(name: str, unit: str, values: Floats) -> str:
+        cells = "\n".join(f"{x:.6f}" for x in values)
+        return (
+            f"<DataColumn><DataObjectName>{name}</DataObjectName><ColumnUnits>{unit}</ColumnUnits>"
+            f"<ColumnCells>\n{cells}\n</ColumnCells></DataColumn>"
+        )
+
+    columns = column("Time", "s", TIME) + column("Angle", "rad", ANGLE)
+    xml = f"<Document><DataSet>{columns}</DataSet></Document>"
+    same(read_text(tmp_path, xml, "a.cmbl"))
+
+
+def tracker(start: int = 3, tilt: float = 0.0) -> str:
+    """A project of Tracker: pixels of a bob 400 px below the origin (320, 40)."""
+    marks = []
+    for row, x in enumerate(ANGLE + np.radians(tilt)):
+        px, py = 320 + 400 * np.sin(x), 40 + 400 * np.cos(x)
+        marks.append(
+            f'<property name="[{row}]" type="object"><object class="org.opensourcephysics.cabrillo'
+            f'.tracker.PointMass$FrameData"><property name="n" type="int">{row + start}</property>'
+            f'<property name="x" type="double">{px}</property>'
+            f'<property name="y" type="double">{py}</property></object></property>'
+        )
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<object class="org.opensourcephysics.cabrillo.tracker.TrackerPanel">
+<property name="videoclip" type="object"><object class="org.opensourcephysics.media.core.VideoClip">
+<property name="startframe" type="int">{start}</property></object></property>
+<property name="clipcontrol" type="object"><object class="x.StepperClipControl">
+<property name="delta_t" type="double">{1000 / 30}</property></object></property>
+<property name="coords" type="object">
+<object class="org.opensourcephysics.media.core.ImageCoordSystem">
+<property name="framedata" type="array"><property name="[0]" type="object">
+<object class="org.opensourcephysics.media.core.ImageCoordSystem$FrameData">
+<property name="xorigin" type="double">320</property><property name="yorigin" type="double">40
+</property><property name="angle" type="double">{tilt}</property>
+<property name="xscale" type="double">500</property><property name="yscale" type="double">500
+</property></object></property></property></object></property>
+<property name="tracks" type="collection"><property name="item" type="object">
+<object class="org.opensourcephysics.cabrillo.tracker.PointMass">
+<property name="framedata" type="array">{"".join(marks)}</property></object></property></property>
+</object>"""
+
+
+@pytest.mark.parametrize("tilt", [0.0, 5.0])
+def test_trackers_project(tmp_path: Path, tilt: float) -> None:
+    same(read_text(tmp_path, tracker(tilt=tilt), "a.trk"))
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as zipped:
+        zipped.writestr("a.trk", tracker(tilt=tilt))
+    same(read_text(tmp_path, archive.getvalue(), "a.trz"))
+
+
+def test_phyphox_as_zip_and_as_workbook(tmp_path: Path) -> None:
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as zipped:
+        head = '"Time (s)","Tilt (deg)"\n'
+        zipped.writestr("Raw Data.csv", text(TIME, np.degrees(ANGLE), head=head))
+        zipped.writestr("meta/time.csv", '"event","experiment time"\n"START",0.0\n"PAUSE",50.0\n')
+    same(read_text(tmp_path, archive.getvalue(), "a.zip"))
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    sheet.append(["Time (s)", "Tilt (deg)"])
+    for t, x in zip(TIME.tolist(), np.degrees(ANGLE).tolist(), strict=True):
+        sheet.append([t, x])
+    meta = book.create_sheet("Metadata Time")
+    meta.append(["START", 0.0])
+    book.save(tmp_path / "a.xlsx")
+    same(read(tmp_path / "a.xlsx"))
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "said"),
+    [
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><cassylab/>", "a.labx", "no reader knows|entities"),
+        (b"<?xml version='1.0'?><!DOCTYPE x [<!ENTITY a 'b'>]><x/>", "a.labx", "entities"),
+        (b"<?xml version='1.0'?><svg/>", "a.svg", "no reader knows"),
+        (b"<?xml version='1.0'?><cassylab><a>", "a.labx", "the XML is damaged"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600, "a.xls", "old Excel file"),
+        (b"\x89HDF\r\n\x1a\n" + b"\0" * 600, "a.mat", "-v7"),
+    ],
+)
+def test_what_can_not_be_read_is_refused_for_its_reason(
+    tmp_path: Path, content: bytes, name: str, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        read_text(tmp_path, content, name)
+
+
+def test_a_project_of_capstone_and_a_zip_without_a_table_are_refused(tmp_path: Path) -> None:
+    for member, said in (("main.xml", "PASCO Capstone"), ("a.jpg", "no CSV")):
+        archive = io.BytesIO()
+        with zipfile.ZipFile(archive, "w") as zipped:
+            zipped.writestr(member, "<x/>")
+        with pytest.raises(InputError, match=said):
+            read_text(tmp_path, archive.getvalue(), "a.cap")
+
+
+def test_standard_input_and_output(tmp_path: Path) -> None:
+    rows = text(TIME, ANGLE, head="t (s),theta (rad)\n").encode()
+    done = subprocess.run(
+        [sys.executable, "-m", "pendpipe.cli", "convert", "-", "-"],
+        input=rows,
+        capture_output=True,
+        check=True,
+        cwd=tmp_path,
+    )
+    (tmp_path / "plain.csv").write_bytes(done.stdout)
+    same(read(tmp_path / "plain.csv"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plain.csv"]
+    again = subprocess.run(
+        [sys.executable, "-m", "pendpipe.cli", "inspect", "-"],
+        input=done.stdout,
+        capture_output=True,
+        check=True,
+    )
+    assert b"format      plain" in again.stdout
+
+
+# --- cut and hostile files -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cut", [2, 4, 9, 12])
+def test_the_last_row_of_a_cut_file_is_no_sample(tmp_path: Path, cut: int) -> None:
+    whole = text(TIME, ANGLE, head="t (s),theta (rad)\n")
+    recording = read_text(tmp_path, whole[:-cut])
+    assert len(recording) == len(TIME) - 1
+    assert any("cut short" in note for note in recording.notes)
+    # Without its line end alone it is whole.
+    assert len(read_text(tmp_path, whole[:-1])) == len(TIME)
+
+
+def test_devices_pipes_and_huge_files_are_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(InputError, match="a device or a pipe"):
+            read(path)
+    with (tmp_path / "sparse.WDQ").open("wb") as stream:
+        stream.truncate(5 << 30)
+    with pytest.raises(InputError, match=r"5\.4 GB"):
+        read(tmp_path / "sparse.WDQ")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"t,theta\n" + b"1," * 10_000_000 + b"1\n" + b"2," * 10_000_000 + b"2\n", "letters long"),
+        (b"9" * 100_000_000, "letters long"),
+        (b"# nothing\n" * 4_000_000, "no row of numbers|no block of rows"),
+        (b"#\n" * 20_000_000, "no row of numbers|no block of rows"),
+    ],
+    ids=["columns", "line", "remarks", "short remarks"],
+)
+def test_hostile_text_is_refused_in_seconds_and_in_little_memory(
+    tmp_path: Path, content: bytes, said: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    code = (
+        "import resource, sys, time\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))\n"
+        "from pendpipe.errors import InputError\n"
+        "from pendpipe.formats import read\n"
+        "try:\n    read(sys.argv[1])\n"
+        "except InputError as fault:\n    print(fault)\n"
+        "print(time.process_time())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=False
+    )
+    *lines, seconds = done.stdout.splitlines() or [done.stderr[-300:], "99"]
+    assert len(lines) == 1, done.stderr[-300:]
+    assert any(part in lines[0] for part in said.split("|")), lines[0]
+    assert float(seconds) < 10.0
+
+
+def test_the_cells_of_a_workbook_are_counted_before_they_are_read(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
+        row = b"<row>" + b'<c r="A1"><v>1</v></c>' * 100 + b"</row>"
+        archive.writestr("xl/worksheets/sheet1.xml", b"<sheetData>" + row * 60_000)
+    with pytest.raises(InputError, match="more than 3000000 cells"):
+        read(tmp_path / "a.xlsx")
