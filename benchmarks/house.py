@@ -1,13 +1,11 @@
 """The measures of the house: how much code there is, how it hangs together, what it costs.
 
-    python -m benchmarks.house                      # of the working tree's tracked files
-    python -m benchmarks.house --commit 2af5a66     # of that commit beside it
+    python -m benchmarks.house [--commit 2af5a66] [--list]     # that commit beside what is here
 
-The library and the challenge are measured apart. Statements are those of the syntax tree;
-strings that stand alone (docstrings) are not counted. A file's importers are the other files of
-the two packages that name it in an import. A definition is unused if its name stands nowhere
-else in the repository's code, templates and configuration; what a decorator enters into a
-registry counts as used. Duplicates are lines of six or more that have the same shape.
+Strings that stand alone (docstrings) are no statements. A file's importers are the other files of
+the two packages that name it. A definition is unused if its name stands nowhere else in code,
+templates and configuration, and no registry holds it. Lines stand twice if six or more in a row
+have the shape of others.
 """
 
 from __future__ import annotations
@@ -21,24 +19,24 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import time
 import tokenize
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
 from typing import Any, Final
 
 ROOT: Final = Path(__file__).parents[1]
-LONG_LINES, MANY_PARAMETERS, SAME_LINES, SAME_TOKENS = 60, 7, 6, 40
-STARTS: Final = 7
-"""Starts of the interpreter, of which the median is printed."""
+SAME_LINES, SAME_TOKENS = 6, 40
+STARTS: Final = 9
 USES: Final = ("*.py", "*.smk", "Snakefile", "*.html", "*.j2", "*.toml", "*.yaml", "run")
 """Files in which a name may be used."""
 PLAIN: Final = frozenset({"property", "cached_property", "staticmethod", "classmethod", "cache"})
 """Decorators that enter nothing into a registry."""
-PROTOCOLS: Final = frozenset({"from_param"})
-"""Methods that a library calls by name."""
+PROTOCOLS: Final = frozenset({"from_param", "_repr_html_"})
+"""What other code finds by name: methods; and below, all definitions of some modules."""
+REGISTRIES: Final = re.compile(r"effects/catalogue/|turning_points/(plain_)?entries\.py")
 LAYOUT: Final = {getattr(tokenize, k) for k in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT")}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -76,9 +74,9 @@ def importers(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
             wanted: list[str] = []
             if isinstance(node, ast.Import):
                 wanted = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                below = [f"{node.module}.{alias.name}" for alias in node.names]
-                wanted = [name if name in names else node.module for name in below]
+            elif isinstance(node, ast.ImportFrom) and (home := node.module):
+                below = [f"{home}.{alias.name}" for alias in node.names]
+                wanted = [name if name in names else home for name in below]
             for name in names.intersection(wanted):
                 found[name].add(module_name(path))
     return found
@@ -100,22 +98,22 @@ def definitions(module: ast.Module) -> Iterator[tuple[str, int]]:
 def tokens(path: Path) -> list[tokenize.TokenInfo]:
     """A file's tokens without comments, layout and long strings."""
     found = tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
-    return [t for t in found if t.type not in LAYOUT and '"""' not in t.string and t.string]
+    return [t for t in found if t.string and t.type not in LAYOUT and '"""' not in t.string]
 
 
 def unused(tree: Path, trees: dict[Path, ast.Module]) -> list[str]:
     """Definitions whose name stands nowhere else, as ``file:line name``."""
     words: Counter[str] = Counter()
     for path in (path for pattern in USES for path in tree.rglob(pattern)):
-        python = path.suffix == ".py"
-        text = " ".join(t.string for t in tokens(path)) if python else path.read_text("utf-8")
-        words.update(re.findall(r"\w+", text))
+        code = [t.string for t in tokens(path)] if path.suffix == ".py" else [path.read_text()]
+        words.update(re.findall(r"\w+", " ".join(code)))
     own = Counter(name for module in trees.values() for name, _ in definitions(module))
     return [
         f"{path.relative_to(tree)}:{line} {name}"
         for path, module in trees.items()
         for name, line in definitions(module)
         if words[name] <= own[name] and not name.startswith("__") and name not in PROTOCOLS
+        if not REGISTRIES.search(path.as_posix())
     ]
 
 
@@ -141,13 +139,11 @@ def shape_of(rows: list[list[tokenize.TokenInfo]]) -> tuple[object, ...]:
     """Tokens of some lines, names numbered as they come, numbers and strings by kind."""
     names: dict[str, int] = {}
     shape: list[object] = []
-    for row in rows:
-        for token in row:
-            kinds = {tokenize.NUMBER: "number", tokenize.STRING: "string"}
-            shape.append(kinds.get(token.type, token.string))
-            if token.type == tokenize.NAME:
-                shape[-1] = names.setdefault(token.string, len(names))
-        shape.append("\n")
+    for token in (token for row in rows for token in row):
+        kinds = {tokenize.NUMBER: "number", tokenize.STRING: "string"}
+        shape.append(kinds.get(token.type, token.string))
+        if token.type == tokenize.NAME:
+            shape[-1] = names.setdefault(token.string, len(names))
     return tuple(shape)
 
 
@@ -161,26 +157,22 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
     table: dict[str, dict[str, Any]] = {}
     for part, paths in parts.items():
         texts = [path.read_text("utf-8") for path in paths]
-        lengths = [len(text.splitlines()) for text in texts]
+        sizes = [len(text.splitlines()) for text in texts]
         nodes = [node for path in paths for node in ast.walk(trees[path])]
         functions = [node for node in nodes if isinstance(node, Function)]
-        long = [f for f in functions if f.end_lineno and f.end_lineno - f.lineno >= LONG_LINES]
+        long = [f for f in functions if f.end_lineno and f.end_lineno - f.lineno >= 60]
         kinds = ("posonlyargs", "args", "kwonlyargs")
         counts = [sum(len(getattr(f.args, kind)) for kind in kinds) for f in functions]
         alone = [p for p in paths if p in packages and len(by[module_name(p)]) == 1]
         table[part] = {
             "files": len(paths),
             "statements": sum(isinstance(n, ast.stmt) and not is_text(n) for n in nodes),
-            "lines": sum(lengths),
-            "median file, lines": round(median(lengths)),
-            f"functions over {LONG_LINES} lines": len(long),
-            f"functions over {MANY_PARAMETERS} parameters": sum(
-                n > MANY_PARAMETERS for n in counts
-            ),
+            "lines": sum(sizes),
+            "median file, lines": round(median(sizes)),
+            "functions over 60 lines": len(long),
+            "functions over 7 parameters": sum(n > 7 for n in counts),
             "files with exactly one importer": len(alone),
-            "definitions nobody uses": sum(
-                name.startswith(f"{path.relative_to(tree)}:") for path in paths for name in dead
-            ),
+            "definitions nobody uses": sum(tree / n.partition(":")[0] in paths for n in dead),
             "lines that stand twice": duplicates(paths),
             "`# fmt: skip`": sum(text.count("# fmt: skip") for text in texts),
         }
@@ -188,29 +180,27 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
 
 
 def costs(tree: Path) -> dict[str, str]:
-    """What starting costs, and how large the wheel is."""
+    """What starting costs beyond the bare interpreter, and how large the wheel is."""
     environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
 
+    def cpu_ms(*words: str) -> float:
+        before = getrusage(RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *words], env=environment, capture_output=True)
+        after = getrusage(RUSAGE_CHILDREN)
+        return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+
     def start(*words: str) -> str:
-        """Time of a start over that of the bare interpreter, each beside the other."""
-        took = []
-        for _ in range(STARTS):
-            times = [time.perf_counter()]
-            for each in (("-c", "pass"), words):
-                subprocess.run([sys.executable, *each], env=environment, capture_output=True)
-                times.append(time.perf_counter())
-            took.append(times[2] - 2 * times[1] + times[0])
-        return f"{1e3 * median(took):.0f} ms"
+        return f"{median(cpu_ms(*words) - cpu_ms('-c', 'pass') for _ in range(STARTS)):.0f} ms"
 
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder]
         built = subprocess.run([*words, str(tree)], capture_output=True, text=True)
-        wheels = [f"{path.stat().st_size / 1e3:.0f} kB" for path in Path(folder).glob("*.whl")]
-    why = (built.stderr.strip() or "no reason given").splitlines()[-1]
+        wheels = [f"{p.stat().st_size / 1e3:.0f} kB" for p in Path(folder).glob("*.whl")]
+    why = f"not built: {built.stderr.strip().splitlines()[-1:]}"
     return {
-        "`import pendpipe`": start("-c", "import pendpipe"),
-        "`pendpipe --version`": start("-m", "pendpipe.cli", "--version"),
-        "wheel of the library": (wheels or [f"not built: {why}"])[0],
+        "CPU of `import pendpipe`": start("-c", "import pendpipe"),
+        "CPU of `pendpipe --version`": start("-m", "pendpipe.cli", "--version"),
+        "wheel of the library": (wheels or [why])[0],
     }
 
 
@@ -227,6 +217,11 @@ def copy_of(commit: str | None, folder: Path) -> Path:
     return folder / str(commit)
 
 
+def table_row(what: str, cells: Iterable[object]) -> str:
+    """A row of a Markdown table."""
+    return f"| {what} | {' | '.join(map(str, cells))} |"
+
+
 def main() -> None:
     """Print the tables; a commit's beside the working tree's."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -241,13 +236,12 @@ def main() -> None:
         prices = {name: costs(tree) for name, tree in trees.items()}
     parts = list(found["here"][0])
     heads = [f"{part}, {name}" for part in parts for name in trees]
-    print(f"| | {' | '.join(heads)} |\n{'|---' * (1 + len(heads))}|")
+    print(table_row("", heads), table_row("---", ["---"] * len(heads)), sep="\n")
     for what in found["here"][0]["library"]:
-        cells = [str(found[name][0][part][what]) for part in parts for name in trees]
-        print(f"| {what} | {' | '.join(cells)} |")
-    print(f"\n| | {' | '.join(trees)} |\n{'|---' * (1 + len(trees))}|")
+        print(table_row(what, [found[n][0][part][what] for part in parts for n in trees]))
+    print("", table_row("", trees), table_row("---", ["---"] * len(trees)), sep="\n")
     for what in prices["here"]:
-        print(f"| {what} | {' | '.join(prices[name][what] for name in trees)} |")
+        print(table_row(what, [prices[name][what] for name in trees]))
     if arguments.list:
         print("\nNobody uses:", *found["here"][1], sep="\n- ")
 
