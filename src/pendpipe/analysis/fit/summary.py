@@ -161,6 +161,9 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
                 f"{q}, {100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
             )
         )
+    limit = result.quality_factor_limit
+    if limit is not None and not result["b"].at_bound:
+        found.append(_line("Q limit πf/b", with_error(limit.value, limit.sd, short=True)))
     return [*found, "  " + quotable(result)]
 
 
