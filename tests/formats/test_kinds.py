@@ -126,6 +126,19 @@ def test_runs_below_one_another_are_not_one_run(tmp_path: Path) -> None:
     assert "2 runs stand below one another" in recording.weak_guesses[0]
 
 
+def test_rows_that_were_interpolated_across_a_gap_are_no_samples(tmp_path: Path) -> None:
+    time, angle = swing(5000, 100.0)
+    drawn = angle.copy()
+    drawn[2000:2101] = np.linspace(angle[2000], angle[2101] - 0.2, 101)
+    recording = read_text(tmp_path, text(time, drawn, head="t (s),theta (rad)\n"))
+    assert any("interpolated, not measured" in note for note in recording.notes)
+    lost = np.flatnonzero(~recording.usable)
+    assert 80 <= len(lost) <= 110
+    assert lost.min() >= 1990
+    assert lost.max() <= 2110
+    assert read_text(tmp_path, text(time, angle, head="t (s),theta (rad)\n")).usable.all()
+
+
 # --- the column ----------------------------------------------------------------------------
 
 

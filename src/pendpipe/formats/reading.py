@@ -12,13 +12,14 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, ByteArray
+from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
 from pendpipe.formats.examine import resolution
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.plain import read_if_plain
 from pendpipe.formats.readings import Readings, readings
+from pendpipe.formats.swing import made_up
 from pendpipe.formats.table import Marker, NotThisFormatError, Table
 from pendpipe.formats.timebase import TimeBase, time_base
 from pendpipe.recording import GOOD, MISSING, Recording, check
@@ -171,6 +172,10 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
     if quality is not None:
         notes.append(f"{np.sum(quality == MISSING)} row(s) without a reading, marked missing")
+    drawn = made_up(base.time_s, values)
+    if drawn.any():
+        notes.append(f"{_where(base.time_s, drawn)} on a straight line: interpolated, not measured")
+        quality = np.where(drawn, MISSING, GOOD if quality is None else quality).astype(np.uint8)
     metadata = {**_kept(table), **base.metadata, **_markers(table.markers)}
     if found.quantity == "reading":
         metadata["unit"] = found.unit
@@ -187,6 +192,15 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     )
     check(table.place, recording)
     return recording
+
+
+def _where(time_s: FloatArray, rows: BoolArray) -> str:
+    """Name stretches of rows by their number and their times."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], rows, [False]))))
+    spans = [
+        f"{time_s[a]:.4g} to {time_s[b - 1]:.4g} s" for a, b in edges.reshape(-1, 2)[:3].tolist()
+    ]
+    return f"{rows.sum()} rows ({', '.join(spans)}{', ...' if len(edges) > 6 else ''})"
 
 
 def converted(table: Table, choice: Choice, base: TimeBase, options: ReadOptions) -> Readings:
