@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import InputError
-from pendpipe.formats.matlab_check import most_unpacked
+from pendpipe.formats.matlab import most_unpacked
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError, Table
 from pendpipe.formats.text import read_table as read_text
