@@ -99,7 +99,7 @@ def test_each_reason_is_on_the_page_once_and_only_where_its_cause_occurred() -> 
     content = opened(
         *[(truth("single", "clipping", size), answer()) for size in (50.0, 60.0, 100.0, 110.0)],
         *[(truth("single", K3, size), answer(K3)) for size in (50.0, 100.0)] * 2,
-    )  # fmt: skip
+    )
     text = page(score(content), [], "proof")
     assert text.count(REASONS["undetected"]["clipping"]) == 1
     for table in REASONS.values():

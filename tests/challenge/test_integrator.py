@@ -14,8 +14,12 @@ from pendpipe_challenge.motion import Motion
 
 OMEGA, AMPLITUDE = 5.6, 0.2
 LOSSES = {
-    "omega": OMEGA, "gamma": 0.03, "hysteretic": 0.004, "quadratic": 0.02, "coulomb": 0.004,
-}  # fmt: skip
+    "omega": OMEGA,
+    "gamma": 0.03,
+    "hysteretic": 0.004,
+    "quadratic": 0.02,
+    "coulomb": 0.004,
+}
 TIME = 0.05 * np.arange(600)
 
 
@@ -66,7 +70,7 @@ LAWS: dict[str, tuple[dict[str, float], Callable[[float, float, float], float]]]
         {"rough": 0.05, "rough_place": 0.08, "rough_width": 0.02},
         lambda t, x, v: -0.05 * np.exp(-(((x - 0.08) / 0.02) ** 2)) * np.sign(v),
     ),
-}  # fmt: skip
+}
 
 
 def by_scipy(extra: Callable[[float, float, float], float]) -> FloatArray:
@@ -86,9 +90,16 @@ def by_scipy(extra: Callable[[float, float, float], float]) -> FloatArray:
     while t < TIME[-1]:
         turn.direction = -way  # type: ignore[attr-defined]
         run = solve_ivp(
-            rates, (t, TIME[-1] + 1e-9), state, method="DOP853", rtol=1e-11, atol=1e-14,
-            events=turn, dense_output=True, max_step=0.02,
-        )  # fmt: skip
+            rates,
+            (t, TIME[-1] + 1e-9),
+            state,
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-14,
+            events=turn,
+            dense_output=True,
+            max_step=0.02,
+        )
         here = (t <= TIME) & (run.t[-1] >= TIME)
         found[here] = run.sol(TIME[here])[0]
         t, state, way = run.t[-1], np.array([run.y[0, -1], 0.0]), -way

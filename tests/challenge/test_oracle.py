@@ -12,6 +12,7 @@ import pytest
 from pendpipe_challenge.bench import Bench
 from pendpipe_challenge.catalogue import CATALOGUE, EFFECTS, hide
 from pendpipe_challenge.items import make_null, make_outside, make_pair, make_single
+from pendpipe_challenge.oracle import members
 from pendpipe_challenge.scenario import Noise, Scenario, Whitening, draw_scenario
 from pendpipe_challenge.sizing import size
 
@@ -119,9 +120,12 @@ def test_the_oracle_finds_and_names_a_large_effect_and_no_null() -> None:
 
 def test_a_cancelling_pair_hides_itself() -> None:
     item = make_pair(
-        np.random.default_rng(2), "cubic-stiffness", "frequency-drift", (100.0, 100.0),
+        np.random.default_rng(2),
+        "cubic-stiffness",
+        "frequency-drift",
+        (100.0, 100.0),
         cancelling=True,
-    )  # fmt: skip
+    )
     assert item.truth["total_delta_chi2"] < 0.5 * 200.0
     assert all(e["marginal_delta_chi2"] < 100.0 for e in item.truth["effects"])
 
@@ -145,3 +149,8 @@ def test_what_is_outside_leaves_something_to_every_catalogue_entry() -> None:
     assert effect["left_by_catalogue"] == pytest.approx(100.0, rel=0.16)
     assert effect["delta_chi2"] > effect["left_by_catalogue"]
     assert effect["effect"] == "unnamed-restoring"
+
+
+def test_a_class_ends_where_the_likelihood_has_fallen_by_exp_minus_3() -> None:
+    scores = {"impulse": 50.0, "backlash": 44.5, "gain-drift": 43.5}
+    assert members(scores) == ("impulse", "backlash")

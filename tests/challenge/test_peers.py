@@ -22,8 +22,7 @@ NOISE = 1e-4
 
 def swung(more: str = "", size: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A free decay of Eq. 8 with white noise, and with one torque more."""
-    losses = {"omega": 5.6, "gamma": 0.009, "hysteretic": 0.004, "quadratic": 2e-3,
-              "coulomb": 1e-3}  # fmt: skip
+    losses = {"omega": 5.6, "gamma": 0.009, "hysteretic": 0.004, "quadratic": 2e-3, "coulomb": 1e-3}
     time = np.arange(2500) / 20.0
     motion = Motion({**losses, **({more: size} if more else {})}, 0.15)
     noise = NOISE * np.random.default_rng(3).standard_normal(len(time))

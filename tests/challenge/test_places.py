@@ -20,9 +20,12 @@ INTERVAL_S = 0.1
 
 
 def placed(
-    effect: str, known: dict[str, float], *, time_s: list[float] | None = None,
+    effect: str,
+    known: dict[str, float],
+    *,
+    time_s: list[float] | None = None,
     hertz: list[float] | None = None,
-) -> tuple[dict[str, Any], dict[str, Any]]:  # fmt: skip
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """An item and its right answer, that puts the effect somewhere."""
     made, said = truth("single", effect), answer(effect)
     made["effects"][0]["parameters"] = known

@@ -21,37 +21,73 @@ from pendpipe_challenge.score import score
 def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:
     """A sealed truth with what the scores read."""
     effects = [
-        {"effect": effect, "also": [], "law": "x", "kind": "dynamics", "own_form": True,
-         "delta_chi2": size, "parameters": {"cubic": 1.0}, "left_by_catalogue": size,
-         "best_mimic": ""}
-    ]  # fmt: skip
+        {
+            "effect": effect,
+            "also": [],
+            "law": "x",
+            "kind": "dynamics",
+            "own_form": True,
+            "delta_chi2": size,
+            "parameters": {"cubic": 1.0},
+            "left_by_catalogue": size,
+            "best_mimic": "",
+        }
+    ]
     oracle = {
-        "detected": size > 20 and bool(effect), "detected_by_effect": size > 15 and bool(effect),
-        "named": effect, "top3": [effect], "class": [effect, "backlash"], "found_each": [True],
-        "largest_score": size, "threshold": 20.0,
-        "scores": {"cubic-stiffness": size if effect else 1.0}, "whiteness_p": 0.5,
-    }  # fmt: skip
+        "detected": size > 20 and bool(effect),
+        "detected_by_effect": size > 15 and bool(effect),
+        "named": effect,
+        "top3": [effect],
+        "class": [effect, "backlash"],
+        "found_each": [True],
+        "largest_score": size,
+        "threshold": 20.0,
+        "scores": {"cubic-stiffness": size if effect else 1.0},
+        "whiteness_p": 0.5,
+    }
     nuisances = {
-        "alpha": 0.0, "freedom": 0.0, "stops": False, "samples": 1000, "gain": 1.0,
+        "alpha": 0.0,
+        "freedom": 0.0,
+        "stops": False,
+        "samples": 1000,
+        "gain": 1.0,
         "frequency_hz": 1.0,
-    }  # fmt: skip
-    return {"family": family, "baseline": "eq8", "effects": effects if effect else [],
-            "nuisances": nuisances, "oracle": oracle, "cancelling": False, **more}  # fmt: skip
+    }
+    return {
+        "family": family,
+        "baseline": "eq8",
+        "effects": effects if effect else [],
+        "nuisances": nuisances,
+        "oracle": oracle,
+        "cancelling": False,
+        **more,
+    }
 
 
 def answer(*names: str, probability: float = 0.9, rest: tuple[str, ...] = ()) -> dict[str, Any]:
     """An answer that names these effects, the first with a class."""
     effects = [
-        {"id": name, "probability": probability, "parameters": {"k3": {"value": 1.1, "sd": 0.1}},
-         "indistinguishable_from": [{"id": r, "probability": 0.01} for r in rest if not i],
-         "deciding_measurement": "swing it wider"}
+        {
+            "id": name,
+            "probability": probability,
+            "parameters": {"k3": {"value": 1.1, "sd": 0.1}},
+            "indistinguishable_from": [{"id": r, "probability": 0.01} for r in rest if not i],
+            "deciding_measurement": "swing it wider",
+        }
         for i, name in enumerate(names)
-    ]  # fmt: skip
+    ]
     verdict = "missing-physics" if names else "consistent"
-    return {"diagnosis": {"verdict": verdict, "effects": effects, "noise_rms_rad": 1.0,
-                          "baseline": {"residual_rms_rad": 2.0}, "statement": "It differs.",
-                          "improved": {"residual_rms_rad": 1.0},
-                          "held_out": {"gain": 3.0, "gain_sd": 1.0}}}  # fmt: skip
+    return {
+        "diagnosis": {
+            "verdict": verdict,
+            "effects": effects,
+            "noise_rms_rad": 1.0,
+            "baseline": {"residual_rms_rad": 2.0},
+            "statement": "It differs.",
+            "improved": {"residual_rms_rad": 1.0},
+            "held_out": {"gain": 3.0, "gain_sd": 1.0},
+        }
+    }
 
 
 def opened(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> dict[str, Any]:
@@ -179,9 +215,11 @@ def test_keeping_silent_withholds_what_is_less_probable(threshold: float) -> Non
 
 def test_the_page_says_yes_and_no() -> None:
     content = opened(
-        *[(truth("null"), answer())] * 3, (truth("single", K3), answer(K3)),
-        (truth("single", K3, 60.0), answer()), (truth("outside", "unnamed-damping"), answer(K3)),
-    )  # fmt: skip
+        *[(truth("null"), answer())] * 3,
+        (truth("single", K3), answer(K3)),
+        (truth("single", K3, 60.0), answer()),
+        (truth("outside", "unnamed-damping"), answer(K3)),
+    )
     text = page(score(content), ["power.svg"], "proof")
     assert "**no**" in text
     assert "| yes |" in text
@@ -256,3 +294,19 @@ def test_intervals_by_clusters_cover_what_they_promise() -> None:
         plain.append(low <= 0.5 <= high)
     assert np.mean(held) > 0.92
     assert np.mean(plain) < 0.9
+
+
+@pytest.mark.parametrize(("wrong", "kept"), [(1, True), (2, False)])
+def test_confident_wrong_names_may_be_five_per_cent(wrong: int, kept: bool) -> None:
+    made = truth("outside", "unnamed-damping")
+    right, named = answer("unnamed-damping"), answer(K3, probability=0.95)
+    found = score(opened(*[(made, named if n < wrong else right) for n in range(30)]))
+    rows = {row["key"]: row for row in found["promises"]}
+    assert rows["confident"]["kept"] is kept
+
+
+@pytest.mark.parametrize(("error", "kept"), [(0.02, True), (0.12, False)])
+def test_a_calibration_error_of_five_per_cent_is_promised(error: float, kept: bool) -> None:
+    right = [(truth("single", K3), answer(K3, probability=1.0 - error))] * 30
+    rows = {row["key"]: row for row in score(opened(*right))["promises"]}
+    assert rows["calibration"]["kept"] is kept

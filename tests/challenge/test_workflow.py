@@ -20,8 +20,11 @@ def test_the_challenge_is_four_jobs_and_its_target(tmp_path: Path) -> None:
         copy(source, tmp_path / name)
     run = subprocess.run(
         [sys.executable, "-m", "snakemake", "challenge", "-n", "--nolock", "--cores", "2"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     said = run.stdout + run.stderr
     assert run.returncode == 0, said
     jobs = {line.split()[0] for line in said.splitlines() if line.startswith("challenge")}
