@@ -29,16 +29,16 @@ import numpy as np
 from benchmarks import journal
 from benchmarks.acquisition_live import flip_table, live_table
 from benchmarks.acquisition_speed import speed_table
+from benchmarks.faulty_device import Fault, FaultyPath, acquire_faulty
 from benchmarks.fuzz import fuzz_table
 from benchmarks.fuzz_seeds import windaq
-from pendpipe.acquire.clock_losses import find_clock_losses
 from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices.faults import Fault, FaultyPath
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.raw import read_raw
 from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.acquire.slips import find_slips
+from pendpipe.acquire.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
@@ -166,13 +166,13 @@ def plug_table(_folder: Path) -> str:
     for kind in ("di154", "di149", "di245", "di2108"):
         missing, errors_s, resumed = [], [], 0
         for number in range(5):
-            recording = acquire_simulated(
+            recording = acquire_faulty(
                 kind,
                 lambda t: 0.05 * t,
+                [Fault("unplug", at=1000 + 300 * number, duration_s=15.0)],
                 rate_hz=100.0,
                 duration_s=40.0,
                 clock_scale=10.0,
-                faults=[Fault("unplug", at=1000 + 300 * number, duration_s=15.0)],
             )
             resumed += any("resumed" in note for note in recording.notes)
             quality = np.zeros(1) if recording.quality is None else recording.quality

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.drivers import DRIVERS, find_driver
 from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.formats import ReadOptions, captures, text

@@ -42,10 +42,10 @@ from benchmarks import fuzz_seeds as seeds
 from benchmarks import journal
 from pendpipe.acquire.clock import ScaledClock
 from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices.dialect import Dialect
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
+from pendpipe.acquire.devices.stream import Dialect
 from pendpipe.acquire.drivers import DRIVERS, find_driver
-from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
+from pendpipe.acquire.drivers.decoders import SyncBitDecoder
 from pendpipe.acquire.line import Line
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read

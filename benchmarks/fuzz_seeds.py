@@ -10,7 +10,7 @@ import zlib
 
 import numpy as np
 
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.raw import Frame, RawWriter, description_line
 from pendpipe.arrays import FloatArray
 

@@ -10,11 +10,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from benchmarks.faulty_device import Fault, FaultyDevice
 
 import pendpipe.acquire.recorder
-import pendpipe.acquire.session
 from pendpipe.acquire.clock import SimulatedClock
-from pendpipe.acquire.devices.faults import Fault
 from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
 from pendpipe.acquire.line import Line
 from pendpipe.acquire.recorder import record
@@ -62,7 +61,7 @@ class Wire:
     def unplug(self) -> None:
         raise NotImplementedError("a wire in memory has no plug")
 
-    replug = close = unplug
+    close = unplug
 
 
 class SteppedLine(Line):
@@ -120,9 +119,10 @@ def recorded_in_steps(
 ) -> Recording:
     """Record as `acquire_simulated` does, in a time that only this recording knows."""
     clock, wire = SteppedClock(), Wire()
-    device = SimulatedDevice(kind, signal, link=wire, faults=[fault], clock=clock)
+    device = FaultyDevice(kind, signal, [fault], link=wire, clock=clock)
     time = SimpleNamespace(sleep=clock.sleep, monotonic=clock.now)
-    monkeypatch.setattr(pendpipe.acquire.session, "time", time)
-    for module in (pendpipe.acquire.session, pendpipe.acquire.recorder):
-        monkeypatch.setattr(module, "Line", lambda _port, _baud: SteppedLine(device, wire))
+    monkeypatch.setattr(pendpipe.acquire.recorder, "time", time)
+    monkeypatch.setattr(
+        pendpipe.acquire.recorder, "Line", lambda _port, _baud: SteppedLine(device, wire)
+    )
     return record(wire.port, kind, clock=clock, **wish)

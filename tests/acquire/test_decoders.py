@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.acquire.drivers.base import Decoder, Loss
-from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
-from pendpipe.acquire.drivers.words import WordDecoder
+from pendpipe.acquire.drivers.decoders import SyncBitDecoder, WordDecoder
 from pendpipe.arrays import AnyArray
 
 

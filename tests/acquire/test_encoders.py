@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.acquire.devices.converter import convert
 from pendpipe.acquire.devices.di154rs import SimulatedDI154RS
 from pendpipe.acquire.devices.di2108 import SimulatedDI2108
+from pendpipe.acquire.devices.stream import convert
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.faulty_device import FAULTS, Fault, FaultyPath, acquire_faulty
 
-import pendpipe.acquire.session
+import pendpipe.acquire.recorder
 from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices.faults import FAULTS, Fault, FaultyPath
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.drivers import find_driver
 from pendpipe.acquire.raw import RawWriter
-from pendpipe.acquire.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
@@ -25,7 +24,7 @@ SYNC_BIT = FAMILIES[:3]
 SCALE, RATE_HZ = 100.0, 100.0
 STAMP_S = 0.05 * SCALE
 """A twentieth of a second of a host that is busy with other tests."""
-POLL_S = pendpipe.acquire.session._LONGEST_POLL_S
+POLL_S = pendpipe.acquire.recorder._LONGEST_POLL_S
 """The recorder's pause between two looks at the line."""
 
 
@@ -35,10 +34,10 @@ def slow(time_s: FloatArray) -> FloatArray:
 
 
 def recorded(kind: str, fault: Fault, duration_s: float = 60.0, **wish: Any) -> Recording:
-    return acquire_simulated(
-        kind, slow, rate_hz=RATE_HZ, duration_s=duration_s, clock_scale=SCALE, faults=[fault],
-        **{"reconnect_s": 5.0, **wish},
-    )  # fmt: skip
+    options = {"reconnect_s": 5.0, **wish}
+    return acquire_faulty(
+        kind, slow, [fault], rate_hz=RATE_HZ, duration_s=duration_s, clock_scale=SCALE, **options
+    )
 
 
 def missing(recording: Recording) -> int:
@@ -58,7 +57,7 @@ def error_steps(recording: Recording, late_s: float = 0.0) -> float:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A device is silent after a quarter of a second of the host."""
-    monkeypatch.setattr(pendpipe.acquire.session, "_SILENCE_S", 0.25)
+    monkeypatch.setattr(pendpipe.acquire.recorder, "_SILENCE_S", 0.25)
 
 
 @pytest.mark.parametrize("kind", ["di245", "di2108"])

@@ -14,9 +14,8 @@ from pathlib import Path
 import pytest
 from serial import SerialException
 
-from pendpipe.acquire.line import Line
-from pendpipe.acquire.line_faults import cannot_open
-from pendpipe.acquire.usb import no_ports, without_port
+from pendpipe.acquire.line import Line, cannot_open
+from pendpipe.acquire.ports import no_ports, without_port
 from pendpipe.errors import InputError
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pyserial's POSIX part")

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices.models import DEVICES
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.raw import Frame, RawWriter, read_raw
 from pendpipe.errors import InputError
 from pendpipe.recording import MISSING, SUSPECT

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.acquire.clock_losses import find_clock_losses
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.drivers.base import Setup
 from pendpipe.acquire.drivers.cdc import DI2108
@@ -22,6 +21,7 @@ from pendpipe.acquire.noise import NoiseWatch
 from pendpipe.acquire.progress import ProgressLine
 from pendpipe.acquire.raw import Frame, RawWriter, read_raw
 from pendpipe.acquire.simulated import acquire_simulated
+from pendpipe.acquire.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError

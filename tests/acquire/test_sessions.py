@@ -184,7 +184,7 @@ def test_a_wrong_model_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_device_that_falls_silent_ends_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendpipe.acquire.session._SILENCE_S", 0.2)
+    monkeypatch.setattr("pendpipe.acquire.recorder._SILENCE_S", 0.2)
     with SimulatedDevice("di2108", swing, clock_scale=100.0) as device:
         threading.Timer(0.4, device.dialect.respond, [b"stop\r"]).start()
         recording = record(
@@ -215,7 +215,7 @@ def test_a_pulled_plug_keeps_what_had_arrived(link: str) -> None:
 
 
 def test_a_failing_signal_is_not_called_a_silent_device(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendpipe.acquire.session._SILENCE_S", 0.2)
+    monkeypatch.setattr("pendpipe.acquire.recorder._SILENCE_S", 0.2)
 
     def failing(time_s: FloatArray) -> FloatArray:
         raise ZeroDivisionError("the signal's own fault")

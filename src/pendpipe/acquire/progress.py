@@ -38,14 +38,14 @@ class ProgressLine:
         self._step = 0.0
 
     def begin(self, driver: type[Driver], setup: Setup) -> None:
-        """Take notice of what is recorded; again after a break."""
+        """Show what is recorded; again after a break."""
         self._breaks += self._decoder is not None
         self._recent.clear()
         self._decoder = driver.decoder(len(setup.channels))
         self._step = setup.range_volts / 2 ** (driver.bits - 1)
 
     def update(self, elapsed_s: float, data: bytes) -> None:
-        """Take notice of further bytes, by `elapsed_s` of the recorder's clock."""
+        """Show further bytes, by `elapsed_s` of the recorder's clock."""
         if self._decoder is None or not self._stream.isatty():
             return
         scans = self._decoder.feed(data)
@@ -73,7 +73,7 @@ class ProgressLine:
         )
 
     def end(self) -> None:
-        """Close the line."""
+        """Close the display."""
         if self._shown:
             self._write("\n")
 

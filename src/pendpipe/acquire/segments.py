@@ -9,11 +9,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.acquire.clock_losses import find_clock_losses
 from pendpipe.acquire.drivers.base import Decoder, Driver, Loss
-from pendpipe.acquire.drivers.words import WordDecoder
+from pendpipe.acquire.drivers.decoders import WordDecoder
 from pendpipe.acquire.raw import Hole, RawRecording
 from pendpipe.acquire.slips import find_slips
+from pendpipe.acquire.timebase import find_clock_losses
 from pendpipe.arrays import AnyArray, FloatArray, IntArray
 
 _NEAR: Final = 64

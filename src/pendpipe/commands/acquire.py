@@ -273,12 +273,11 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 def _real(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
     """Record from the instrument on a port."""
-    from pendpipe.acquire.ports import identify
     from pendpipe.acquire.recorder import record
 
     record(
         arguments.port,
-        arguments.model or identify(arguments.port).model,
+        arguments.model,
         channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
@@ -350,8 +349,7 @@ def _default_signal(seed: int, volts_per_radian: float) -> Signal:
 
 def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
-    from pendpipe.acquire.ports import identify, list_ports
-    from pendpipe.acquire.usb import no_ports, without_port
+    from pendpipe.acquire.ports import identify, list_ports, no_ports, without_port
 
     if port:
         identity = identify(port)

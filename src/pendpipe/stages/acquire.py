@@ -13,6 +13,9 @@ from pendpipe.errors import InputError
 from pendpipe.manifest import SET_ASIDE
 from pendpipe.recording import Recording, read_plain, write_plain
 
+RATE_HZ = 60.0
+"""Scans a second of an instrument in a campaign."""
+
 
 def acquire_record(
     campaign: Campaign, name: str, out: Path, *, anew: bool = False, place: Path | str = "CONFIG"
@@ -75,8 +78,8 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     InputError
         If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
     """
-    from pendpipe.acquire import record_from_port
     from pendpipe.acquire.attempts import choose, decode_attempt, kept_in, new_path, read_attempts
+    from pendpipe.acquire.recorder import record as record_from
 
     if record.channel and not record.channel.isdecimal():
         raise InputError(
@@ -95,7 +98,9 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
             )
         port = record.source.removeprefix("dataq:")
         path = new_path(f"{folder}/")
-        record_from_port(port, channel=channel, duration_s=record.stop_s, raw_path=path)
+        record_from(
+            port, channels=[channel or 1], rate_hz=RATE_HZ, duration_s=record.stop_s, raw_path=path
+        )
         attempts = read_attempts(folder.glob("*.raw"))
     used = choose(attempts)
     recording = decode_attempt(used.path, out.parent, channel)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import select
 import socket
-import tempfile
 from contextlib import suppress
-from pathlib import Path
 from typing import Protocol
 
 
@@ -30,9 +28,6 @@ class Link(Protocol):
 
     def unplug(self) -> None:
         """Pull the plug: the host's next read fails."""
-
-    def replug(self) -> None:
-        """Put it in again, under the same name."""
 
     def close(self) -> None:
         """End the line for good."""
@@ -63,16 +58,12 @@ class _Waking:
 class PseudoTerminal(_Waking):
     """A pseudo-terminal, which the driver opens as it opens any serial port."""
 
-    def __init__(self, *, replaceable: bool = False) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._connected = False
-        # The system numbers its terminals; a link keeps the name over a replug.
-        self._folder = tempfile.mkdtemp(prefix="pendpipe-") if replaceable else None
-        self.port = f"{self._folder}/ttySIMULATED"
-        self.replug()
+        self._open()
+        self.port = os.ttyname(self._host)
 
-    def replug(self) -> None:
-        """Put the plug in (again), under the same name."""
+    def _open(self) -> None:
         import tty
 
         self._device, self._host = os.openpty()
@@ -81,10 +72,6 @@ class PseudoTerminal(_Waking):
         tty.setraw(self._host)
         os.set_blocking(self._device, False)
         self._connected = True
-        if self._folder is None:
-            self.port = os.ttyname(self._host)
-        else:
-            Path(self.port).symlink_to(os.ttyname(self._host))
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Wait until there is something to read (or room to write), or `wake` is called."""
@@ -110,14 +97,10 @@ class PseudoTerminal(_Waking):
             self._connected = False
             os.close(self._device)
             os.close(self._host)
-            if self._folder is not None:
-                Path(self.port).unlink()
 
     def close(self) -> None:
         """End the line for good."""
         self.unplug()
-        if self._folder is not None:
-            Path(self._folder).rmdir()
         self._close()
 
 
@@ -126,10 +109,13 @@ class LoopbackSocket(_Waking):
 
     def __init__(self) -> None:
         super().__init__()
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self._listener.setblocking(False)
         self._host: socket.socket | None = None
+        self._listen(0)
         self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def _listen(self, port: int) -> None:
+        self._listener = socket.create_server(("127.0.0.1", port))
+        self._listener.setblocking(False)
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Wait until there is something to read (or room to write), or `wake` is called."""
@@ -174,23 +160,14 @@ class LoopbackSocket(_Waking):
             self._host = None
         self._listener.close()
 
-    def replug(self) -> None:
-        """Put it in again, under the same name."""
-        port = int(self.port.rpartition(":")[2])
-        self._listener = socket.create_server(("127.0.0.1", port))
-        self._listener.setblocking(False)
-
     def close(self) -> None:
         """End the line for good."""
         self.unplug()
         self._close()
 
 
-def open_link(kind: str | None = None, *, replaceable: bool = False) -> Link:
-    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them.
-
-    A pseudo-terminal keeps its name over a replug only if it is `replaceable`.
-    """
+def open_link(kind: str | None = None) -> Link:
+    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them."""
     if kind is None:
         kind = "pty" if hasattr(os, "openpty") else "socket"
-    return PseudoTerminal(replaceable=replaceable) if kind == "pty" else LoopbackSocket()
+    return PseudoTerminal() if kind == "pty" else LoopbackSocket()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
 from pendpipe.acquire.clock import SimulatedClock
-from pendpipe.acquire.devices.faults import Fault, FaultyPath
+from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.devices.links import Link, open_link
-from pendpipe.acquire.devices.models import DEVICES
 from pendpipe.acquire.devices.stream import Signal, Stream
 from pendpipe.errors import InputError
 
@@ -32,17 +31,14 @@ class SimulatedDevice:
         channel without one reads 0 V. It is called with rising times, block after block, so
         noise drawn from one generator does not depend on the pace of the host.
     clock_scale
-        How many seconds of the device pass in one of the wall's.
+        How many seconds of the device pass in one of wall-clock time.
     link
         ``"pty"``, ``"socket"``, or ``None`` for what the system has; or a device's end itself.
     rate_error
         The device's clock is fast by this fraction: scans come ``1 + rate_error`` times as
         often as it says.
-    faults
-        What is to go wrong, see `faults.FAULTS`. With any, the signal runs on from the
-        first stream to the next ones; else every start of a stream is its time 0.
     clock
-        The clock of its world; by default one that follows the wall's by `clock_scale`.
+        The clock of its world; by default wall-clock time, `clock_scale` times as fast.
 
     Examples
     --------
@@ -64,7 +60,6 @@ class SimulatedDevice:
         clock_scale: float = 1.0,
         link: str | Link | None = None,
         rate_error: float = 0.0,
-        faults: Iterable[Fault] = (),
         clock: SimulatedClock | None = None,
     ) -> None:
         if kind not in DEVICES:
@@ -73,23 +68,14 @@ class SimulatedDevice:
                 "there is no such simulated device",
                 f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
             )
-        self._kind = kind
+        self.kind = kind
         self.dialect = DEVICES[kind]()
         self.clock = clock or SimulatedClock(clock_scale)
         self.failure: BaseException | None = None
         self._signal = signal
-        self._path = FaultyPath(faults := tuple(faults))
-        self._runs_on = bool(faults)
-        self._rate_error = (1.0 + rate_error) * self._path.rate_factor - 1.0
-        self._link = (
-            open_link(link, replaceable=self._path.may_unplug)
-            if link is None or isinstance(link, str)
-            else link
-        )
+        self._rate_error = rate_error
+        self._link = open_link(link) if link is None or isinstance(link, str) else link
         self._stream: Stream | None = None
-        self._first_start_s: float | None = None
-        self._until_s = 0.0  # the end of a stall or a silence
-        self._condition = ""
         self._starts = self.dialect.starts  # of streams, that were seen
         self._ending = threading.Event()
         self._outbox = bytearray()
@@ -102,7 +88,7 @@ class SimulatedDevice:
 
     @property
     def clock_scale(self) -> float:
-        """How many seconds of the device pass in one of the wall's."""
+        """How many seconds of the device pass in one of wall-clock time."""
         return self.clock.scale
 
     def __enter__(self) -> Self:
@@ -128,11 +114,8 @@ class SimulatedDevice:
             self._link.close()
 
     def _live(self) -> None:
-        """Serve the line until the end; a fault of the signal silences the device."""
+        """Serve the line until the end; an exception of the signal silences the device."""
         try:
-            if self._path.stale:
-                self.dialect.streaming = True
-                self._begin()
             while not self._ending.is_set():
                 self._link.wait(self._rest_s(), sending=bool(self._outbox))
                 self.step()
@@ -141,68 +124,29 @@ class SimulatedDevice:
 
     def step(self) -> None:
         """Read what the host has sent, and send what is due by now."""
-        data = self._link.receive()
-        self._suffer()
-        if self._condition == "silence":
-            return
-        if data:
-            reply = self.dialect.respond(data)
-            self._outbox += self._path.answer(reply, self.clock.now())
-        self._outbox += self._path.due(self.clock.now())
+        if data := self._link.receive():
+            self._outbox += self.dialect.respond(data)
+        self._follow()
+        if self._stream and not self._outbox:
+            self._outbox += self._stream.due(self.clock)
+        self._send()
+
+    def _follow(self) -> None:
+        """Begin or end a stream as the host has commanded."""
         if self.dialect.starts != self._starts:
             self._starts = self.dialect.starts
             self._begin()
         if not self.dialect.streaming:
             self._stream = None
-        elif self._stream and not self._outbox and not self._condition:
-            due = self._stream.due(self.clock)
-            self._outbox += self._path.stream(due, self._stream.scan_bytes)
-        self._send()
 
-    def _begin(self) -> None:
-        """Begin a stream."""
-        now_s = self.clock.now()
-        first_s = now_s if self._first_start_s is None else self._first_start_s
-        self._first_start_s = first_s
-        offset_s = now_s - first_s if self._runs_on else 0.0
+    def _begin(self, offset_s: float = 0.0) -> None:
+        """Begin a stream, whose first scan reads the signal at `offset_s`."""
         self._stream = Stream(self.dialect, self._signal, self._rate_error, offset_s)
         self._stream.begin(self.clock)
 
     def _rest_s(self) -> float:
         """How long there is nothing to do, in seconds of the host, if the host is silent."""
-        if self._stream:
-            return self._stream.rest_s(self.clock)
-        return 0.005 if self._runs_on else 60.0
-
-    def _suffer(self) -> None:
-        """Enter and leave the conditions that faults bring about."""
-        condition, self._path.condition = self._path.condition, ""
-        if condition == "overflow":
-            self.dialect.streaming = False
-        elif condition == "unplug":
-            self._replug(self._path.condition_s)
-        elif condition:
-            self._condition = condition
-            self._until_s = self.clock.now() + self._path.condition_s
-        if self._condition == "silence":
-            self._outbox.clear()
-            if self._stream:
-                self._stream.due(self.clock)
-        if self.clock.now() >= self._until_s:
-            self._condition = ""
-
-    def _replug(self, duration_s: float) -> None:
-        """Be gone, and come back as if switched on."""
-        self._send()
-        self._link.unplug()
-        self.clock.release()
-        self._outbox.clear()
-        self._stream = None
-        self._ending.wait(duration_s / self.clock.scale)
-        starts = self.dialect.starts
-        self.dialect = DEVICES[self._kind]()
-        self.dialect.starts = starts
-        self._link.replug()
+        return self._stream.rest_s(self.clock) if self._stream else 60.0
 
     def _send(self) -> None:
         """Send what the line takes; while it is full, simulated time stands still."""

@@ -1,17 +1,72 @@
-"""The data of a simulated instrument, from its signal to its bytes, at their hour."""
+"""What a simulated instrument sends: its signal, converted, encoded, and released on schedule."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final, TypeAlias
+from typing import ClassVar, Final, Protocol, TypeAlias
 
 import numpy as np
 
 from pendpipe.acquire.clock import Clock
-from pendpipe.acquire.devices.converter import convert
-from pendpipe.acquire.devices.dialect import Dialect
 from pendpipe.arrays import FloatArray, IntArray
+
+
+class Dialect(Protocol):
+    """An instrument without its line and its clock: commands in, replies and data out."""
+
+    model: ClassVar[str]
+    bits: ClassVar[int]
+    starts: int
+    """How often the stream was started: a change means that it begins anew."""
+    streaming: bool
+    """Whether data flow."""
+
+    @property
+    def range_volts(self) -> float:
+        """Full scale, as the host has chosen it."""
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels as printed on the box (from 1), in the order of the scan."""
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Scans a second by the device's own clock."""
+
+    @property
+    def packet_bytes(self) -> int:
+        """Data leave in pieces of so many bytes."""
+
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+
+    def encode(self, codes: IntArray) -> bytes:
+        """Put signed codes, shape (scans, channels), into the bytes of the stream."""
+
+
+def convert(volts: FloatArray, bits: int, range_volts: float) -> IntArray:
+    """Round volts at the terminals to the converter's codes.
+
+    Parameters
+    ----------
+    volts
+        The signal, any shape, in V.
+    bits
+        Resolution; the step is ``2 range_volts / 2**bits``.
+    range_volts
+        Full scale is plus and minus it.
+
+    Returns
+    -------
+    IntArray
+        Signed codes, ``-2**(bits-1)`` to ``2**(bits-1) - 1``, 0 at 0 V; a signal beyond
+        the range gives the end code.
+    """
+    half = 1 << (bits - 1)
+    codes = np.rint(np.asarray(volts, dtype=np.float64) * (half / range_volts))
+    return np.clip(codes, -half, half - 1).astype(np.int64)
+
 
 Signal: TypeAlias = Callable[[FloatArray], FloatArray]
 """Times in s since the device was switched on to volts at the terminals, noise included."""

@@ -12,8 +12,8 @@ from typing import ClassVar, Final
 
 from pendpipe.acquire.drivers.base import Setup
 from pendpipe.acquire.drivers.choice import choose_channels, choose_range
+from pendpipe.acquire.drivers.decoders import STOP_CODE, STOP_CODE_BYTES, WordDecoder
 from pendpipe.acquire.drivers.text import TextDriver
-from pendpipe.acquire.drivers.words import STOP_CODE, STOP_CODE_BYTES, WordDecoder
 from pendpipe.errors import InputError
 
 _BASE_HZ: Final = 60_000_000

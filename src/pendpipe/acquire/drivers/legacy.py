@@ -12,7 +12,7 @@ from typing import ClassVar, Final
 from pendpipe.acquire.clock import Clock
 from pendpipe.acquire.drivers.base import Identity, Setup, StreamReader
 from pendpipe.acquire.drivers.choice import choose_channels, choose_range, refuse_another
-from pendpipe.acquire.drivers.sync_bit import SyncBitDecoder
+from pendpipe.acquire.drivers.decoders import SyncBitDecoder
 from pendpipe.acquire.line import Line
 from pendpipe.errors import InputError
 

@@ -1,4 +1,4 @@
-"""The faults that a simulated device can have on demand: one declared list.
+"""A simulated device with faults on demand, for tests and benchmarks.
 
 A fault of the stream is set off once, when its place is reached; places count the bytes
 of data that the device has made since it was switched on, over all its streams. A fault
@@ -7,9 +7,18 @@ of the answers meets the first answers that hold its `command`.
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from pathlib import Path
+from typing import Any, Final, Literal, Self
+
+from pendpipe.acquire.devices import DEVICES
+from pendpipe.acquire.devices.links import Link, LoopbackSocket, PseudoTerminal
+from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
+from pendpipe.acquire.simulated import record_from
+from pendpipe.recording import Recording
 
 FAULTS: Final[Mapping[str, str]] = {
     "junk": "bytes FF FE 7F of a rising supply before the first answer",
@@ -91,7 +100,6 @@ class FaultyPath:
             if fault.kind == "wrong rate":
                 self.rate_factor *= fault.factor
         self.stale = any(fault.kind == "stale stream" for fault in every)
-        self.may_unplug = any(fault.kind == "unplug" for fault in every)
         self.condition: Condition = ""
         self.condition_s = 0.0  # how long the condition lasts
         echoes = {"no echo", "wrong echo", "late echo", "padded echo", "junk"}
@@ -130,9 +138,9 @@ class FaultyPath:
         return reply
 
     def due(self, now_s: float) -> bytes:
-        """Return the late answers whose hour has come."""
-        ready = b"".join(reply for hour, reply in self._late if hour <= now_s)
-        self._late = [(hour, reply) for hour, reply in self._late if hour > now_s]
+        """Return the late answers that are due."""
+        ready = b"".join(reply for due_s, reply in self._late if due_s <= now_s)
+        self._late = [(due_s, reply) for due_s, reply in self._late if due_s > now_s]
         return ready
 
     def stream(self, data: bytes, scan_bytes: int) -> bytes:
@@ -172,3 +180,147 @@ class FaultyPath:
         if fault.kind in ("overflow", "stall", "unplug", "silence"):
             self.condition = fault.kind  # type: ignore[assignment]
             self.condition_s = fault.duration_s
+
+
+class ReplaceableTerminal(PseudoTerminal):
+    """A pseudo-terminal that keeps its name over a replug; the system numbers them anew."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._folder = Path(tempfile.mkdtemp(prefix="pendpipe-"))
+        self.port = str(self._folder / "ttySIMULATED")
+        Path(self.port).symlink_to(os.ttyname(self._host))
+
+    def unplug(self) -> None:
+        """Pull the plug: the host's next read fails."""
+        if self._connected:
+            Path(self.port).unlink()
+        super().unplug()
+
+    def replug(self) -> None:
+        """Put it in again, under the same name."""
+        self._open()
+        Path(self.port).symlink_to(os.ttyname(self._host))
+
+    def close(self) -> None:
+        """End the line for good."""
+        super().close()
+        self._folder.rmdir()
+
+
+class ReplaceableSocket(LoopbackSocket):
+    """A socket that can be put in again."""
+
+    def replug(self) -> None:
+        """Put it in again, under the same name."""
+        self._listen(int(self.port.rpartition(":")[2]))
+
+
+class FaultyDevice(SimulatedDevice):
+    """A simulated device with faults; its signal runs on from one stream to the next.
+
+    Parameters
+    ----------
+    kind, signal, **options
+        See `SimulatedDevice`.
+    faults
+        What is to go wrong.
+    link
+        ``"pty"``, ``"socket"``, ``None`` for what the system has, or a device's end itself.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        signal: Signal,
+        faults: Iterable[Fault],
+        *,
+        link: str | Link | None = None,
+        **options: Any,
+    ) -> None:
+        self._path = FaultyPath(faults)
+        if link is None or isinstance(link, str):
+            terminal = link == "pty" or (link is None and hasattr(os, "openpty"))
+            link = ReplaceableTerminal() if terminal else ReplaceableSocket()
+        super().__init__(
+            kind, signal, link=link, rate_error=self._path.rate_factor - 1.0, **options
+        )
+        self._first_start_s: float | None = None
+        self._until_s = 0.0  # the end of a stall or a silence
+        self._condition = ""
+
+    def __enter__(self) -> Self:
+        if self._path.stale:
+            self.dialect.streaming = True
+            self._begin()
+        return super().__enter__()
+
+    def step(self) -> None:
+        """Read what the host has sent, and send what is due by now, as the faults allow."""
+        data = self._link.receive()
+        self._suffer()
+        if self._condition == "silence":
+            return
+        if data:
+            reply = self.dialect.respond(data)
+            self._outbox += self._path.answer(reply, self.clock.now())
+        self._outbox += self._path.due(self.clock.now())
+        self._follow()
+        if self._stream and not self._outbox and not self._condition:
+            due = self._stream.due(self.clock)
+            self._outbox += self._path.stream(due, self._stream.scan_bytes)
+        self._send()
+
+    def _begin(self, offset_s: float = 0.0) -> None:
+        now_s = self.clock.now()
+        if self._first_start_s is None:
+            self._first_start_s = now_s
+        super()._begin(now_s - self._first_start_s + offset_s)
+
+    def _rest_s(self) -> float:
+        return super()._rest_s() if self._stream else 0.005
+
+    def _suffer(self) -> None:
+        """Enter and leave the conditions that faults bring about."""
+        condition, self._path.condition = self._path.condition, ""
+        if condition == "overflow":
+            self.dialect.streaming = False
+        elif condition == "unplug":
+            self._replug(self._path.condition_s)
+        elif condition:
+            self._condition = condition
+            self._until_s = self.clock.now() + self._path.condition_s
+        if self._condition == "silence":
+            self._outbox.clear()
+            if self._stream:
+                self._stream.due(self.clock)
+        if self.clock.now() >= self._until_s:
+            self._condition = ""
+
+    def _replug(self, duration_s: float) -> None:
+        """Be gone, and come back as if switched on."""
+        assert isinstance(self._link, ReplaceableTerminal | ReplaceableSocket)
+        self._send()
+        self._link.unplug()
+        self.clock.release()
+        self._outbox.clear()
+        self._stream = None
+        self._ending.wait(duration_s / self.clock.scale)
+        starts = self.dialect.starts
+        self.dialect = DEVICES[self.kind]()
+        self.dialect.starts = starts
+        self._link.replug()
+
+
+def acquire_faulty(
+    kind: str,
+    signal: Signal,
+    faults: Iterable[Fault],
+    *,
+    clock_scale: float,
+    link: str | None = None,
+    **options: Any,
+) -> Recording:
+    """Record from a simulated device with faults; `options` as for `recorder.record`."""
+    with FaultyDevice(kind, signal, faults, clock_scale=clock_scale, link=link) as device:
+        return record_from(device, **options)

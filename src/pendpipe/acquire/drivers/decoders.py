@@ -1,13 +1,19 @@
-"""Decoder of the families that mark a scan with bit 0.
+"""From the bytes of a stream to scans: samples with a frame mark, and words without any.
 
-Every sample is two bytes. Bit 0 of the first byte of a scan is 0, bit 0 of every other
-byte is 1; nothing else marks a frame. The upper seven bits of the second byte are the
-upper seven bits of the sample, its lower bits stand at the top of the first byte
-(dataq-facts A1 for 8, 10 and 12 bits, A7 for 14); the code is offset binary.
+Families that mark a scan: every sample is two bytes. Bit 0 of the first byte of a scan is 0,
+bit 0 of every other byte is 1. The upper seven bits of the second byte are the upper seven bits
+of the sample, its lower bits stand at the top of the first byte (dataq-facts A1 for 8, 10
+and 12 bits, A7 for 14); the code is offset binary.
+
+The CDC family sends little-endian 16-bit words, and nothing between them (dataq-facts A8): a
+lost byte shifts all that follows, and only the rate, the range or a channel of known reading
+can tell. A device whose buffer has overflowed says ``stop 01`` among the words, and no
+more.
 """
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 import numpy as np
@@ -134,3 +140,61 @@ class SyncBitDecoder:
     def _loss(self, after_scan: int, discarded: int, suspect: bool) -> Loss:
         lost = -(-discarded // self.bytes_per_scan)
         return Loss(after_scan, discarded, lost, suspect_before=suspect and after_scan > 0)
+
+
+STOP_CODE: Final = re.compile(rb"stop 0[123]")
+"""In words of chance it stands once in 2e16 bytes."""
+STOP_CODE_BYTES: Final = 7
+_BEGINNINGS: Final = tuple(b"stop 0"[:size] for size in range(6, 0, -1))
+
+
+class WordDecoder:
+    """One signed little-endian 16-bit word a channel, scan after scan.
+
+    Parameters
+    ----------
+    channels
+        Words in a scan.
+    bits
+        Bits of a sample, at the top of its word; below may stand digital inputs.
+    """
+
+    def __init__(self, channels: int, bits: int = 16) -> None:
+        self.bytes_per_scan = 2 * channels
+        self._channels = channels
+        self._shift = 16 - bits
+        self._pending = b""  # an unfinished scan, or what may be the beginning of a stop code
+        self._scans = 0
+        self._ended = ""  # the stop code, once it was met
+        self._discarded = 0
+
+    def feed(self, data: bytes) -> Scans:
+        """Decode further bytes; an unfinished scan waits for the next call."""
+        if self._ended:
+            self._discarded += len(data)
+            return self._scans_of(b"")
+        data = self._pending + data
+        if found := STOP_CODE.search(data):
+            self._ended = found.group().decode("ascii")
+            whole = found.start() - found.start() % self.bytes_per_scan
+            self._discarded = len(data) - whole
+        else:
+            free = len(data) - next((len(b) for b in _BEGINNINGS if data.endswith(b)), 0)
+            whole = free - free % self.bytes_per_scan
+        self._pending = b"" if self._ended else data[whole:]
+        return self._scans_of(data[:whole])
+
+    def finish(self) -> Scans:
+        """Return what was held back, forget an unfinished scan, and tell of a stop code."""
+        held = self._pending
+        self._pending = b""
+        scans = self._scans_of(held[: len(held) - len(held) % self.bytes_per_scan])
+        if not self._ended:
+            return scans
+        return Scans(scans.counts, (Loss(self._scans, self._discarded, 0, reason=self._ended),))
+
+    def _scans_of(self, data: bytes) -> Scans:
+        """Turn whole scans into counts; shape (scans, channels)."""
+        words: AnyArray = np.frombuffer(data, dtype="<i2").reshape(-1, self._channels)
+        self._scans += len(words)
+        return Scans(words >> self._shift if self._shift else words)
