@@ -66,23 +66,15 @@ class Remainder:
             return 1.0
         return math.sqrt(max(self.excess / self.numbers, self.over_noise**2, 1.0))
 
-    def worth(self, gain: float, excess: float | None = None) -> float:
+    def worth(self, gain: float) -> float:
         """Return the significance of a gain of chi^2 beside the remaining misfit.
 
         For an unknown function of m numbers and unknown size the likelihood is
         (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), at most itself.
-
-        Parameters
-        ----------
-        gain
-            Delta chi^2.
-        excess
-            The remaining misfit; by default the present one.
         """
         if not self.systematic:
             return gain
-        left = self.excess if excess is None else excess
-        return min(gain, self.numbers * math.log1p(max(gain, 0.0) / max(left, 1.0)))
+        return min(gain, self.numbers * math.log1p(max(gain, 0.0) / max(self.excess, 1.0)))
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""

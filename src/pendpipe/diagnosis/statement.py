@@ -122,7 +122,7 @@ def statement(
         f" {compact(noise_rms, unit)}.",
         *(_effect(effect) for effect in effects),
         _improvement(len(effects), before, after, held, unit),
-        _changes(before.parameters, after.parameters, unit),
+        _changes(len(effects), before.parameters, after.parameters, unit),
         _rest(unexplained, level, remainder),
     ]
     if swings is not None:
@@ -174,7 +174,9 @@ def _improvement(
     return f"{text}, {better}."
 
 
-def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str) -> str:
+def _changes(
+    number: int, before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str
+) -> str:
     """What it changes in the small-angle period, in Q, and in the other parameters."""
     parts, period = [], "small-angle period" if unit == "rad" else "period"
     for name, of in ((period, _period), ("Q limit (pi f/b)", _quality_factor)):
@@ -192,7 +194,8 @@ def _changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit
     ]
     text = f"This changes {_listed(parts, 'and')}." if parts else ""
     if moved:
-        text += f" Without it the fit was biased: {'; '.join(moved)}."
+        without = "it" if number == 1 else "them"
+        text += f" Without {without} the fit is biased: {'; '.join(moved)}."
     return text.strip()
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from pendpipe.analysis.distributions import log_normal_below
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.codes import Raw, nearest_datum, raw_readings
+from pendpipe.diagnosis.forensics.codes import Raw, raw_readings
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.lattice import (
     Lattice,
@@ -123,7 +123,7 @@ def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tupl
     if part is None:
         inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
         index = np.flatnonzero(inside)
-        place = nearest_datum(data, samples.time_s[index])
+        place = _nearest_datum(data, samples.time_s[index])
     else:
         index, place = np.arange(part.start, part.stop), np.arange(len(data))
     clipped = np.zeros(len(index), dtype=bool)
@@ -134,6 +134,12 @@ def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tupl
     mask = np.zeros(len(data), dtype=bool)
     mask[place[clipped]] = True
     return int(np.count_nonzero(clipped)), mask
+
+
+def _nearest_datum(data: Data, time_s: FloatArray) -> IntArray:
+    """Return the index of the datum nearest to each time."""
+    middle = 0.5 * (data.time_s[1:] + data.time_s[:-1])
+    return np.asarray(np.searchsorted(middle, time_s))
 
 
 def _described(

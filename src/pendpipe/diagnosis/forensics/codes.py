@@ -70,8 +70,6 @@ class Raw:
         Readings, readings minus model, phase of the motion, and whether each counts.
     index
         Index among the samples.
-    datum
-        Index of the datum to which each belongs.
     """
 
     values: FloatArray
@@ -79,7 +77,6 @@ class Raw:
     phase: FloatArray
     used: BoolArray
     index: IntArray
-    datum: IntArray
 
 
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
@@ -94,7 +91,6 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
             sampled.phase,
             data.weight > 0.0,
             index,
-            np.arange(len(data)),
         )
     first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
     last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
@@ -106,14 +102,7 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
         np.interp(when, data.time_s, sampled.phase),
         np.interp(when, data.time_s, data.weight) > 0.99,
         index,
-        nearest_datum(data, when),
     )
-
-
-def nearest_datum(data: Data, time_s: FloatArray) -> IntArray:
-    """Return the index of the datum nearest to each time."""
-    middle = 0.5 * (data.time_s[1:] + data.time_s[:-1])
-    return np.asarray(np.searchsorted(middle, time_s))
 
 
 def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:

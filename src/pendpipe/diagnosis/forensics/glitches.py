@@ -56,7 +56,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     if data.used < 60:
         return nothing("glitches")
     residual, used = error_of(data, fit), data.weight > 0.0
-    local, smeared = _errors(data, fit, noise, residual, ~used)
+    local, smeared = _errors(fit, noise, residual, ~used)
     error = own_error(local)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
     ordered = np.sort(error[used])
@@ -75,7 +75,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         mask |= beyond
         if not smeared:
             break
-        local, _ = _errors(data, fit, noise, residual, ~used | mask)
+        local, _ = _errors(fit, noise, residual, ~used | mask)
         error = own_error(local)
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
@@ -154,9 +154,7 @@ def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolAr
     return found
 
 
-def _errors(
-    data: Data, fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray
-) -> tuple[Local, bool]:
+def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> tuple[Local, bool]:
     """Return each reading's error, and whether a filter has spread it over its neighbours.
 
     If a misfit of the motion remains in the windows, each reading is compared with the cubic
