@@ -81,16 +81,16 @@ def fit_colour(
         Whether the noise may be red.
     """
     # Glitches and tones are not noise: clip what is far above its neighbours.
-    level = _clipped_mean(power, max(float(np.median(power)) / 0.4549, 1e-300))
+    variance = _clipped_mean(power, max(float(np.median(power)) / 0.4549, 1e-300))
     best, least = (
-        Colour(level),
-        float(np.sum(math.log(level) + np.minimum(power / level, _OUTLIER_RATIO))),
+        Colour(variance),
+        float(np.sum(math.log(variance) + np.minimum(power / variance, _OUTLIER_RATIO))),
     )
     for ends in (math.inf, REFERENCE_HZ) if red else ():
-        found, cost = _red(power, frequency_hz, level, ends)
+        found, cost = _red(power, frequency_hz, variance, ends)
         if cost < least - (_NEEDED_GAIN[0] if not best.red else 0.0):
             best, least = found, cost
-    found, cost = _low_pass(power, frequency_hz, interval_s, level)
+    found, cost = _low_pass(power, frequency_hz, interval_s, variance)
     if cost < least - _NEEDED_GAIN[1]:
         best = found
     return best
@@ -125,12 +125,12 @@ def _with_white(found: Quadratic, power: FloatArray, white: float) -> Quadratic:
 
 
 def _red(
-    power: FloatArray, frequency: FloatArray, level: float, ends: float
+    power: FloatArray, frequency: FloatArray, variance: float, ends: float
 ) -> tuple[Colour, float]:
     """Fit a red part that ends at a frequency, or does not end."""
     inside = frequency <= ends
     if np.count_nonzero(inside) < 3:
-        return Colour(level), math.inf
+        return Colour(variance), math.inf
     near, beyond = power[inside], power[~inside]
     logs = np.log(REFERENCE_HZ / np.maximum(frequency[inside], 1e-12))
 
@@ -143,7 +143,7 @@ def _red(
         return _with_white(found, beyond, white) if len(beyond) else found
 
     # Far below the powers all of them are clipped, and the cost would fall without limit.
-    middle = math.log(level)
+    middle = math.log(variance)
     bounds = Bounds(
         np.array([middle - 8.0, -12.0, _FLATTEST]), np.array([middle + 4.0, 8.0, _STEEPEST])
     )
@@ -172,7 +172,7 @@ def _red_throughout(power: FloatArray, logs: FloatArray, bounds: Bounds) -> Floa
 
 
 def _low_pass(
-    power: FloatArray, frequency: FloatArray, interval: float, level: float
+    power: FloatArray, frequency: FloatArray, interval: float, variance: float
 ) -> tuple[Colour, float]:
     """Fit a first-order memory."""
     cosine = np.cos(2.0 * math.pi * frequency * interval)
@@ -182,15 +182,15 @@ def _low_pass(
         slopes = np.stack([np.ones_like(gain), 2.0 * (cosine - values[1]) / gain])
         return _whittle(power, math.exp(values[0]) / gain, slopes)
 
-    middle = math.log(level)
+    middle = math.log(variance)
     bounds = Bounds(np.array([middle - 8.0, -0.95]), np.array([middle + 4.0, 0.95]))
     found = minimise(cost, np.array([middle, 0.3]), bounds, tolerance=_CONVERGED)
     return Colour(math.exp(found.value[0]), memory=float(found.value[1])), found.quadratic.chi2
 
 
-def _clipped_mean(power: FloatArray, level: float) -> float:
+def _clipped_mean(power: FloatArray, variance: float) -> float:
     """Return the mean of chi^2_1 numbers without the far tail, corrected for it."""
     for _ in range(3):
-        inside = power < _OUTLIER_RATIO * level
-        level = float(np.mean(power[inside])) / 0.9958
-    return level
+        inside = power < _OUTLIER_RATIO * variance
+        variance = float(np.mean(power[inside])) / 0.9958
+    return variance

@@ -159,9 +159,9 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
 
 
 def _prior(effect: Effect, fit: Fit) -> float:
-    place = next((place for other, place in fit.model.places() if other is effect), None)
-    # A released parameter has no place among the model's effects.
-    unlikely = 0.0 if place is None else effect.prior_penalty(fit.value[place], fit.at.span)
+    position = next((position for other, position in fit.model.places() if other is effect), None)
+    # A released parameter has no position among the model's effects.
+    unlikely = 0.0 if position is None else effect.prior_penalty(fit.value[position], fit.at.span)
     return effect.prior - unlikely
 
 
@@ -173,12 +173,12 @@ def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     """
     if not isinstance(effect, Curve):
         return 0.0, effect.sizes
-    place = next(place for other, place in fit.model.places() if other is effect)
-    others = [index for index in fit.free if not place.start <= index < place.stop]
-    own, rest = fit.jacobian[:, place], fit.jacobian[:, others]
+    position = next(position for other, position in fit.model.places() if other is effect)
+    others = [index for index in fit.free if not position.start <= index < position.stop]
+    own, rest = fit.jacobian[:, position], fit.jacobian[:, others]
     basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
     left = own - basis @ (basis.T @ own)
-    squares = (np.linalg.qr(left)[1] @ fit.value[place]) ** 2
+    squares = (np.linalg.qr(left)[1] @ fit.value[position]) ** 2
     superfluous = squares < SIZE_CHARGE
     return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)
 

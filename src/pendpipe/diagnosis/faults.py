@@ -150,7 +150,7 @@ class Forensics:
             self._quiet[name] = p_value
             _refit(state, others)
             return
-        state.faults[number] = Fault(finding, p_value, fault.behind, finding.mask)
+        state.faults[number] = Fault(finding, p_value, fault.after, finding.mask)
         if np.any((others | finding.mask) != (masked.weight == 0.0)):
             _refit(state, others | finding.mask)
 

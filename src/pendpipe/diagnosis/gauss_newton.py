@@ -158,8 +158,10 @@ def _shapes(model: Model) -> list[int]:
     """Return the indices of the values on which the readings do not depend linearly."""
     return [
         index
-        for effect, place in model.places()
-        for index in range(place.start + (1 if effect.parameter_free else effect.sizes), place.stop)
+        for effect, position in model.places()
+        for index in range(
+            position.start + (1 if effect.parameter_free else effect.sizes), position.stop
+        )
     ]
 
 
@@ -167,9 +169,9 @@ def _residual(
     data: Data, noise: Noise, at: Evaluated, value: FloatArray
 ) -> tuple[FloatArray, float]:
     """Return the whitened residual with the prior's entry, and the largest phase error."""
-    plain, slip = unwrapped(data, at)
+    difference, slip = unwrapped(data, at)
     prior = (0.5 - value[SHARE]) / _SHARE_SD
-    return np.append(noise.whiten(plain), prior), slip
+    return np.append(noise.whiten(difference), prior), slip
 
 
 def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:

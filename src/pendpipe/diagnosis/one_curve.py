@@ -85,8 +85,8 @@ def _needed_beside(step: Step, drawn: Fit, state: State) -> bool:
     effect = step.winner.lead.effect
     if not effect.local:
         return False
-    place = next(place for other, place in state.fit.model.places() if other is effect)
-    start = np.concatenate([drawn.value, state.fit.value[place]])
+    position = next(position for other, position in state.fit.model.places() if other is effect)
+    start = np.concatenate([drawn.value, state.fit.value[position]])
     try:
         both = refine(drawn.model.adding(effect), state.data, state.noise, start, held=state.held)
     except (NoMotionError, np.linalg.LinAlgError):

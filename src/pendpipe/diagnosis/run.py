@@ -113,15 +113,15 @@ class Outcome:
         """
         from pendpipe.files import make_folder, write_json
 
-        place, diagnosis = Path(folder), self.diagnosis
-        make_folder(place)
+        target, diagnosis = Path(folder), self.diagnosis
+        make_folder(target)
         if figures:
             from pendpipe.figures.diagnosis import draw_diagnosis
 
-            drawn = draw_diagnosis(self, place)
+            drawn = draw_diagnosis(self, target)
             diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
         content = diagnosis.to_dict()
-        write_json(place / FILE_NAME, content)
+        write_json(target / FILE_NAME, content)
         return content
 
     def plot(self) -> Figure:
@@ -310,7 +310,7 @@ def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, .
         (number, effect_named(found, step, each))
         for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
     ]
-    faults = [(fault.behind, fault_named(found, fault)) for fault in found.faults]
+    faults = [(fault.after, fault_named(found, fault)) for fault in found.faults]
     # The sort is stable: a fault goes before the effect that followed it.
     return tuple(each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0]))
 

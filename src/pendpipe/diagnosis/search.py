@@ -223,13 +223,13 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())
         starts[-1][C] *= share
-    fault = NoMotionError("it stops")
+    error = NoMotionError("it stops")
     for start in starts:
         try:
             return refine(model, data, state.noise, start, held=beginning.held)
         except NoMotionError as found:
-            fault = found
-    raise fault
+            error = found
+    raise error
 
 
 def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
@@ -301,7 +301,7 @@ def _prune(state: State, progress: Progress) -> None:
         without = fit_without(state, state.steps[-1])
         between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
     # The last effect has others after it only if a fault was found after it.
-    joined = any(fault.behind == len(state.steps) for fault in state.faults)
+    joined = any(fault.after == len(state.steps) for fault in state.faults)
     for step in list(state.steps if joined and not _ends_with_curve(state) else state.steps[:-1]):
         effect = step.winner.lead.effect
         without = None if isinstance(effect, ReleasedParameter) else fit_without(state, step)

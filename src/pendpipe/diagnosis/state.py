@@ -60,13 +60,13 @@ class Step:
 class Fault:
     """A significant finding of a test of the measurement, and its global p-value.
 
-    `behind` is the number of effects added before it; `mask` marks all readings left out for it,
+    `after` is the number of effects added before it; `mask` marks all readings left out for it,
     None for none.
     """
 
     finding: Finding
     p_value: float
-    behind: int = 0
+    after: int = 0
     mask: BoolArray | None = None
 
 

@@ -65,13 +65,13 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     max_phase_error_rad
         The largest phase difference of model and readings; 0 where it is obviously small.
     """
-    plain = data.residual(at.reading)
-    if _in_phase(data, at, plain):
-        return plain, 0.0
-    log_ratio, phase, centre = alignment(data, at, plain)
+    difference = data.residual(at.reading)
+    if _in_phase(data, at, difference):
+        return difference, 0.0
+    log_ratio, phase, centre = alignment(data, at, difference)
     slip = float(np.max(np.abs(phase), initial=0.0))
     if slip < _LARGE_DIFFERENCE and np.max(np.abs(log_ratio), initial=0.0) < _LARGE_DIFFERENCE:
-        return plain, slip
+        return difference, slip
     sampled = at.sampled
     by_log = np.interp(sampled.phase, centre, log_ratio)
     by_phase = np.interp(sampled.phase, centre, phase)
@@ -79,13 +79,13 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     moved = amplitude * np.exp(by_log) * np.cos(sampled.phase + by_phase)
     omega = sampled.motion.angular_frequency
     linear = sampled.angle * by_log + sampled.velocity / omega * by_phase
-    return plain + sampled.angle - moved + linear, slip
+    return difference + sampled.angle - moved + linear, slip
 
 
-def _in_phase(data: Data, at: Evaluated, plain: FloatArray) -> bool:
+def _in_phase(data: Data, at: Evaluated, difference: FloatArray) -> bool:
     """Whether all residuals are too small for a phase difference in any cycle."""
     sampled = at.sampled
-    if np.max(np.abs(plain) * data.weight) > _SMALL_RESIDUAL * np.min(sampled.amplitude):
+    if np.max(np.abs(difference) * data.weight) > _SMALL_RESIDUAL * np.min(sampled.amplitude):
         return False
     return abs(_turned(data, at)) < math.pi
 
@@ -98,19 +98,19 @@ def _turned(data: Data, at: Evaluated) -> float:
     return turned - float(np.interp(when, at.sampled.time_s, at.sampled.phase))
 
 
-def alignment(data: Data, at: Evaluated, plain: FloatArray) -> Alignment:
+def alignment(data: Data, at: Evaluated, difference: FloatArray) -> Alignment:
     """Compare readings with a model cycle by cycle; empty if there are too few cycles.
 
     Parameters
     ----------
     data, at
         The readings, and the model at them.
-    plain
+    difference
         Result of `data.residual`, shape (n,).
     """
     sampled = at.sampled
     try:
-        found = lock_in(plain + sampled.angle, data.weight, sampled, _CYCLE_SHARE)
+        found = lock_in(difference + sampled.angle, data.weight, sampled, _CYCLE_SHARE)
     except np.linalg.LinAlgError:
         return _NO_CYCLES
     if len(found.number) < 2:

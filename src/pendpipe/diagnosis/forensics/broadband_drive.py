@@ -91,7 +91,7 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
     instants = edges[:-1] + 0.5 * spacing
     growth = sampled.at_nodes(fit.at.tangent.of_start()[0])
     # A kick's random steps are spread over its window.
-    behind = np.clip((time[:, None] - edges[:-1]) / spacing, 0.0, 1.0)
+    after = np.clip((time[:, None] - edges[:-1]) / spacing, 0.0, 1.0)
     there = np.interp(instants, time, sampled.amplitude)
     grown = there * np.interp(instants, time, growth)
     basis = tangent_basis(fit)
@@ -102,7 +102,7 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
         (sampled.amplitude * sampled.cosine * growth, grown),
         (sampled.amplitude * sampled.sine, there),
     ):
-        columns = behind * quadrature[:, None] / scale
+        columns = after * quadrature[:, None] / scale
         tall = np.zeros((len(time) + 1, _KICKS))
         tall[:-1] = noise.whiten(columns)
         tall -= basis @ (basis.T @ tall)

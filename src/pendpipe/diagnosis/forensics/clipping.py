@@ -40,7 +40,7 @@ class End(NamedTuple):
     """One end of the range."""
 
     side: Side
-    level: float
+    limit: float
     at: BoolArray
     """Readings at this end; shape (m,) of `Raw`."""
     p_value: float
@@ -51,7 +51,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the largest (smallest) reading is smaller than the motion's.
 
     With the true angles x_j from the rest of each window (without readings at the end), the
-    probability that no reading exceeds the level m is
+    probability that no reading exceeds the limit m is
 
         p = product over j of Phi((m + q/2 - x_j)/sigma_j),
 
@@ -73,8 +73,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
 
 def _at_end(raw: Raw, slack: float, sign: float) -> BoolArray:
     """Return the readings at the end of the observed range."""
-    level = float((sign * raw.values[raw.used]).max())
-    return np.asarray(raw.used & (sign * raw.values >= level - slack))
+    limit = float((sign * raw.values[raw.used]).max())
+    return np.asarray(raw.used & (sign * raw.values >= limit - slack))
 
 
 def _end(raw: Raw, lattice: Lattice | None, side: Side, memory: float) -> End:
@@ -82,20 +82,20 @@ def _end(raw: Raw, lattice: Lattice | None, side: Side, memory: float) -> End:
     step = lattice.step if lattice is not None else 0.0
     slack = 0.5 * step if step else 1e-9 * float(np.ptp(raw.values[raw.used]))
     at, other = _at_end(raw, slack, sign), _at_end(raw, slack, -sign)
-    level = float((sign * raw.values[at]).max())
+    limit = float((sign * raw.values[at]).max())
     if np.count_nonzero(at) < _FEWEST_AT_END:
-        return End(side, sign * level, at, 1.0, 0.0)
+        return End(side, sign * limit, at, 1.0, 0.0)
     local = local_residual(raw.phase, raw.residual, raw.used, leave_out=at | other)
     if local.smooth(memory) and local.rms > _ROUNDING_RMS * step:
         # The motion is not fitted well enough: its true extremes are unknown.
-        return End(side, sign * level, at, 1.0, 0.0)
+        return End(side, sign * limit, at, 1.0, 0.0)
     true = sign * (raw.values - local.left)
     before = _noise(local, step)
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
-    near = raw.used & (true > level - 6.0 * local.rms - 3.0 * step)
-    p_value = _largest(level + 0.5 * step - true[near], spread[near], _common(before, step))
-    beyond = np.maximum(true[at] - level - 0.5 * step, 0.0) / spread[at]
-    return End(side, sign * level, at, p_value, float(beyond @ beyond))
+    near = raw.used & (true > limit - 6.0 * local.rms - 3.0 * step)
+    p_value = _largest(limit + 0.5 * step - true[near], spread[near], _common(before, step))
+    beyond = np.maximum(true[at] - limit - 0.5 * step, 0.0) / spread[at]
+    return End(side, sign * limit, at, p_value, float(beyond @ beyond))
 
 
 def _noise(local: Local, step: float) -> float:
@@ -123,16 +123,16 @@ def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tupl
     if part is None:
         inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
         index = np.flatnonzero(inside)
-        place = _nearest_datum(data, samples.time_s[index])
+        datum = _nearest_datum(data, samples.time_s[index])
     else:
-        index, place = np.arange(part.start, part.stop), np.arange(len(data))
+        index, datum = np.arange(part.start, part.stop), np.arange(len(data))
     clipped = np.zeros(len(index), dtype=bool)
-    slack = 0.5 * step if step else 1e-9 * abs(ends[0].level)
+    slack = 0.5 * step if step else 1e-9 * abs(ends[0].limit)
     for end in ends:
         sign = 1.0 if end.side == "upper" else -1.0
-        clipped |= sign * (samples.values[index] - end.level) >= -slack
+        clipped |= sign * (samples.values[index] - end.limit) >= -slack
     mask = np.zeros(len(data), dtype=bool)
-    mask[place[clipped]] = True
+    mask[datum[clipped]] = True
     return int(np.count_nonzero(clipped)), mask
 
 
@@ -155,13 +155,13 @@ def _described(
     step = lattice.step if lattice is not None else 0.0
     number, mask = _clipped(data, samples, ends, step)
     for end in ends:
-        parameters[f"{end.side}_level"] = Estimate(end.level, step / math.sqrt(12.0), data.unit)
+        parameters[f"{end.side}_level"] = Estimate(end.limit, step / math.sqrt(12.0), data.unit)
         if lattice is not None:
-            codes.append(round(float(lattice.position(np.array(end.level)))))
+            codes.append(round(float(lattice.position(np.array(end.limit)))))
     parameters["number"] = Estimate(float(number), 0.0, "")
     when, amplitude = data.time_s[mask], fit.at.sampled.amplitude[mask]
     sides = " and ".join(end.side for end in ends)
-    levels = " and ".join(f"{end.level:.5g}" for end in ends)
+    limits = " and ".join(f"{end.limit:.5g}" for end in ends)
     around = {"upper": 0.0, "lower": math.pi}[ends[0].side]
     return Finding(
         "clipping",
@@ -177,6 +177,6 @@ def _described(
             adc_codes=tuple(codes),
         ),
         mask=mask,
-        summary=f"{number} readings lie at the {sides} end of the range ({levels}"
+        summary=f"{number} readings lie at the {sides} end of the range ({limits}"
         f" {data.unit}), which the motion exceeds, until {when[-1]:.4g} s",
     )

@@ -127,11 +127,11 @@ def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | 
     moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
     if np.count_nonzero(moving) < 50:
         moving[:] = True
-    place = coded.position[moving] - np.round(coded.position[moving])
+    position = coded.position[moving] - np.round(coded.position[moving])
     before = math.hypot(coded.ratio, coded.blur)
-    expected, variance = rounding_moments(place, before)
+    expected, variance = rounding_moments(position, before)
     more, less = (1.0 + _RELATIVE_STEP) * before, (1.0 - _RELATIVE_STEP) * before
-    gain = rounding_moments(place, more)[0] - rounding_moments(place, less)[0]
+    gain = rounding_moments(position, more)[0] - rounding_moments(position, less)[0]
     gain /= more**2 - less**2
     square = coded.error[moving] ** 2
     unit = float(np.mean(square))
@@ -167,8 +167,8 @@ def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = N
     solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * wanted))
     rest = (wanted - basis @ solved) * inverse
     off = capped - squares.expected
-    level = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
-    off = off - level * squares.gain
+    common = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
+    off = off - common * squares.gain
     weights = rest * squares.expected
     # Scatter relative to independent squares of normal numbers.
     share = (
@@ -202,9 +202,9 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
     size, covariance = _fitted(squares, [speed])
     lowest = 0.1 * squares.expected
     model = squares.expected + squares.gain * (size[0] + size[1] * speed)
-    plain = squares.expected + squares.gain * _fitted(squares, [])[0][0]
-    model, plain = np.maximum(model, lowest), np.maximum(plain, lowest)
-    gain = np.log(plain / model) + squares.square * (1.0 / plain - 1.0 / model)
+    null = squares.expected + squares.gain * _fitted(squares, [])[0][0]
+    model, null = np.maximum(model, lowest), np.maximum(null, lowest)
+    gain = np.log(null / model) + squares.square * (1.0 / null - 1.0 / model)
     to_seconds = squares.unit / squares.speed
     share = max(float(size[1]), 0.0)
     seconds = math.sqrt(share * to_seconds)

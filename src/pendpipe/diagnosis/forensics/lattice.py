@@ -76,17 +76,17 @@ def find_lattice(
     """
     if step is None or not step > 0.0:
         return None
-    levels, inverse = np.unique(values, return_inverse=True)
-    if len(levels) < 3:
+    distinct, inverse = np.unique(values, return_inverse=True)
+    if len(distinct) < 3:
         return None
-    gaps = np.round(np.diff(levels) / step).astype(np.int64)
+    gaps = np.round(np.diff(distinct) / step).astype(np.int64)
     number = np.concatenate([[0], np.cumsum(gaps)])
     if number[-1] < 2:
         return None
     centred = number - number.mean()
-    refined = float(centred @ levels / (centred @ centred))
-    origin = float(np.mean(levels - refined * number))
-    if np.max(np.abs(levels - origin - refined * number)) > slack * refined:
+    refined = float(centred @ distinct / (centred @ centred))
+    origin = float(np.mean(distinct - refined * number))
+    if np.max(np.abs(distinct - origin - refined * number)) > slack * refined:
         return None
     shift = round(origin / refined)
     return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
@@ -118,8 +118,8 @@ def with_true_step(samples: Samples) -> Samples:
         return samples
     if np.diff(np.unique(whole[:_FIRST_CODES])).min(initial=np.inf) < 2.0:
         return samples
-    levels = np.unique(whole)
-    times = spacing_of(levels) if len(levels) >= _FEWEST_CODES else None
+    distinct = np.unique(whole)
+    times = spacing_of(distinct) if len(distinct) >= _FEWEST_CODES else None
     if times is None:
         return samples
     step = times * samples.step
@@ -127,12 +127,12 @@ def with_true_step(samples: Samples) -> Samples:
     return replace(samples, step=step, noise_rms=noise, promised_step=samples.step)
 
 
-def spacing_of(levels: FloatArray) -> float | None:
+def spacing_of(distinct: FloatArray) -> float | None:
     """Return the spacing of the observed codes in steps; None if they have none.
 
     Parameters
     ----------
-    levels
+    distinct
         Observed codes (whole numbers), rising.
 
     Returns
@@ -141,7 +141,7 @@ def spacing_of(levels: FloatArray) -> float | None:
         Whole if all codes are its multiples (from one of them on); else the spacing of a lattice
         of which they are the roundings.
     """
-    gaps = np.diff(levels)
+    gaps = np.diff(distinct)
     if len(gaps) < 2 or gaps.min() < 2.0:
         return None
     common = int(np.gcd.reduce(gaps.astype(np.int64)))
@@ -152,12 +152,12 @@ def spacing_of(levels: FloatArray) -> float | None:
     number = np.append(0.0, np.cumsum(np.round(gaps / spacing)))
     for _ in range(_ROUNDS):
         centred = number - number.mean()
-        spacing = float(centred @ levels / (centred @ centred))
-        off = levels - spacing * number
+        spacing = float(centred @ distinct / (centred @ centred))
+        off = distinct - spacing * number
         if float(np.ptp(off)) < 2.0 * _LARGEST_ROUNDING:
             return spacing
         # A gap may have been counted wrong: recount by the line through all of them.
-        number = np.round((levels - off.mean()) / spacing)
+        number = np.round((distinct - off.mean()) / spacing)
     return None
 
 
@@ -231,8 +231,8 @@ def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, Fl
     error = codes - grid[:, None]
     square = np.sum(chance * error**2, axis=1)
     fourth = np.sum(chance * error**4, axis=1)
-    place = fraction - np.round(fraction)
+    position = fraction - np.round(fraction)
     return (
-        np.interp(place, grid, square),
-        np.interp(place, grid, np.maximum(fourth - square**2, 0.0)),
+        np.interp(position, grid, square),
+        np.interp(position, grid, np.maximum(fourth - square**2, 0.0)),
     )

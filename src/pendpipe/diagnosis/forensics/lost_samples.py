@@ -132,10 +132,10 @@ def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle:
     residual = data.residual(fit.at.reading) * data.weight
     readings = (residual + sampled.angle)[inside]
     before = amplitude * np.cos(sampled.phase[inside] + phase[cycle - 1])
-    behind = amplitude * np.cos(sampled.phase[inside] + phase[cycle + 1])
-    gain = (readings - before) ** 2 - (readings - behind) ** 2
+    after = amplitude * np.cos(sampled.phase[inside] + phase[cycle + 1])
+    gain = (readings - before) ** 2 - (readings - after) ** 2
     total = np.concatenate([[0.0], np.cumsum(gain)])
     # Sum of squares with the break at j: earlier phase up to j, later one from j on.
     best = int(np.argmin(total))
-    place = np.flatnonzero(inside)
-    return float(data.time_s[place[min(best, len(place) - 1)]])
+    rows = np.flatnonzero(inside)
+    return float(data.time_s[rows[min(best, len(rows) - 1)]])
