@@ -542,7 +542,7 @@ def targets() -> dict[str, Target]:
         "the plain form": Target(_files(_named(".csv", seeds.plain())), run_file, 60_000),
         "WinDaq CSV": Target(_files(_named(".csv", seeds.windaq_csv())), run_file, 25_000),
         "DI-149 captures": Target(_files(_named(".cso", seeds.captures())), run_file, 40_000),
-        "WinDaq": Target(_files(seeds.windaq_files()), run_file, 200_000),
+        "WinDaq": Target(_files(seeds.windaq_files()), run_file, 170_000),
         "MATLAB": Target(_files(_named(".mat", seeds.matlab())), run_file, 40_000),
         "MATLAB, inside the compression": Target(_matlab_packed, run_file, 15_000),
         "Excel": Target(_files([(".xlsx", seeds.zipped(_workbook()))]), run_file, 5_000),
@@ -556,6 +556,7 @@ def targets() -> dict[str, Target]:
         marked = isinstance(find_driver(model).decoder(1), SyncBitDecoder)
         inputs = 20_000 if marked else 25_000
         found[f"decoder {model}"] = Target(_stream(model), run_decoder, inputs)
+    found["XML projects and zips"] = Target(_files(seeds.projects()), run_file, 30_000)
     return found
 
 

@@ -49,6 +49,52 @@ def texts() -> list[bytes]:
         ).encode(),
         ("% remark\nlocal time,angle_deg\n" + clock).encode("utf-16"),
         ("sample rate (Hz): 10\n" + rows("{n}\t{x:.4f}\t{x:.2e}\n")).encode(),
+        ("t1;theta1;t2;theta2\n" + rows("{t:.0e};{x:.4f};{t:.2f};{x:.3f}\n")).encode(),
+        ("t,theta\n" + rows("{t:.2f},{x:.5f}\n") * 3).encode(),
+        ("TM,PT\n" + "".join(rows("{t:.3f},{x:.4f}\n").splitlines(keepends=True)[::-1])).encode(),
+        (
+            'MIN=0\t-1\nMAX=3\t1\nSCALE=3\t1\nDEC=1\t3\nDEF="Zeit" t / s\t"Winkel" w / rad\n'
+            + rows("{t:.3f}\t{x:.4f}\n").replace(".", ",")
+        ).encode(),
+    ]
+
+
+def projects() -> list[tuple[str, bytes]]:
+    """Projects kept as XML, and tables in a zip archive."""
+    channel = "<channel><quantity>{}</quantity><symbol>a</symbol><unit>{}</unit><values>{}</values>"
+    cells = [rows("<value>{t}</value>"), rows("<value>{x}</value>")]
+    cassy = "".join(
+        channel.format(name, unit, each) + "</channel>"
+        for name, unit, each in zip(("Zeit", "Winkel"), ("s", "rad"), cells, strict=True)
+    )
+    column = (
+        "<DataColumn><DataObjectName>{}</DataObjectName><ColumnCells>{}</ColumnCells></DataColumn>"
+    )
+    marks = rows(
+        '<property name="[{n}]"><object class="tracker.PointMass$FrameData">'
+        '<property name="x" type="double">{x}</property><property name="y" type="double">1.5'
+        "</property></object></property>"
+    )
+    tracker = (
+        '<object class="tracker.TrackerPanel"><property name="delta_t">33.3</property>'
+        f'<object class="a.tracker.PointMass">{marks}</object></object>'
+    )
+    head = "<?xml version='1.0'?>"
+    return [
+        (".labx", (head + f"<cassylab>{cassy}</cassylab>").encode()),
+        (
+            ".cmbl",
+            (
+                head
+                + "<Document>"
+                + column.format("Time", rows("{t}\n"))
+                + column.format("Angle", rows("{x}\n"))
+                + "</Document>"
+            ).encode(),
+        ),
+        (".trk", (head + tracker).encode()),
+        (".zip", zipped({"Raw Data.csv": texts()[0], "meta/time.csv": b"event,0\n"})),
+        (".trz", zipped({"a.trk": (head + tracker).encode()})),
     ]
 
 

@@ -282,7 +282,7 @@ def _evenness(finite: FloatArray) -> float:
 def _counts_samples(column: Column, role: Role) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
     values = column.values
-    if not np.isfinite(values).all() or np.any(values != np.rint(values)):
+    if len(values) < 2 or not np.isfinite(values).all() or np.any(values != np.rint(values)):
         return False
     return abs(float(np.median(np.diff(values)))) == 1.0 and role in ("index", "unknown", "length")
 

@@ -238,9 +238,11 @@ def _by_step(finite: FloatArray) -> _Guess | None:
 
 def _printed_digit(finite: FloatArray, scale: float) -> float | None:
     """Find the decimal place of which all readings, times `scale`, are multiples."""
-    some = scale * finite[:: max(1, len(finite) // 2000)]
-    if len(some) < 20:
+    some = finite[:: max(1, len(finite) // 2000)]
+    # Beyond 1e9 a double has no such digits left.
+    if len(some) < 20 or np.abs(some).max() > 1e9:
         return None
+    some = scale * some
     for place in range(7):
         whole = some * 10.0**place
         # Of readings that have no such digit a few in a hundred are this near to one.
