@@ -264,6 +264,68 @@ def test_it_may_hang_anywhere(tmp_path: Path, level: float) -> None:
     np.testing.assert_allclose(values - values.mean(), ANGLE - ANGLE.mean(), atol=1e-5)
 
 
+# --- programs that write text in their own way ---------------------------------------------
+
+
+def test_frames_that_a_tracker_lost_are_missing(tmp_path: Path) -> None:
+    for lost in ("nan", "NaN", ""):
+        lines = text(TIME, ANGLE, head="t (s),theta (rad)\n").splitlines()
+        lines[100] = lines[100].split(",")[0] + f",{lost}"
+        recording = read_text(tmp_path, "\n".join(lines) + "\n")
+        assert np.flatnonzero(~recording.usable).tolist() == [99]
+
+
+def test_a_serial_monitors_arrows_and_labels(tmp_path: Path) -> None:
+    arrows = "".join(
+        f"12:03:{t % 60:06.3f} -> {round(1e3 * t)},{x:.6f}\n"
+        for t, x in zip(TIME, ANGLE, strict=True)
+    )
+    same(read_text(tmp_path, arrows))
+    bare = "".join(f"12:03:{t % 60:06.3f} -> {x:.6f}\n" for t, x in zip(TIME, ANGLE, strict=True))
+    same(read_text(tmp_path, bare))
+    pairs = zip(TIME, ANGLE, strict=True)
+    labels = "".join(f"t:{t:.4f},theta:{x:.6f}\n" for t, x in pairs)
+    same(read_text(tmp_path, labels))
+    same(read_text(tmp_path, "ready\n" + labels.replace(":", "=").replace(",", " ")))
+
+
+def test_logger_pro_labview_and_pandas_as_text(tmp_path: Path) -> None:
+    rows = text(TIME, ANGLE, sign="\t")
+    vernier = "Vernier Format 2\nUntitled\n3/4/2019 10:10:10\nRun 1\nTime\tAngle\nt\tθ\ns\trad\n\n"
+    recording = read_text(tmp_path, vernier + rows)
+    same(recording)
+    assert not recording.weak_guesses
+    labview = (
+        "LabVIEW Measurement\t\nSeparator\tTab\nTime\t10:10:10,5\n***End_of_Header***\t\n\n"
+        "Channels\t1\nY_Unit_Label\tVolts\nDelta_X\t0.033333\n***End_of_Header***\t\n"
+        "X_Value\tVoltage\n"
+    )
+    recording = read_text(tmp_path, labview + rows)
+    assert recording.quantity == "volts"
+    np.testing.assert_allclose(recording.values, ANGLE, atol=1e-5)
+    index = np.arange(len(TIME), dtype=float)
+    pandas = text(index, TIME, ANGLE, head=",t,theta\n")
+    same(read_text(tmp_path, pandas))
+
+
+def test_minus_signs_and_blanks_of_a_typesetter(tmp_path: Path) -> None:
+    rows = text(TIME, ANGLE, head="t (s),theta (rad)\n")
+    same(
+        read_text(tmp_path, rows.replace("-", "\N{MINUS SIGN}").replace(",", ",\N{NO-BREAK SPACE}"))
+    )
+
+
+def test_a_workbook_of_texts_with_decimal_commas(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    sheet.append(["t (s)", "theta (rad)"])
+    for t, x in zip(TIME, ANGLE, strict=True):
+        sheet.append([f"{t:.4f}".replace(".", ","), f"{x:.6f}".replace(".", ",")])
+    book.save(tmp_path / "a.xlsx")
+    same(read(tmp_path / "a.xlsx"))
+
+
 # --- containers ----------------------------------------------------------------------------
 
 

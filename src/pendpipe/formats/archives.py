@@ -120,7 +120,7 @@ def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
             book = load_workbook(io.BytesIO(data), read_only=True, data_only=True)
             sheets = {sheet.title: _rows(sheet) for sheet in book if hasattr(sheet, "values")}
     numbers = {
-        title: sum(isinstance(cell, int | float) for row in rows for cell in row)
+        title: sum(_is_number(cell) for row in rows for cell in row)
         for title, rows in sheets.items()
     }
     best = max(numbers, key=lambda title: numbers[title], default=None)
@@ -129,7 +129,7 @@ def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
     width = max(map(len, sheets[best]))
     rows = (list(row) + [None] * (width - len(row)) for row in sheets[best])
     text = "\n".join("\t".join(map(_written, row)) for row in rows) + "\n"
-    plain = ReadOptions(**{**vars(options), "delimiter": "\t", "decimal": "."})
+    plain = ReadOptions(**{**vars(options), "delimiter": "\t"})
     try:
         table = table_of_text(place, text, plain, "excel")
     except NotThisFormatError as reason:
@@ -171,6 +171,13 @@ def _rows(sheet: Any) -> list[tuple[Any, ...]]:
         if width:
             filled.append(row[:width])
     return filled
+
+
+def _is_number(cell: Any) -> bool:
+    """Say whether a cell holds a number, or a text that is one."""
+    if isinstance(cell, str):
+        return re.fullmatch(r"\s*[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?\s*", cell) is not None
+    return isinstance(cell, int | float)
 
 
 def _written(cell: Any) -> str:

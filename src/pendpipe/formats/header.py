@@ -19,7 +19,7 @@ _RATE_WORD: Final = re.compile(
 )
 _INTERVAL_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(interval|period|time|step)|\bdt\b|delta[\s_]*t\b|time[\s_]*step"
-    r"|abtast(zeit|intervall)|\bts\b",
+    r"|abtast(zeit|intervall)|\bts\b|\bdelta_x\b",
     re.I,
 )
 _VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]*)", re.I)

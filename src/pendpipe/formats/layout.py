@@ -32,7 +32,7 @@ COMMENT: Final = ("#", "%", "//", "!")
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
 BLANK_CELLS: Final = frozenset(
-    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "#value!", '""', "?", "*")
+    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "nan", "#value!", '""', "?", "*")
 )
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
 

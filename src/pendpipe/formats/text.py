@@ -56,7 +56,9 @@ def decode(data: bytes) -> str:
 
 
 def _unified(text: str) -> str:
-    return text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    """Give line ends, minus signs and blanks one form each."""
+    text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", " ")
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -66,7 +68,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
-    lines = _without_cassy_limits(text.split("\n"))
+    lines = _without_labels(_without_arrows(_without_cassy_limits(text.split("\n"))))
     _refuse_long(place, lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
@@ -108,6 +110,44 @@ def _without_cassy_limits(lines: list[str]) -> list[str]:
         for line in lines[:50]
     ]
     return head + lines[50:]
+
+
+_ARROW: Final = re.compile(r"\s*(\d{1,2}:\d\d:\d\d(?:\.\d+)?)\s*->\s*")
+_LABELLED: Final = re.compile(r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;\s]?")
+
+
+def _without_arrows(lines: list[str]) -> list[str]:
+    """Make a cell of the time that a serial monitor puts before each line (``12:03:04.512 ->``)."""
+    some = lines[:100]
+    marked = [line for line in some if _ARROW.match(line)]
+    if len(marked) < 0.5 * len(some) or not marked:
+        return lines
+    sign = next((sign for sign in "\t;," if sign in marked[len(marked) // 2]), " ")
+    return [_ARROW.sub(lambda match: match[1] + sign, line, count=1) for line in lines]
+
+
+def _without_labels(lines: list[str]) -> list[str]:
+    """Take names out of rows that repeat them (``t:0.01,theta:0.5``) and put them above."""
+    first = next((row for row, line in enumerate(lines[:100]) if _labels(line)), None)
+    if first is None:
+        return lines
+    names = _labels(lines[first])
+    rows = [line for line in lines[first : first + 50] if line.strip()]
+    if len(rows) < 4 or any(_labels(line) != names for line in rows[:-1]):
+        return lines
+    bare = [
+        ",".join(match[2] for match in _LABELLED.finditer(line)) if _labels(line) else line
+        for line in lines[first:]
+    ]
+    # The names take the place of the line above, so that the rows keep their numbers.
+    return [*lines[: max(0, first - 1)], ",".join(names), *bare]
+
+
+def _labels(line: str) -> list[str]:
+    """The names in a row of names and numbers; none where it is anything else."""
+    found = _LABELLED.findall(line) if ":" in line or "=" in line else []
+    whole = bool(found) and not _LABELLED.sub("", line).strip()
+    return [name for name, _ in found] if whole else []
 
 
 def _refuse_long(place: Path, lines: Sequence[str]) -> None:
@@ -233,6 +273,6 @@ def _column(header: Header, place: int, values: FloatArray, found: Numbers | Non
         unit=unit or (found.unit if found is not None else ""),
         values=np.ascontiguousarray(values),
         number=place + 1,
-        blank=found.blank if found is not None and found.blank.any() else None,
+        blank=np.isnan(values) if np.isnan(values).any() else None,
         fault=found.fault if found is not None else None,
     )
