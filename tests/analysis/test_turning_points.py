@@ -19,7 +19,7 @@ from pendpipe.analysis.turning_points import (
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
-from pendpipe.recording import Recording
+from pendpipe.recording import Quantity, Recording
 
 OMEGA = 2.0 * math.pi * 0.516
 FIG_8 = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
@@ -281,7 +281,6 @@ BAD = {
     "dead": np.full(3000, 0.2),
     "saturated": np.clip(0.3 * np.cos(3.0 * TIME), -0.1, 0.1),
     "noise": 1e-4 * np.random.default_rng(3).standard_normal(3000),
-    "beyond pi": 40.0 * np.exp(-0.02 * TIME) * np.cos(3.0 * TIME),
     "half cycles": 0.3 * np.cos(0.1 * TIME),
 }
 
@@ -294,8 +293,9 @@ def test_unfit_readings_are_refused_in_one_line(fault: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
-def test_metres_have_no_pi() -> None:
+@pytest.mark.parametrize("quantity", ["angle_rad", "displacement_m", "reading"])
+def test_a_torsion_pendulum_and_what_is_no_angle_swing_beyond_pi(quantity: Quantity) -> None:
     values = 40.0 * np.exp(-0.02 * TIME) * np.cos(3.0 * TIME)
-    points = find_turning_points(Recording(TIME, values, "displacement_m"))
-    assert points.unit == "m"
+    points = find_turning_points(Recording(TIME, values, quantity))
+    assert points.unit == {"angle_rad": "rad", "displacement_m": "m", "reading": "1"}[quantity]
     assert points.amplitude_rad[0] == pytest.approx(40.0 * math.exp(-0.02 * points.time_s[0]), 1e-3)

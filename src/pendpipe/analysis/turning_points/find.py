@@ -43,7 +43,7 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     Parameters
     ----------
     recording
-        Angles (rad), displacements (m), or volts with a known sensor constant, of a free
+        Angles (rad), or any other readings in their own unit, of a free
         decay: what stands before the release is cut already. Times may be uneven.
     place
         Named in messages.
@@ -58,7 +58,7 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     NotAnalysableError
         Dead or saturated channel, amplitude below the noise, under three half cycles.
     InputError
-        An angle beyond pi about its centre (a wrong unit).
+        A sensor constant that is no number.
     """
     return turning_points_of(prepare(recording, place), place)
 

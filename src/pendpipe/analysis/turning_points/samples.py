@@ -12,7 +12,7 @@ import numpy as np
 from pendpipe.analysis.noise import find_step, noise_rms
 from pendpipe.analysis.turning_points.plain import extent, stays
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError, NotAnalysableError
+from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
 _FEWEST: Final = 16
@@ -64,7 +64,7 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     NotAnalysableError
         Dead or saturated channel, too few readings.
     InputError
-        Readings that are still volts; an angle beyond pi about its centre.
+        A sensor constant that is no number.
     """
     if recording.quantity == "volts":
         recording = recording.as_motion(place=place)
@@ -82,12 +82,6 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
             place, f"the channel is dead: it reads {low:.6g} throughout", "check the sensor"
         )
     _refuse_saturated(values, low, high, place)
-    if recording.quantity == "angle_rad" and high - low > 2.0 * math.pi:
-        raise InputError(
-            place,
-            f"the angle reaches {0.5 * (high - low):.3g} rad about its centre, beyond pi",
-            "give --unit (deg, V, m), or --volts-per-radian",
-        )
     step = recording.resolution or find_step(values)
     if step is not None and _one_row_a_count(time, values, step):
         return _edges(time, values, recording.unit, step)
