@@ -1,10 +1,12 @@
-"""Tear, empty and alter every result of the small campaign, and run it again.
+"""Tear, empty and alter every kind of result of the small campaign, and run it again.
 
-    python -m benchmarks.torn_files [--limit N] [--seed N]
+    python -m benchmarks.torn_files [--apart] [--limit N] [--seed N]
 
-A row a file and a damage: whether the next run names it, which jobs it takes, and whether
-campaign.json ends as it was, byte for byte. What was tried is kept in ``.evidence`` for as
-long as the code is the same, so that a stopped run goes on where it was.
+A row a file and a damage: whether the next run names the file, sets it aside and makes it
+again, how many jobs that run has, whether campaign.json ends as it was, byte for byte, and
+whether anything is left to do. All files suffer the same damage in one run, records' files
+in a record each; with ``--apart`` each has a run of its own. What was tried is kept in
+``.evidence`` for as long as the code is the same: a stopped run goes on where it was.
 """
 
 from __future__ import annotations
@@ -17,28 +19,26 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from pendpipe.doctor import examine
 from pendpipe.provenance import code_version
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / ".evidence/torn_files"
 RESULTS = FOLDER / "results"
-RECORD = "air-07"
 FILES = (
     "calibration/caliper.csv",
     "calibration/sensor.json",
-    "calibration/manifest/sensor.json",
-    f"{RECORD}/recording.csv",
-    f"{RECORD}/calibration.json",
-    f"{RECORD}/turning_points.csv",
-    f"{RECORD}/fit.json",
-    f"{RECORD}/diagnosis/diagnosis.json",
-    f"{RECORD}/diagnosis/damping.svg",
-    f"{RECORD}/figures/decay.svg",
-    f"{RECORD}/manifest/fit.json",
-    "broken/recording.csv",
+    "water-low-2/recording.csv",
+    "water-low-4/calibration.json",
+    "water-low-5/turning_points.csv",
+    "air-03/fit.json",
+    "air-07/diagnosis/diagnosis.json",
+    "air-11/diagnosis/damping.svg",
+    "water-high-1/figures/decay.svg",
+    "water-high-4/manifest/fit.json",
     "broken/refused.json",
     "separation.json",
     "comparison.json",
@@ -46,7 +46,7 @@ FILES = (
     "figures/fig05.svg",
     "figures/drawn.json",
     "report.html",
-    "manifest/compare.json",
+    "manifest/report.json",
 )
 
 
@@ -89,54 +89,70 @@ def snakemake(*arguments: str) -> str:
     return done.stdout + done.stderr
 
 
-def tried(name: str, damage: str, draw: random.Random, before: bytes) -> list[str]:
-    """Damage one file, run again, and return the table's row."""
-    path = RESULTS / name
+def tried(names: Sequence[str], damage: str, seed: int, before: bytes) -> list[list[str]]:
+    """Damage files, run again, and return the table's rows."""
     change, old_time = DAMAGES[damage]
-    status = path.stat()
-    path.write_bytes(change(path.read_bytes(), draw))
-    if old_time:
-        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    for name in names:
+        path = RESULTS / name
+        status = path.stat()
+        path.write_bytes(change(path.read_bytes(), random.Random(f"{seed} {name} {damage}")))
+        if old_time:
+            os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     began = time.perf_counter()
     output = snakemake()
     spent = time.perf_counter() - began
     jobs = re.search(r"^total +(\d+)$", output, flags=re.MULTILINE)
-    kept = list(path.parent.glob(f"{path.name}.damaged-*"))
-    row = [
-        name,
-        damage,
-        "yes" if f"{path}: " in output else "**no**",
-        "yes" if len(kept) == 1 else "**no**",
-        jobs[1] if jobs else "0",
-        "the same" if (RESULTS / "campaign.json").read_bytes() == before else "**differs**",
-        "nothing" if "Nothing to be done" in snakemake("-n") else "**jobs**",
-        f"{spent:.0f}",
-    ]
-    for copy in kept:
-        copy.unlink()
-    return row
+    wrong = {finding.path for finding in examine(RESULTS) if finding.kind != "set-aside"}
+    same = (RESULTS / "campaign.json").read_bytes() == before
+    nothing = "Nothing to be done" in snakemake("-n")
+    rows = []
+    for name in names:
+        path = RESULTS / name
+        kept = list(path.parent.glob(f"{path.name}.damaged-*"))
+        rows.append(
+            [
+                name,
+                damage,
+                "yes" if f"{path}: " in output else "**no**",
+                "yes" if len(kept) == 1 else "**no**",
+                "yes" if path.is_file() and str(path) not in wrong else "**no**",
+                jobs[1] if jobs else "0",
+                "the same" if same else "**differs**",
+                "nothing" if nothing else "**jobs**",
+                f"{spent:.0f}",
+            ]
+        )
+        for copy in kept:
+            copy.unlink()
+    return rows
 
 
 def main() -> None:
     """Try what is left to try, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--limit", type=int, help="how many rows to try in this run")
+    parser.add_argument("--apart", action="store_true", help="a run for each file")
+    parser.add_argument("--limit", type=int, help="how many runs to make now")
     parser.add_argument("--seed", type=int, default=0, help="of the random bytes")
     arguments = parser.parse_args()
     code = code_version("pendpipe.commands.report") + code_version("pendpipe.commands.fit")
-    journal = FOLDER / f"{code}-{arguments.seed}.json"
+    way = "apart" if arguments.apart else "together"
+    journal = FOLDER / f"{code}-{way}-{arguments.seed}.json"
     FOLDER.mkdir(parents=True, exist_ok=True)
     rows = json.loads(journal.read_text(encoding="utf-8")) if journal.exists() else []
     done = {(row[0], row[1]) for row in rows}
     snakemake()
+    for copy in RESULTS.rglob("*.damaged-*"):
+        copy.unlink()
     before = (RESULTS / "campaign.json").read_bytes()
-    left = [(name, damage) for name in FILES for damage in DAMAGES if (name, damage) not in done]
-    for name, damage in left[: arguments.limit]:
-        draw = random.Random(f"{arguments.seed} {name} {damage}")
-        rows.append(tried(name, damage, draw, before))
+    groups = [[name] for name in FILES] if arguments.apart else [list(FILES)]
+    runs = [(names, damage) for damage in DAMAGES for names in groups]
+    left = [run for run in runs if (run[0][0], run[1]) not in done]
+    for names, damage in left[: arguments.limit]:
+        rows += tried(names, damage, arguments.seed, before)
         journal.write_text(json.dumps(rows), encoding="utf-8")
-        print(f"{len(rows)} of {len(FILES) * len(DAMAGES)}: {rows[-1]}", file=sys.stderr)
-    head = ["file", "damage", "named", "set aside", "jobs", "campaign.json", "left to do", "s"]
+        print(f"{len(rows)} of {len(FILES) * len(DAMAGES)}", file=sys.stderr)
+    head = ["file", "damage", "named", "set aside", "made again", "jobs", "campaign.json"]
+    head += ["left to do", "s"]
     for row in (head, ["---"] * len(head), *rows):
         print(f"| {' | '.join(row)} |")
     print(f"\n{len(rows)} of {len(FILES) * len(DAMAGES)} tried")

@@ -210,9 +210,9 @@ def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> No
     check_contract(content)
     assert content["verdict"] == "not-analysable"
     assert content["reason"] == "no decay"
-    from pendpipe.stages.diagnose import DIAGNOSIS_FIGURES
+    from pendpipe.figures import OF_EVERY_DIAGNOSIS
 
-    for name in DIAGNOSIS_FIGURES:
+    for name in OF_EVERY_DIAGNOSIS:
         assert (tmp_path / f"{name}.svg").read_text().startswith("<svg")
 
 

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from pendpipe.figures import fig03, fig04, fig05, fig06, fig09, fig10, tail
+from pendpipe.figures.comparison import (
+    draw_fig03,
+    draw_fig04,
+    draw_fig05,
+    draw_fig06,
+    draw_fig09,
+    draw_fig10,
+    draw_tail,
+)
 from pendpipe.figures.data import NothingToDrawError
 
 WATER, AIR = 15, 12
@@ -26,7 +34,7 @@ def curves(axes: Any, minimum: int = 30) -> list[np.ndarray]:
 
 
 def test_figure_3_draws_every_position_and_the_fitted_slope(example: Any) -> None:
-    figure = fig03.draw(example.content["calibration"])
+    figure = draw_fig03(example.content["calibration"])
     upper, lower = figure.axes
     assert len(points(upper)) == len(points(lower)) == 25
     (x0, x1), (y0, y1) = upper.lines[0].get_data()
@@ -41,12 +49,12 @@ def test_figure_3_residual_is_data_minus_line(example: Any) -> None:
     calibration = example.content["calibration"]
     raised = {**calibration, "points": [dict(p) for p in calibration["points"]]}
     raised["points"][3]["volts"] += 0.01
-    before, after = (points(fig03.draw(c).axes[1])[3, 1] for c in (calibration, raised))
+    before, after = (points(draw_fig03(c).axes[1])[3, 1] for c in (calibration, raised))
     assert after - before == pytest.approx(10.0)
 
 
 def test_figure_4_line_is_k_f_squared(example: Any) -> None:
-    upper, lower = fig04.draw(example.content).axes[:2]
+    upper, lower = draw_fig04(example.content).axes[:2]
     drawn = points(upper)
     assert len(drawn) == AIR
     (x0, x1), (y0, y1) = upper.lines[0].get_data()
@@ -57,14 +65,14 @@ def test_figure_4_line_is_k_f_squared(example: Any) -> None:
 
 
 def test_figure_5_both_causes_together_exceed_each(example: Any) -> None:
-    axes = fig05.draw(example.content).axes[0]
+    axes = draw_fig05(example.content).axes[0]
     buoyancy, added, both = curves(axes)[:3]
     assert np.all(both[:, 1] > np.maximum(buoyancy[:, 1], added[:, 1]))
     assert axes.get_ylabel().endswith("(%)")
 
 
 def test_figure_6_history_term_lowers_q_tenfold_and_more(example: Any) -> None:
-    axes = fig06.draw(example.content).axes[0]
+    axes = draw_fig06(example.content).axes[0]
     for steady, full in np.array(curves(axes)).reshape(2, 2, -1, 2):
         # 1 + a/delta is between 9 and 36 here; a decimal logarithm is drawn.
         assert np.all((steady - full)[:, 1] > 0.95)
@@ -73,7 +81,7 @@ def test_figure_6_history_term_lowers_q_tenfold_and_more(example: Any) -> None:
 
 
 def test_figure_9_shows_the_drag_factor_below_the_theory(example: Any) -> None:
-    upper, lower = fig09.draw(example.content).axes
+    upper, lower = draw_fig09(example.content).axes
     assert len(points(upper)) == len(points(lower)) == WATER
     ratio = points(lower)
     high = ratio[ratio[:, 0] > 0.8, 1]
@@ -82,7 +90,7 @@ def test_figure_9_shows_the_drag_factor_below_the_theory(example: Any) -> None:
 
 
 def test_figure_10_leaves_hysteresis_out_in_red_and_overestimates(example: Any) -> None:
-    axes = fig10.draw(example.content).axes[0]
+    axes = draw_fig10(example.content).axes[0]
     drawn = [line for line in axes.lines if len(line.get_xdata()) >= 30]
     for full, viscous in zip(drawn[0::2], drawn[1::2], strict=True):
         assert np.all(viscous.get_ydata() > full.get_ydata())
@@ -93,7 +101,7 @@ def test_figure_10_leaves_hysteresis_out_in_red_and_overestimates(example: Any) 
 
 def test_tail_figure_shows_the_whole_record_and_every_later_start(example: Any) -> None:
     fits = example.content["tail"]
-    for panel, name in zip(tail.draw(fits).axes, "abc", strict=False):
+    for panel, name in zip(draw_tail(fits).axes, "abc", strict=False):
         drawn = points(panel)
         assert drawn[:, 0] == pytest.approx([fit["start_s"] for fit in fits[1:]])
         factor = drawn[0, 1] / fits[1][name]["value"]
@@ -104,11 +112,11 @@ def test_tail_figure_shows_the_whole_record_and_every_later_start(example: Any) 
 def test_a_hopeless_tail_does_not_squeeze_the_others(example: Any) -> None:
     fits = [*example.content["tail"]]
     last = {name: {**fits[-1][name], "sd": 1e4} for name in "abc"}
-    low, high = tail.draw([*fits, {**fits[-1], **last, "start_s": 200.0}]).axes[0].get_ylim()
+    low, high = draw_tail([*fits, {**fits[-1], **last, "start_s": 200.0}]).axes[0].get_ylim()
     assert high - low < 4 * fits[0]["a"]["value"]
 
 
-@pytest.mark.parametrize("draw", [fig05.draw, fig06.draw, fig09.draw, fig10.draw])
+@pytest.mark.parametrize("draw", [draw_fig05, draw_fig06, draw_fig09, draw_fig10])
 def test_without_theory_curves_there_is_nothing_to_draw(draw: Any, example: Any) -> None:
     with pytest.raises(NothingToDrawError):
         draw({**example.content, "curves": {}})
@@ -117,5 +125,5 @@ def test_without_theory_curves_there_is_nothing_to_draw(draw: Any, example: Any)
 def test_refused_records_are_not_drawn(example: Any) -> None:
     records = [dict(entry) for entry in example.content["records"]]
     records[0] = {"record": "water-high-1", "refused": "no decay"}
-    axes = fig09.draw({**example.content, "records": records}).axes[0]
+    axes = draw_fig09({**example.content, "records": records}).axes[0]
     assert len(points(axes)) == WATER - 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe import physics
-from pendpipe.figures import decay as decay_figure
-from pendpipe.figures import fig07, fig08
+from pendpipe.analysis.turning_points import read_turning_points, write_turning_points
+from pendpipe.estimate import Estimate
 from pendpipe.figures.data import Decay, NothingToDrawError, read_decay
-from pendpipe.figures.exponential import fit_exponential
+from pendpipe.figures.decays import (
+    draw_decay,
+    draw_fig07,
+    draw_fig08,
+    fit_exponential,
+    local_quality,
+    quality_with_band,
+)
 from pendpipe.recording import read_plain
 
 TYPICAL = "water-low-7"
@@ -28,7 +36,7 @@ def quiet_decay(a: float, b: float, c: float, *, sd: float = 1e-9) -> Decay:
     """A decay without noise, at 0.5 Hz."""
     time = np.arange(0.0, 200.0, 1.0)
     parameters = {
-        name: {"value": value}
+        name: Estimate(value, 0.0, "")
         for name, value in zip(
             ("a", "b", "c", "frequency", "amplitude"), (a, b, c, 0.5, 0.07), strict=True
         )
@@ -41,7 +49,7 @@ def quiet_decay(a: float, b: float, c: float, *, sd: float = 1e-9) -> Decay:
 def test_figure_7_draws_all_samples_inside_the_envelope(example: Any) -> None:
     recording = read_plain(example.folder / TYPICAL / "recording.csv")
     found = read_decay(example.folder, entry_of(example, TYPICAL))
-    upper, lower = fig07.draw(found, recording, 3.85).axes
+    upper, lower = draw_fig07(found, recording, 3.85).axes
     samples, above, below = (np.column_stack(line.get_data()) for line in upper.lines)
     assert len(samples) == 32768
     noise_mv = 1e3 * 3.85 * 8e-5
@@ -54,7 +62,7 @@ def test_figure_7_draws_all_samples_inside_the_envelope(example: Any) -> None:
 
 def test_figure_8_limit_and_maximum_are_those_of_equation_15(example: Any) -> None:
     found = read_decay(example.folder, entry_of(example, TYPICAL))
-    axes = fig08.draw(found).axes[0]
+    axes = draw_fig08(found).axes[0]
     quality = axes.lines[0].get_ydata()
     a, b, c = found.rates
     frequency = found.value("frequency")
@@ -68,7 +76,7 @@ def test_figure_8_limit_and_maximum_are_those_of_equation_15(example: Any) -> No
 
 def test_local_quality_of_an_exact_decay_is_equation_15() -> None:
     quiet = quiet_decay(0.45, 0.012, 1.4e-6)
-    local = fig08.local_quality(quiet)
+    local = local_quality(quiet)
     y = np.interp(local.time_s, quiet.time_s, quiet.amplitude_rad)
     assert local.value == pytest.approx(physics.quality_factor(y, 0.5, *quiet.rates), rel=0.01)
 
@@ -76,7 +84,7 @@ def test_local_quality_of_an_exact_decay_is_equation_15() -> None:
 def test_band_is_the_error_of_b_where_only_b_is_uncertain() -> None:
     # With a = c = 0 the quality factor is pi f/b whatever the amplitude.
     quiet = quiet_decay(0.0, 0.012, 0.0)
-    quality, half_width = fig08.quality_with_band(quiet, quiet.time_s)
+    quality, half_width = quality_with_band(quiet, quiet.time_s)
     assert quality == pytest.approx(np.pi * 0.5 / 0.012)
     assert half_width == pytest.approx(1.96 * quality * 1e-4 / 0.012, rel=1e-4)
 
@@ -100,7 +108,7 @@ def test_linear_damping_misfits_a_nonlinear_decay(example: Any) -> None:
 
 def test_decay_residuals_are_data_minus_fit(example: Any) -> None:
     found = read_decay(example.folder, entry_of(example, "water-low-1"))
-    upper, lower = decay_figure.draw(found).axes
+    upper, lower = draw_decay(found).axes
     fitted = physics.amplitude(found.elapsed_s, found.value("amplitude"), *found.rates)
     residual = lower.containers[0][0].get_ydata()
     assert residual == pytest.approx(1e6 * (found.amplitude_rad - fitted))
@@ -111,18 +119,18 @@ def test_decay_residuals_are_data_minus_fit(example: Any) -> None:
 def test_a_wrong_level_does_not_split_the_two_sides(example: Any, tmp_path: Any) -> None:
     entry = entry_of(example, TYPICAL)
     source = example.folder / TYPICAL
-    lines = (source / "turning_points.csv").read_text().splitlines()
-    start = next(i for i, line in enumerate(lines) if line.startswith("half_cycle"))
-    rows = np.loadtxt(lines[start + 1 :], delimiter=",")
+    points = read_turning_points(source / "turning_points.csv")
     shift = 1e-3
-    rows[:, 5] += shift
-    rows[:, 3] -= 4 / np.pi * shift
+    moved_points = replace(
+        points,
+        level_rad=points.level_rad + shift,
+        angle_rad=points.angle_rad - 4 / np.pi * shift,
+        level_coupling=4 / np.pi,
+    )
     target = tmp_path / TYPICAL
     target.mkdir()
     (target / "fit.json").write_text((source / "fit.json").read_text())
-    with (target / "turning_points.csv").open("w") as stream:
-        stream.write(f"# level_coupling: {4 / np.pi}\n{lines[start]}\n")
-        np.savetxt(stream, rows, delimiter=",")
+    write_turning_points(target / "turning_points.csv", moved_points)
     true, moved = (read_decay(folder, entry) for folder in (example.folder, tmp_path))
     assert moved.amplitude_rad == pytest.approx(true.amplitude_rad, abs=1e-12)
 

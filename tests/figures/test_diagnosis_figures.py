@@ -15,16 +15,9 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.cycles import cycles
-from pendpipe.figures import (
-    diagnosis_codes,
-    diagnosis_curve,
-    diagnosis_cycles,
-    diagnosis_map,
-    diagnosis_spectrum,
-)
+from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES, diagnosis
 from pendpipe.figures.data import NothingToDrawError
-from pendpipe.figures.diagnosis import draw_diagnosis
-from pendpipe.figures.diagnosis_data import Shown, shown
+from pendpipe.figures.diagnosis import Shown, draw_diagnosis, shown
 from pendpipe.recording import Recording
 
 FREQUENCY_HZ, LINEAR, AMPLITUDE, NOISE_RAD = 0.9, 0.012, 0.25, 1e-4
@@ -77,7 +70,7 @@ def test_a_model_on_its_own_clock_has_its_own_amplitude_and_phase(content: Shown
 
 
 def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:
-    (axes,) = diagnosis_cycles.draw_frequency(content).axes
+    (axes,) = diagnosis.draw_frequency(content).axes
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["Eq. 8", "with circular-error", "readings"]
     flat, bent = (line.get_ydata() for line in axes.lines[1:3])
@@ -88,7 +81,7 @@ def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Sho
 
 
 def test_the_figure_of_the_damping_shows_losses_less_the_baselines(content: Shown) -> None:
-    upper, lower = diagnosis_cycles.draw_damping(content).axes
+    upper, lower = diagnosis.draw_damping(content).axes
     assert "1/Q" in upper.get_ylabel()
     assert lower.lines[1].get_ydata() == pytest.approx(0.0, abs=1e-9)
     expected = 2e3 * LINEAR / OMEGA
@@ -96,14 +89,14 @@ def test_the_figure_of_the_damping_shows_losses_less_the_baselines(content: Show
 
 
 def test_the_map_is_loud_before_and_quiet_after(content: Shown) -> None:
-    before = diagnosis_map.residual_map(content, content.baseline)
+    before = diagnosis.residual_map(content, content.baseline)
     assert content.extended is not None
-    after = diagnosis_map.residual_map(content, content.extended)
+    after = diagnosis.residual_map(content, content.extended)
     assert np.nanmax(np.abs(before)) > 50.0
     assert np.nanstd(after) == pytest.approx(1.0, abs=0.15)
     # A phase that runs away shows where the velocity is largest, not at the turning points.
     rows = np.nanmean(before**2, axis=1)
-    quarter = diagnosis_map.PHASES // 4
+    quarter = diagnosis.PHASES // 4
     assert rows[quarter] > 10.0 * rows[0]
 
 
@@ -112,7 +105,7 @@ def test_no_label_of_the_map_is_cut_off(content: Shown, quieter: float) -> None:
     """However loud the residual is beside the noise, and so however long the numbers are."""
     variance = content.noise.variance / quieter**2
     noise = replace(content.noise, variance=variance, white_rms=content.noise.white_rms / quieter)
-    figure = diagnosis_map.draw(replace(content, noise=noise))
+    figure = diagnosis.draw_residual_map(replace(content, noise=noise))
     whole = FigureCanvasAgg(figure).figure.bbox
     for axes in figure.axes:
         inside = axes.get_tightbbox()
@@ -124,11 +117,11 @@ def test_no_label_of_the_map_is_cut_off(content: Shown, quieter: float) -> None:
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:
     """White noise of rms s, read every dt: s sqrt(2 dt)."""
     assert content.extended is not None
-    frequency, density = diagnosis_spectrum.spectrum(content, content.extended)
+    frequency, density = diagnosis.spectrum(content, content.extended)
     expected = NOISE_RAD * math.sqrt(2.0 * content.data.interval_s)
     upper = frequency > 1.0
     assert np.sqrt(np.mean(density[upper] ** 2)) == pytest.approx(expected, rel=0.06)
-    level = diagnosis_spectrum.noise_level(content, frequency)
+    level = diagnosis.noise_level(content, frequency)
     # Below, chance may pass for red noise.
     assert level[upper] == pytest.approx(expected, rel=0.06)
 
@@ -137,15 +130,15 @@ def test_the_spectrum_of_a_tone_stands_at_its_frequency(content: Shown) -> None:
     at, time = content.baseline.at, content.data.time_s
     tone = np.sin(2.0 * math.pi * 3.3 * time)
     loud = replace(content, data=replace(content.data, values=at.reading + tone, lattice=None))
-    frequency, density = diagnosis_spectrum.spectrum(loud, content.baseline)
+    frequency, density = diagnosis.spectrum(loud, content.baseline)
     assert frequency[np.argmax(density)] == pytest.approx(3.3, abs=0.05)
 
 
 def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> None:
     content = shown(outcome)
-    for module in (diagnosis_curve, diagnosis_codes):
+    for draw in (diagnosis.draw_curve, diagnosis.draw_codes):
         with pytest.raises(NothingToDrawError):
-            module.draw(content)
+            draw(content)
     drawn = draw_diagnosis(outcome, tmp_path)
     assert [path.stem for path in drawn] == [
         "decay", "residual_map", "residual_spectrum", "damping", "frequency",
@@ -171,7 +164,7 @@ def named(outcome: Any, found: dict[str, Any]) -> Shown:
 
 
 def test_an_unnamed_effect_is_drawn_with_its_95_percent_band(outcome: Any) -> None:
-    (axes,) = diagnosis_curve.draw(named(outcome, curve())).axes
+    (axes,) = diagnosis.draw_curve(named(outcome, curve())).axes
     band = axes.collections[0].get_paths()[0].vertices
     assert np.ptp(band[np.isclose(band[:, 0], 20.0), 1]) == pytest.approx(2 * 1.96e-4)
     assert axes.get_xlabel() == "Amplitude (mrad)"
@@ -180,7 +173,7 @@ def test_an_unnamed_effect_is_drawn_with_its_95_percent_band(outcome: Any) -> No
 
 def test_a_loss_has_its_local_exponent_below(outcome: Any) -> None:
     found = curve(local_exponent=np.full(20, 1.5), local_exponent_sd=np.full(20, 0.1))
-    _, lower = diagnosis_curve.draw(named(outcome, found)).axes
+    _, lower = diagnosis.draw_curve(named(outcome, found)).axes
     assert lower.lines[0].get_ydata() == pytest.approx(1.5)
     assert "exponent" in lower.get_ylabel()
 
@@ -196,7 +189,7 @@ def test_codes_are_counted_where_they_matter(outcome: Any) -> None:
         data=replace(content.data, values=clipped, step=step, lattice=None),
         diagnosis=replace(content.diagnosis, effects=(effect,)),
     )
-    (axes,) = diagnosis_codes.draw(content).axes
+    (axes,) = diagnosis.draw_codes(content).axes
     heights = [bar.get_height() for bar in axes.patches]
     assert sum(heights) == len(clipped)
     top = round((20 * step - clipped.min()) / step)
@@ -217,8 +210,12 @@ def test_a_code_is_marked_where_its_readings_are(outcome: Any) -> None:
         data=replace(content.data, values=values, step=step, lattice=None),
         diagnosis=replace(content.diagnosis, effects=(replace(effect, location=where),)),
     )
-    (axes,) = diagnosis_codes.draw(content).axes
+    (axes,) = diagnosis.draw_codes(content).axes
     mark = axes.lines[-1].get_xdata()[0]
     (bar,) = [bar for bar in axes.patches if bar.get_x() < mark < bar.get_x() + bar.get_width()]
     assert bar.get_height() == np.count_nonzero(values == code * step)
     assert axes.get_xlim()[0] == pytest.approx(round(values.min() / step) - 0.5)
+
+
+def test_each_figure_has_a_name_that_the_workflow_knows() -> None:
+    assert {*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES} == set(diagnosis.DRAWINGS)

@@ -11,10 +11,10 @@ import matplotlib as mpl
 import pytest
 
 from pendpipe.cli import main
-from pendpipe.figures import decay as decay_figure
-from pendpipe.figures import fig03, fig09
 from pendpipe.figures.campaign import draw_all
+from pendpipe.figures.comparison import draw_fig03, draw_fig09
 from pendpipe.figures.data import read_decay
+from pendpipe.figures.decays import draw_decay
 from pendpipe.figures.style import save
 from pendpipe.quantities import prefixed, with_error
 
@@ -55,14 +55,14 @@ def test_several_processes_draw_what_one_draws(
 
 def test_the_same_data_give_the_same_bytes(example: Any, tmp_path: Path) -> None:
     first, second = (
-        save(fig09.draw(example.content), tmp_path / folder / "fig09") for folder in ("a", "b")
+        save(draw_fig09(example.content), tmp_path / folder / "fig09") for folder in ("a", "b")
     )
     for one, other in zip(first, second, strict=True):
         assert one.read_bytes() == other.read_bytes()
 
 
 def test_letters_stay_letters_and_no_axis_has_an_offset(example: Any, tmp_path: Path) -> None:
-    svg, _ = save(fig03.draw(example.content["calibration"]), tmp_path / "fig03")
+    svg, _ = save(draw_fig03(example.content["calibration"]), tmp_path / "fig03")
     words = "".join(ET.parse(svg).getroot().itertext())
     assert "Sensor output (V)" in words
     assert "1e" not in words
@@ -70,7 +70,7 @@ def test_letters_stay_letters_and_no_axis_has_an_offset(example: Any, tmp_path: 
 
 def test_drawing_leaves_matplotlib_as_it_was(example: Any) -> None:
     before = dict(mpl.rcParams)
-    fig09.draw(example.content)
+    draw_fig09(example.content)
     assert dict(mpl.rcParams) == before
 
 
@@ -78,7 +78,7 @@ def test_a_name_with_a_dollar_is_no_formula(example: Any, tmp_path: Path) -> Non
     entry = next(e for e in example.content["records"] if e["record"] == "air-01")
     found = read_decay(example.folder, entry)
     hostile = type(found)(**{**vars(found), "record": "$\\frac{ & <b>"})
-    svg, _ = save(decay_figure.draw(hostile), tmp_path / "decay")
+    svg, _ = save(draw_decay(hostile), tmp_path / "decay")
     assert "$\\frac{ & <b>" in "".join(ET.parse(svg).getroot().itertext())
 
 

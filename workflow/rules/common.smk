@@ -9,9 +9,10 @@ from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import load_campaign
 from pendpipe.errors import InputError
+from pendpipe.figures import OF_EVERY_DIAGNOSIS
 from pendpipe.files import check_writable
 from pendpipe.provenance import code_version
-from pendpipe.stages.diagnose import DIAGNOSIS_FIGURES
+from pendpipe.report.captions import CAPTIONS
 
 jobs.prepare_environment()
 
@@ -78,7 +79,7 @@ def diagnosis_figures():
     if CAMPAIGN.configuration.diagnose.figures == "none":
         return []
     folder = f"{RESULTS}/{{record}}/diagnosis"
-    return [f"{folder}/{name}.svg" for name in DIAGNOSIS_FIGURES]
+    return [f"{folder}/{name}.svg" for name in OF_EVERY_DIAGNOSIS]
 
 
 def diagnoses():
@@ -91,7 +92,7 @@ def figure_files():
     """The figures of the paper, where the campaign has an apparatus to compare with."""
     if CAMPAIGN.configuration.apparatus is None:
         return []
-    names = [f"fig{number:02d}" for number in range(3, 11)]
+    names = [name for name in CAPTIONS if name.startswith("fig")]
     return expand(
         "{results}/figures/{name}.{form}", results=RESULTS, name=names, form=FORMS
     )

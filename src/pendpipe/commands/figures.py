@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from pendpipe.figures.inputs import read_comparison, read_content, results_folder
+    from pendpipe.figures.data import read_comparison, read_content, results_folder
     from pendpipe.manifest import check, job
 
     folder = results_folder(read_content(arguments.campaign))

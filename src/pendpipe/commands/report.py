@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from pendpipe.figures.inputs import read_comparison, read_content, results_folder
+    from pendpipe.figures.data import read_comparison, read_content, results_folder
     from pendpipe.files import replaced
     from pendpipe.manifest import check, job
     from pendpipe.report.headline import as_text, headline

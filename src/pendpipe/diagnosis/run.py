@@ -131,10 +131,9 @@ class Outcome:
         -------
         matplotlib.figure.Figure
         """
-        from pendpipe.figures.diagnosis_data import shown
-        from pendpipe.figures.diagnosis_decay import draw
+        from pendpipe.figures.diagnosis import draw_decay, shown
 
-        return draw(shown(self))
+        return draw_decay(shown(self))
 
 
 def diagnose_recording(

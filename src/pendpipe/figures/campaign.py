@@ -12,17 +12,14 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from pendpipe.errors import InputError
-from pendpipe.figures import (
-    decay,
-    fig03,
-    fig04,
-    fig05,
-    fig06,
-    fig07,
-    fig08,
-    fig09,
-    fig10,
-    tail,
+from pendpipe.figures.comparison import (
+    draw_fig03,
+    draw_fig04,
+    draw_fig05,
+    draw_fig06,
+    draw_fig09,
+    draw_fig10,
+    draw_tail,
 )
 from pendpipe.figures.data import (
     Entry,
@@ -31,8 +28,8 @@ from pendpipe.figures.data import (
     read_decay,
     used,
 )
-from pendpipe.figures.placeholder import placeholder
-from pendpipe.figures.style import save
+from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08
+from pendpipe.figures.style import placeholder, save
 from pendpipe.recording import read_plain
 
 Comparison = Mapping[str, Any]
@@ -109,24 +106,24 @@ def _together(parts: list[Drawn]) -> Drawn:
 def _campaign_figures(comparison: Comparison, folder: Path) -> dict[str, Callable[[], Figure]]:
     """The drawing of each figure, not yet done."""
     figures: dict[str, Callable[[], Figure]] = {
-        "fig03": lambda: fig03.draw(comparison.get("calibration")),
-        "fig04": lambda: fig04.draw(comparison),
+        "fig03": lambda: draw_fig03(comparison.get("calibration")),
+        "fig04": lambda: draw_fig04(comparison),
         "fig07": lambda: _typical_decay(comparison, folder),
-        "fig08": lambda: fig08.draw(read_decay(folder, _typical(comparison))),
-        "tail": lambda: tail.draw(comparison.get("tail")),
+        "fig08": lambda: draw_fig08(read_decay(folder, _typical(comparison))),
+        "tail": lambda: draw_tail(comparison.get("tail")),
     }
     if comparison.get("has_theory"):
         figures |= {
-            "fig05": lambda: fig05.draw(comparison),
-            "fig06": lambda: fig06.draw(comparison),
-            "fig09": lambda: fig09.draw(comparison),
-            "fig10": lambda: fig10.draw(comparison),
+            "fig05": lambda: draw_fig05(comparison),
+            "fig06": lambda: draw_fig06(comparison),
+            "fig09": lambda: draw_fig09(comparison),
+            "fig10": lambda: draw_fig10(comparison),
         }
     return dict(sorted(figures.items()))
 
 
 def _decay_of(folder: Path, entry: Entry) -> Callable[[], Figure]:
-    return lambda: decay.draw(read_decay(folder, entry))
+    return lambda: draw_decay(read_decay(folder, entry))
 
 
 def _typical(comparison: Comparison) -> Entry:
@@ -147,7 +144,7 @@ def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
         recording = read_plain(folder / entry["record"] / "recording.csv")
     except InputError as fault:
         raise NothingToDrawError(str(fault)) from None
-    return fig07.draw(read_decay(folder, entry), recording, constant)
+    return draw_fig07(read_decay(folder, entry), recording, constant)
 
 
 def _draw(

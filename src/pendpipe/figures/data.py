@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.result import read_fit
+from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.estimate import Estimate
+from pendpipe.files import read_json, without_folders
 
 Entry = Mapping[str, Any]
 """One record of ``comparison.json``."""
@@ -45,7 +50,7 @@ class Decay:
     time_s, amplitude_rad, amplitude_sd_rad, level_rad
         The turning points: when, how far from the level, its error, the level; shape (n,).
     parameters
-        ``a``, ``b``, ``c``, ``frequency``, ``amplitude`` as in fit.json.
+        The fit's, by name.
     names, covariance
         Order and matrix of the covariance of the parameters.
     unit
@@ -57,14 +62,14 @@ class Decay:
     amplitude_rad: FloatArray
     amplitude_sd_rad: FloatArray
     level_rad: FloatArray
-    parameters: Mapping[str, Mapping[str, Any]]
+    parameters: Mapping[str, Estimate]
     names: tuple[str, ...]
     covariance: FloatArray
     unit: str = "rad"
 
     def value(self, name: str) -> float:
         """The fitted value of a parameter."""
-        return number(self.parameters[name])
+        return self.parameters[name].value
 
     @property
     def rates(self) -> tuple[float, float, float]:
@@ -132,69 +137,79 @@ def curve(comparison: Mapping[str, Any], branch: str, quantity: str) -> tuple[Fl
     return frequency[order], values[order]
 
 
+def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str, Any]:
+    """Read a JSON file that holds an object.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it holds something else.
+    """
+    if not path.is_file():
+        raise InputError(path, "there is no such file", remedy)
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError(path, "this is no JSON object", "make it again")
+    return content
+
+
+def read_comparison(path: Path) -> dict[str, Any]:
+    """Read comparison.json."""
+    content = read_content(path, "run pendpipe compare first")
+    if "records" not in content:
+        raise InputError(path, "it has no records", "make it again with pendpipe compare")
+    return content
+
+
+def results_folder(configuration: Mapping[str, Any]) -> Path:
+    """The folder of a campaign's results: a folder a record lies in it."""
+    return Path(str(configuration.get("results") or "results"))
+
+
 def read_decay(folder: Path, entry: Entry) -> Decay:
     """Read a record's turning points and fit from its folder of the results.
 
     Raises
     ------
     NothingToDrawError
-        If the files are not there, or were left by a refused record.
+        If the files can't be used, as those of a refused record.
     """
     name = entry["record"]
     try:
-        fit = json.loads((folder / name / "fit.json").read_text(encoding="utf-8"))
-        text = (folder / name / "turning_points.csv").read_text(encoding="utf-8")
-    except FileNotFoundError as fault:
-        raise NothingToDrawError(f"{name} has no {Path(str(fault.filename)).name}") from None
-    if "refused" in fit:
-        raise NothingToDrawError(f"{name} was refused")
-    columns, metadata = _table(text)
-    if columns is None or len(columns["time_s"]) < 3:
-        raise NothingToDrawError(f"{name} has fewer than three turning points")
+        fit = read_fit(folder / name / "fit.json")
+        points = read_turning_points(folder / name / "turning_points.csv")
+    except InputError as fault:
+        raise NothingToDrawError(f"{name}: {without_folders(fault.problem)}") from None
     # The fit counts its time from the first turning point that it kept.
-    start = entry.get("start_s")
-    keep = columns["time_s"] >= (-np.inf if start is None else start - 1e-9)
-    stop = entry.get("stop_s")
-    keep &= columns["time_s"] <= (np.inf if stop is None else stop + 1e-9)
-    if np.count_nonzero(keep) < 3:
-        keep[:] = True
-    columns = {key: column[keep] for key, column in columns.items()}
-    covariance = fit.get("covariance") or {}
+    low, high = entry.get("start_s"), entry.get("stop_s")
+    keep = np.ones(len(points), dtype=np.bool_)
+    keep &= points.time_s >= (-np.inf if low is None else low - 1e-9)
+    keep &= points.time_s <= (np.inf if high is None else high + 1e-9)
+    if np.count_nonzero(keep) >= 3:
+        points = points.chosen(keep)
+    if len(points) < 3:
+        raise NothingToDrawError(f"{name} has fewer than three turning points")
+    offset = fit.parameters.get("offset")
     return Decay(
-        name, columns["time_s"], _amplitude(columns, metadata, fit), columns["angle_sd_rad"],
-        columns["level_rad"],
-        fit["parameters"], tuple(covariance.get("order", ())),
-        np.array(covariance.get("matrix", []), dtype=np.float64), metadata.get("unit", "rad"),
-    )  # fmt: skip
+        name,
+        points.time_s,
+        _amplitude(points, math.nan if offset is None else offset.value),
+        points.angle_sd_rad,
+        points.level_rad,
+        fit.parameters,
+        fit.covariance_order,
+        fit.covariance,
+        points.unit,
+    )
 
 
-def _amplitude(
-    columns: Mapping[str, FloatArray], metadata: Mapping[str, str], fit: Mapping[str, Any]
-) -> FloatArray:
+def _amplitude(points: TurningPoints, offset_rad: float) -> FloatArray:
     """Angles without their alternating sign, about the level that the fit found.
 
     A level too high by one lowers the signed angles by the table's ``level_coupling``.
     """
+    too_high = float(np.mean(points.level_rad)) - offset_rad
+    shift = points.level_coupling * too_high if math.isfinite(too_high) else 0.0
     # Signed, so that noise about zero stays noise about zero.
-    side = 1.0 - 2.0 * (columns["half_cycle"] % 2.0)
-    if float(np.sum(side * columns["angle_rad"])) < 0.0:
-        side = -side
-    too_high = float(np.mean(columns["level_rad"])) - number(fit["parameters"].get("offset"))
-    coupling = float(metadata.get("level_coupling", "1"))
-    shift = coupling * too_high if np.isfinite(too_high) else 0.0
-    return side * (columns["angle_rad"] + shift)
-
-
-def _table(text: str) -> tuple[dict[str, FloatArray] | None, dict[str, str]]:
-    """Columns and metadata of turning_points.csv."""
-    lines = text.splitlines()
-    head = [line for line in lines if line.startswith("#")]
-    rows = [line for line in lines if line.strip() and not line.startswith("#")]
-    metadata = {
-        key.strip(): value.strip()
-        for key, _, value in (line.lstrip("# ").partition(":") for line in head)
-    }
-    if len(rows) < 2:
-        return None, metadata
-    values = np.loadtxt(rows[1:], delimiter=",", ndmin=2)
-    return dict(zip(rows[0].split(","), values.T, strict=True)), metadata
+    amplitude: FloatArray = points.side * (points.angle_rad + shift)
+    return amplitude

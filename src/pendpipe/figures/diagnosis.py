@@ -2,33 +2,599 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.ticker import FixedFormatter
 
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.lattice import find_lattice
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Diagnosis, FoundEffect
 from pendpipe.diagnosis.run import Outcome
-from pendpipe.figures import (
-    diagnosis_codes,
-    diagnosis_curve,
-    diagnosis_cycles,
-    diagnosis_decay,
-    diagnosis_map,
-    diagnosis_spectrum,
-)
+from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.model import Evaluated
 from pendpipe.figures.data import NothingToDrawError
-from pendpipe.figures.diagnosis_data import Shown, shown
-from pendpipe.figures.style import save
+from pendpipe.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    VERMILION,
+    WIDTH_IN,
+    key_above,
+    save,
+    styled,
+)
+from pendpipe.quantities import axis_unit, compact, prefixed, pretty_unit
+
+NAMES = {"eq8": "Eq. 8", "viscous": "Eq. 3"}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A diagnosis with the readings and the models that it compared.
+
+    Parameters
+    ----------
+    diagnosis, data, noise
+        The answer, the readings and their noise.
+    baseline, extended
+        The two models; `extended` is None where nothing was found.
+    """
+
+    diagnosis: Diagnosis
+    data: Data
+    noise: Noise
+    baseline: Fit
+    extended: Fit | None
+
+    @property
+    def clock(self) -> Evaluated:
+        """The model whose phase tells the cycles apart: the one that stays in step."""
+        best = self.extended
+        if best is None or best.max_phase_error_rad > self.baseline.max_phase_error_rad:
+            best = self.baseline
+        return best.at
+
+    @property
+    def baseline_name(self) -> str:
+        """For legends."""
+        return NAMES.get(self.diagnosis.baseline_name, self.diagnosis.baseline_name)
+
+    @property
+    def extended_name(self) -> str:
+        """For legends: what was added."""
+        found = [effect.identifier for effect in self.diagnosis.effects]
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        return f"with {found[0]}{more}"
+
+    def residual(self, fit: Fit) -> FloatArray:
+        """Readings minus model, NaN where a reading is masked; shape (n,)."""
+        left = self.data.residual(fit.at.reading)
+        return np.where(self.data.weight > 0.0, left, math.nan)
+
+    @cached_property
+    def _measured(self) -> Cycles:
+        found = cycles(self.data.values, self.data.weight, self.clock, self.noise.white_rms)
+        if len(found.time_s) < 3:
+            raise NothingToDrawError("there are too few whole cycles")
+        return found
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        ends = span_ends(self._measured)
+        if len(ends) < 3:
+            raise NothingToDrawError("the amplitude is lost in the noise")
+        return ends
+
+    @cached_property
+    def measured(self) -> Spans:
+        """Loss and frequency of the readings."""
+        return between(self._measured, self._ends)
+
+    def of_model(self, fit: Fit) -> Spans:
+        """The same of a model's readings, between the same times."""
+        own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
+        return between(own.at(self._measured.time_s), self._ends)
+
+
+def shown(outcome: Outcome) -> Shown:
+    """Take from an outcome what is drawn."""
+    found = outcome.search
+    extended = found.improved if outcome.diagnosis.effects else None
+    return Shown(outcome.diagnosis, found.data, found.noise, found.baseline, extended)
+
+
+Model = tuple[str, Fit, str]
+"""A model's name in the key, its fit and its colour."""
+_CYCLES: Final = 4.0
+"""Cycles at the end of the decay that are drawn with each reading."""
+
+
+@styled
+def draw_decay(content: Shown) -> Figure:
+    """Draw the amplitude's decay, the last cycles, and the residuals against time."""
+    models: list[Model] = [(content.baseline_name, content.baseline, VERMILION)]
+    if content.extended is not None:
+        models.append((content.extended_name, content.extended, BLUE))
+    data, figure = content.data, Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
+    decay, end, rest = figure.subplots(3, 1)
+    quantity = "Angle" if data.unit == "rad" else "Displacement"
+    values = np.where(data.weight > 0.0, data.values, np.nan)
+    factor, unit = axis_unit(values, data.unit)
+    decay.plot(data.time_s, factor * values, color=GREY, linewidth=0.4, label="readings")
+    for name, fit, colour in models:
+        middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
+        for side in (1.0, -1.0):
+            outline = factor * (middle + side * fit.at.sampled.amplitude)
+            label = name if side > 0.0 else None
+            decay.plot(data.time_s, outline, color=colour, linewidth=1.2, label=label)
+    decay.set_ylabel(f"{quantity} ({unit})")
+    key_above(decay, 3)
+    _draw_end(end, content, values, models)
+    end.set_ylabel(f"{quantity} ({unit})")
+    residuals = [content.residual(fit) for _, fit, _ in models]
+    small, small_unit = axis_unit(np.stack(residuals), data.unit)
+    rest.axhline(0.0, color=INK, linewidth=0.8)
+    for residual, (_, _, colour) in zip(residuals, models, strict=True):
+        rest.plot(data.time_s, small * residual, ".", color=colour, markersize=1.5)
+    rest.set(xlabel="Time (s)", ylabel=f"Readings − model ({small_unit})")
+    return figure
+
+
+def _draw_end(axes: Axes, content: Shown, values: FloatArray, models: list[Model]) -> None:
+    """Draw the last cycles, where a wrong model is most out of phase."""
+    time = content.data.time_s
+    factor, _ = axis_unit(values, content.data.unit)
+    last = time > time[-1] - _CYCLES * content.baseline.at.span.period_s
+    axes.plot(time[last], factor * values[last], "o", color=GREY, markersize=2.0)
+    for _, fit, colour in models:
+        axes.plot(time[last], factor * fit.at.reading[last], color=colour, linewidth=1.0)
+    axes.set_xlabel("Time (s)")
+
+
+PHASES: Final = 24
+_COLUMNS: Final = 90
+_IN_A_CELL: Final = 4
+"""Readings, usually: fewer would leave holes."""
+_CHARACTER: Final = 0.0165
+"""Width of a figure in a tick label, over the drawing's."""
+_COLOURS = LinearSegmentedColormap.from_list(
+    "residual", [BLUE, "#FFFFFF", VERMILION]
+).with_extremes(bad="#E3E6EA")
+
+
+@styled
+def draw_residual_map(content: Shown) -> Figure:
+    """Draw mean residuals over their standard errors, the baseline's and the extended model's."""
+    models = [(content.baseline_name, content.baseline)]
+    if content.extended is not None:
+        models.append((content.extended_name, content.extended))
+    maps = [residual_map(content, fit) for _, fit in models]
+    largest = max([4.0] + [float(np.nanmax(np.abs(each))) for each in maps])
+    norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
+    figure = Figure(figsize=(WIDTH_IN, 2.0 * len(maps) + 0.95))
+    height = figure.get_figheight()
+    ticks = _ticks(largest)
+    labels = _signed(ticks)
+    right = 0.845 - _CHARACTER * max(max(map(len, labels)) - 3, 0)
+    figure.subplots_adjust(
+        left=0.105, right=right, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
+    )
+    rows = figure.subplots(len(maps), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (name, fit), values in zip(rows, models, maps, strict=True):
+        image = _panel(axes, content, values, norm)
+        rms = math.sqrt(float(np.nanmean(content.residual(fit) ** 2)))
+        axes.set_title(f"{name}: residual {compact(rms, content.data.unit)} rms")
+    rows[-1].set_xlabel("Time (s)")
+    low = rows[-1].get_position().y0
+    place = figure.add_axes((right + 0.02, low, 0.02, rows[0].get_position().y1 - low))
+    bar = figure.colorbar(image, cax=place, ticks=ticks, format=FixedFormatter(labels))
+    bar.ax.minorticks_off()
+    bar.set_label("Data − model (standard errors)", labelpad=1)
+    return figure
+
+
+def _panel(axes: Axes, content: Shown, values: FloatArray, norm: AsinhNorm) -> AxesImage:
+    time = content.data.time_s
+    image = axes.imshow(
+        values, norm=norm, cmap=_COLOURS, aspect="auto", origin="lower", interpolation="nearest",
+        extent=(float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
+    )  # fmt: skip
+    axes.grid(visible=False)
+    axes.set_yticks(
+        [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi, 2.0 * math.pi], ["0", "π/2", "π", "3π/2", "2π"]
+    )
+    axes.set_ylabel("Phase of the cycle", labelpad=1)
+    return image
+
+
+def _ticks(largest: float) -> list[float]:
+    """Round numbers, both signs."""
+    steps = [2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6]
+    inside = [step for step in steps if step <= largest]
+    kept = inside[:: max(1, math.ceil(len(inside) / 4))]
+    return sorted([-step for step in kept] + [0.0] + kept)
+
+
+def _signed(ticks: list[float]) -> list[str]:
+    return [f"{tick:+.0f}".replace("-", "−") if tick else "0" for tick in ticks]
+
+
+def residual_map(content: Shown, fit: Fit) -> FloatArray:
+    """Mean residual over its standard error in cells of phase and time.
+
+    Phase 0 is the turning point on the positive side, pi that on the negative. Every cell
+    is a cycle or more wide.
+
+    Returns
+    -------
+    FloatArray
+        Shape (PHASES, columns); NaN where there is no reading.
+    """
+    residual, sampled = content.residual(fit), content.clock.sampled
+    known = np.isfinite(residual)
+    turned = math.pi if sampled.motion.upwards < 0.0 else 0.0
+    phase = np.mod(sampled.phase + turned, 2.0 * math.pi) / (2.0 * math.pi)
+    time = content.data.time_s
+    turns = float(sampled.phase[-1] - sampled.phase[0]) / (2.0 * math.pi)
+    columns = max(1, int(min(turns, _COLUMNS, len(time) / (_IN_A_CELL * PHASES))))
+    row = np.minimum((phase * PHASES).astype(np.int64), PHASES - 1)
+    share = (time - time[0]) / (time[-1] - time[0])
+    column = np.minimum((share * columns).astype(np.int64), columns - 1)
+    cell = (row * columns + column)[known]
+    count = np.bincount(cell, minlength=PHASES * columns)
+    total = np.bincount(cell, weights=residual[known], minlength=PHASES * columns)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = total / (np.sqrt(count) * content.noise.rms)
+    return np.where(count > 0, found, math.nan).reshape(PHASES, columns)
+
+
+_BANDS: Final = 500
+_HARMONICS: Final = 8
+
+
+@styled
+def draw_residual_spectrum(content: Shown) -> Figure:
+    """Draw the amplitude spectral density of what each model leaves."""
+    frequency, baseline = spectrum(content, content.baseline)
+    curves = [(content.baseline_name, baseline, VERMILION, 1.3)]
+    if content.extended is not None:
+        extended = spectrum(content, content.extended)[1]
+        curves.append((content.extended_name, extended, BLUE, 0.8))
+    level = noise_level(content, frequency)
+    factor, unit = axis_unit(np.array([float(np.max(each)) for _, each, _, _ in curves]),
+                             content.data.unit)  # fmt: skip
+    figure = Figure(figsize=(WIDTH_IN, 3.3))
+    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.14, top=0.8)
+    axes = figure.subplots()
+    for name, density, colour, width in curves:
+        axes.plot(frequency, factor * density, color=colour, linewidth=width, label=name)
+    axes.plot(frequency, factor * level, color=INK, linestyle="--", linewidth=1.1, label="noise")
+    axes.set(xscale="log", yscale="log", xlabel="Frequency (Hz)")
+    axes.set_ylabel(f"Residual, density ({unit}/√Hz)")
+    axes.set_xlim(float(frequency[0]), float(frequency[-1]))
+    lowest = 0.1 * float(np.min(level))
+    axes.set_ylim(factor * lowest, 2.0 * factor * max(float(np.max(each[1])) for each in curves))
+    _plain(axes)
+    _mark_harmonics(axes, content)
+    key_above(axes, 2, lift=1.06)
+    return figure
+
+
+def _plain(axes: Axes) -> None:
+    """Numbers instead of powers of ten."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.tick_params(which="minor", length=0)
+
+
+def _mark_harmonics(axes: Axes, content: Shown) -> None:
+    """A thin line at each multiple of the motion's frequency."""
+    motion = float((content.extended or content.baseline).value[OMEGA]) / (2.0 * math.pi)
+    low, high = axes.get_xlim()
+    for harmonic in range(1, _HARMONICS + 1):
+        line = harmonic * motion
+        if not low < line < high:
+            continue
+        axes.axvline(line, color=GREY, linewidth=0.6, linestyle=":", zorder=0)
+        if harmonic in (1, 2, 3, 5, 8):
+            axes.annotate(
+                f"{harmonic}", (line, 1.0), (0.0, 2.0), xycoords=("data", "axes fraction"),
+                textcoords="offset points", ha="center", fontsize=7.5, color=GREY,
+            )  # fmt: skip
+
+
+def even_residual(content: Shown, fit: Fit) -> FloatArray:
+    """The residual at even times: uneven readings are interpolated, masked ones bridged."""
+    residual = content.residual(fit)
+    known = np.isfinite(residual)
+    if content.data.uniform and known.all():
+        return residual
+    time = content.data.time_s
+    even = np.linspace(time[0], time[-1], len(time))
+    return np.interp(even, time[known], residual[known])
+
+
+def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
+    """Amplitude spectral density of a residual, in bands of equal ratio.
+
+    Returns
+    -------
+    frequency_hz, density
+        Shape (k,): in rad/sqrt(Hz) (one-sided, Hann's window), rms over each band.
+    """
+    residual = even_residual(content, fit)
+    count = len(residual)
+    if count < 32:
+        raise NothingToDrawError("there are too few readings for a spectrum")
+    time = content.data.time_s
+    interval = float(time[-1] - time[0]) / (count - 1)
+    window = np.hanning(count)
+    lines = np.fft.rfft((residual - np.mean(residual)) * window)
+    density = np.asarray(2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2), dtype=np.float64)
+    frequency = np.fft.rfftfreq(count, interval)
+    return _banded(np.asarray(frequency[2:-1], dtype=np.float64), density[2:-1])
+
+
+def _banded(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Means of the power over bands, so that a long record makes no black carpet."""
+    edges = np.geomspace(frequency[0], frequency[-1], _BANDS)
+    band = np.searchsorted(edges, frequency, side="right")
+    count = np.bincount(band, minlength=_BANDS + 1)
+    full = count > 0
+    mean = np.bincount(band, weights=density, minlength=_BANDS + 1)[full] / count[full]
+    place = np.bincount(band, weights=frequency, minlength=_BANDS + 1)[full] / count[full]
+    return place, np.sqrt(mean)
+
+
+def noise_level(content: Shown, frequency: FloatArray) -> FloatArray:
+    """The noise's density that the diagnosis has used, rad/sqrt(Hz), at given frequencies."""
+    noise, data = content.noise, content.data
+    interval = float(data.time_s[-1] - data.time_s[0]) / (len(data) - 1)
+    if not noise.uniform:
+        return np.full(len(frequency), noise.rms * math.sqrt(2.0 * interval))
+    known = np.arange(len(noise.variance)) / (2.0 * len(noise.variance) * data.interval_s)
+    return np.sqrt(2.0 * data.interval_s * np.interp(frequency, known, noise.variance))
+
+
+@styled
+def draw_damping(content: Shown) -> Figure:
+    """Draw 1/Q of each span of cycles, and by how much it differs from the baseline's."""
+    measured = content.measured
+    curves = _models(content)
+    omega = float(content.baseline.value[OMEGA])
+    figure = Figure(figsize=(WIDTH_IN, 4.2))
+    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.11, top=0.885, hspace=0.1)
+    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, 0.8]})
+    quality, quality_sd = 2.0 * measured.loss / omega, 2.0 * measured.loss_sd / omega
+    across, unit = axis_unit(measured.amplitude, content.data.unit)
+    x = across * measured.amplitude
+    _points(upper, x, 1e3 * quality, 1e3 * quality_sd, "readings")
+    for name, colour, dashes, spans in curves:
+        upper.plot(x, 2e3 * spans.loss / omega, color=colour, linestyle=dashes, label=name,
+                   linewidth=1.2)  # fmt: skip
+    upper.set_ylabel("Loss 1/Q (10⁻³)")
+    expected = 2.0 * curves[0][3].loss / omega
+    power, factor = _power(np.concatenate([quality - expected, quality_sd]))
+    _points(lower, x, factor * (quality - expected), factor * quality_sd, "")
+    for _, colour, dashes, spans in curves:
+        lower.plot(x, factor * (2.0 * spans.loss / omega - expected), color=colour,
+                   linestyle=dashes, linewidth=1.2)  # fmt: skip
+    lower.set_ylabel(f"1/Q − {content.baseline_name}'s ({power})")
+    _amplitude_axis(lower, x, unit)
+    key_above(upper, 3 if content.extended is None else 2)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+@styled
+def draw_frequency(content: Shown) -> Figure:
+    """Draw the frequency of each span of cycles, relative to the baseline's omega/(2 pi)."""
+    measured = content.measured
+    curves = _models(content)
+    origin = float(content.baseline.value[OMEGA]) / (2.0 * math.pi)
+    shift = measured.frequency_hz / origin - 1.0
+    shift_sd = measured.frequency_sd_hz / origin
+    power, factor = _power(np.concatenate([shift, shift_sd]))
+    figure = Figure(figsize=(WIDTH_IN, 3.2))
+    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.145, top=0.84)
+    axes = figure.subplots()
+    across, unit = axis_unit(measured.amplitude, content.data.unit)
+    x = across * measured.amplitude
+    _points(axes, x, factor * shift, factor * shift_sd, "readings")
+    for name, colour, dashes, spans in curves:
+        axes.plot(x, factor * (spans.frequency_hz / origin - 1.0), color=colour, linestyle=dashes,
+                  label=name, linewidth=1.2)  # fmt: skip
+    axes.set_ylabel(f"Frequency/({origin:.6g} Hz) − 1 ({power})")
+    _amplitude_axis(axes, x, unit)
+    key_above(axes, 3 if content.extended is None else 2)
+    return figure
+
+
+def _models(content: Shown) -> list[tuple[str, str, str, Spans]]:
+    """Name, colour, dashes and spans of the baseline and of the extended model."""
+    found = [(content.baseline_name, VERMILION, "--", content.of_model(content.baseline))]
+    if content.extended is not None:
+        found.append((content.extended_name, INK, "-", content.of_model(content.extended)))
+    return found
+
+
+def _points(axes: Axes, x: FloatArray, y: FloatArray, sd: FloatArray, label: str) -> None:
+    axes.errorbar(
+        x, y, sd, fmt="o", color=BLUE, markersize=3.2, elinewidth=0.7, capsize=0.0,
+        label=label or None,
+    )  # fmt: skip
+
+
+def _power(values: FloatArray) -> tuple[str, float]:
+    """The power of a thousand that an axis of pure numbers is counted in."""
+    largest = float(np.nanmax(np.abs(values)))
+    if largest >= 0.5 or largest == 0.0:
+        return "1", 1.0
+    if largest >= 0.5e-3:
+        return "10⁻³", 1e3
+    return "10⁻⁶", 1e6
+
+
+def _amplitude_axis(axes: Axes, x: FloatArray, unit: str) -> None:
+    """Amplitude along the axis: logarithmic where it falls far."""
+    axes.set_xlabel(f"Amplitude ({unit})")
+    if float(np.max(x)) < 3.0 * float(np.min(x)):
+        return
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    decades = math.log10(float(np.max(x)) / float(np.min(x)))
+    between = (1.0, 3.0) if decades > 2.0 else (1.0, 2.0, 5.0)
+    axes.xaxis.set_major_locator(
+        LogLocator(subs=between if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0))
+    )
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(which="minor", length=0)
+
+
+@styled
+def draw_curve(content: Shown) -> Figure:
+    """Draw the curve of each unnamed effect, one below the other."""
+    unnamed = [effect for effect in content.diagnosis.effects if effect.curve is not None]
+    if not unnamed:
+        raise NothingToDrawError("every effect has a name")
+    rows = sum(2 if _exponents(effect) else 1 for effect in unnamed)
+    height = 2.7 * rows
+    figure = Figure(figsize=(WIDTH_IN, height))
+    figure.subplots_adjust(
+        left=0.15, right=0.975, bottom=0.5 / height, top=1.0 - 0.45 / height, hspace=0.5
+    )
+    panels = iter(figure.subplots(rows, 1, squeeze=False)[:, 0])
+    for effect in unnamed:
+        panel = next(panels)
+        _curve(panel, effect)
+        if not panel.get_legend():
+            panel.set_title(effect.identifier)
+        if _exponents(effect):
+            _exponent(next(panels), effect)
+    return figure
+
+
+def _exponents(effect: FoundEffect) -> bool:
+    return effect.curve is not None and "local_exponent" in effect.curve
+
+
+def _curve(axes: Axes, effect: FoundEffect) -> None:
+    assert effect.curve is not None
+    curve = effect.curve
+    at, argument = _scaled(curve["at"], curve["argument"])
+    sizes = [curve["value"], *([curve["quadrature"]] if "quadrature" in curve else [])]
+    largest = max(float(np.max(np.abs(size))) for size in sizes)
+    name, _, unit = str(curve["ordinate"]).replace("omega^2", "ω²").partition(", ")
+    factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
+    looks = [("value", "sd", BLUE, "-", "in phase" if len(sizes) > 1 else "")]
+    if len(sizes) > 1:
+        looks.append(("quadrature", "quadrature_sd", GREEN, "--", "in quadrature"))
+    axes.axhline(0.0, color=INK, linewidth=0.9)
+    for key, sd, colour, dashes, label in looks:
+        value, half = factor * np.asarray(curve[key]), 1.96 * factor * np.asarray(curve[sd])
+        axes.fill_between(at, value - half, value + half, color=colour, alpha=0.22, linewidth=0.0)
+        axes.plot(at, value, color=colour, linestyle=dashes, label=label or None)
+    label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
+    axes.set(xlabel=argument, ylabel="\n".join(textwrap.wrap(label, 30)))
+    axes.margins(x=0.01)
+    if len(sizes) > 1:
+        key_above(axes, 2)
+
+
+def _exponent(axes: Axes, effect: FoundEffect) -> None:
+    """The power of the velocity that the whole loss follows, by amplitude."""
+    assert effect.curve is not None
+    at, argument = _scaled(effect.curve["at"], effect.curve["argument"])
+    value = np.asarray(effect.curve["local_exponent"])
+    half = 1.96 * np.asarray(effect.curve["local_exponent_sd"])
+    axes.fill_between(at, value - half, value + half, color=BLUE, alpha=0.22, linewidth=0.0)
+    axes.plot(at, value, color=BLUE)
+    for power in (0, 1, 2):
+        axes.axhline(power, color=INK, linewidth=0.6, linestyle=":")
+    axes.set(xlabel=argument, ylabel="Local exponent $n$ of |v|ⁿ")
+    axes.set_ylim(max(float(np.min(value)) - 1.0, -2.0), min(float(np.max(value)) + 1.0, 5.0))
+    axes.margins(x=0.01)
+
+
+def _scaled(at: object, argument: str) -> tuple[np.ndarray, str]:
+    """Arguments in a handy unit, and the axis's name."""
+    values = np.asarray(at, dtype=np.float64)
+    name, _, unit = argument.partition(", ")
+    factor, short = (1.0, unit)
+    if unit in ("rad", "m") and not name.startswith("phase"):
+        factor, short = prefixed(float(np.max(np.abs(values))), unit)
+    return factor * values, f"{name[:1].upper()}{name[1:]} ({short})"
+
+
+CONCERNED: Final = ("clipping", "missing-codes", "coarse-quantisation")
+_BARS: Final = 400
+
+
+@styled
+def draw_codes(content: Shown) -> Figure:
+    """Draw the histogram of codes beside that which the fitted motion with its noise expects."""
+    effects = content.diagnosis.effects
+    marked = sorted({code for effect in effects for code in effect.location.adc_codes})
+    if not marked and not any(effect.identifier in CONCERNED for effect in effects):
+        raise NothingToDrawError("no code is concerned")
+    step = content.data.step
+    if not step > 0.0:
+        raise NothingToDrawError("the readings have no steps")
+    values = content.data.values
+    # The codes of the diagnosis: 0 is the one nearest to a reading of zero.
+    lattice = find_lattice(values, step)
+    origin, step = (0.0, step) if lattice is None else (lattice.origin, lattice.step)
+    codes = np.rint((values - origin) / step).astype(np.int64)
+    model = (content.extended or content.baseline).at.reading
+    expected = np.rint((model - origin) / step).astype(np.int64)
+    low, high = int(codes.min()), int(codes.max())
+    group = -(-(high - low + 1) // _BARS)
+    edges = np.arange(low - 0.5, high + group + 0.5, group)
+    given, _ = np.histogram(codes, edges)
+    wanted, _ = np.histogram(expected, edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    figure = Figure(figsize=(WIDTH_IN, 3.0))
+    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.15, top=0.86)
+    axes = figure.subplots()
+    axes.bar(middle, given, width=group, color=BLUE, linewidth=0.0, label="readings")
+    axes.step(middle, wanted, where="mid", color=INK, linewidth=0.9, label="expected")
+    for code in marked[:200]:
+        axes.axvline(code, color=VERMILION, linewidth=0.8, zorder=0)
+    axes.set(xlabel="Code (0: nearest to a reading of zero)", ylabel="Readings")
+    axes.margins(x=0.0)
+    key_above(axes, 2)
+    return figure
+
 
 DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
-    "decay": diagnosis_decay.draw,
-    "residual_map": diagnosis_map.draw,
-    "residual_spectrum": diagnosis_spectrum.draw,
-    "damping": diagnosis_cycles.draw_damping,
-    "frequency": diagnosis_cycles.draw_frequency,
-    "curve": diagnosis_curve.draw,
-    "codes": diagnosis_codes.draw,
+    "decay": draw_decay,
+    "residual_map": draw_residual_map,
+    "residual_spectrum": draw_residual_spectrum,
+    "damping": draw_damping,
+    "frequency": draw_frequency,
+    "curve": draw_curve,
+    "codes": draw_codes,
 }
 """By name, in the order in which they are read."""
 

@@ -6,6 +6,7 @@ dashes. Vermilion is kept for what goes wrong when something is left out.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -133,6 +134,15 @@ def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0) -> None:
 def plain_text(text: str) -> str:
     """Free text for a title: a dollar sign is no formula."""
     return text.replace("$", r"\$")
+
+
+@styled
+def placeholder(reason: str) -> Figure:
+    """A figure that says why it is empty."""
+    figure = Figure(figsize=(WIDTH_IN, 1.4))
+    text = "\n".join(textwrap.wrap(f"Not drawn: {reason}.", 60))
+    figure.text(0.5, 0.5, plain_text(text), ha="center", va="center", color=GREY)
+    return figure
 
 
 def save(

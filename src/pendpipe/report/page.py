@@ -14,6 +14,7 @@ from typing import Any, Final
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from pendpipe.analysis.fit.result import read_fit
 from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.report.diagnoses import Diagnosed, diagnoses
@@ -164,15 +165,12 @@ def _diagnoses(asked: Content, folder: Path, entries: list[Content], spent: int)
 
 def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
     """SHA-256 of each record's input, from its fit."""
-    hashes = {}
-    for entry in entries:
-        path = folder / str(entry["record"]) / "fit.json"
-        if path.is_file():
-            fit = json.loads(path.read_text(encoding="utf-8"))
-            hashes[str(entry["record"])] = str(
-                (fit.get("provenance") or {}).get("input_sha256", "")
-            )
-    return hashes
+    return {
+        str(entry["record"]): str(read_fit(path).provenance.get("input_sha256", ""))
+        for entry in entries
+        if not entry.get("refused")
+        and (path := folder / str(entry["record"]) / "fit.json").is_file()
+    }
 
 
 def _counts(table: list[Line]) -> list[tuple[str, str, str, int]]:

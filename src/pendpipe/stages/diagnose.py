@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.result import FILE_NAME
+from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import replaced, write_json
 
 if TYPE_CHECKING:
@@ -17,10 +18,6 @@ if TYPE_CHECKING:
     from pendpipe.recording import Recording
 
 RESULT: Final = FILE_NAME
-DIAGNOSIS_FIGURES: Final = ("residual_map", "residual_spectrum", "damping", "frequency")
-"""The figures that the diagnosis of every record has."""
-FIGURES: Final = (*DIAGNOSIS_FIGURES, "decay", "codes", "curve")
-"""All figures' names; `codes` and `curve` are drawn where they have something to show."""
 _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 <text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
 {}</text></svg>
@@ -101,7 +98,7 @@ def write_diagnosis(
 
 def _remove_figures(folder: Path) -> None:
     """Remove the figures of an earlier diagnosis."""
-    for name in FIGURES:
+    for name in (*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES):
         for form in (".svg", ".png"):
             folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
@@ -110,7 +107,7 @@ def _write_placeholders(folder: Path, options: DiagnosisOptions, reason: str) ->
     """Write one line instead of each figure that a workflow waits for and that was not drawn."""
     if not options.in_campaign or options.figures == "none":
         return
-    for name in DIAGNOSIS_FIGURES:
+    for name in OF_EVERY_DIAGNOSIS:
         path = folder / f"{name}.svg"
         if not path.exists():
             with replaced(path) as stream:

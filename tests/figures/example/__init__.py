@@ -15,6 +15,7 @@ import numpy.typing as npt
 import yaml
 
 from pendpipe import physics
+from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.files import write_json
 from pendpipe.recording import Recording, write_plain
 
@@ -77,8 +78,7 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
     sd = np.sqrt(np.diag(covariance))
     units = ("rad", "1/(rad s)", "1/s", "rad/s")
     parameters = {
-        key: estimate(float(values[i]), float(sd[i]), units[i])
-        | {"at_bound": bool(i > 0 and values[i] == 0.0)}
+        key: estimate(float(values[i]), float(sd[i]), units[i], bool(i > 0 and values[i] == 0.0))
         for i, key in enumerate(FIT_NAMES)
     }
     parameters["frequency"] = estimate(truth.frequency, 2e-6, "Hz")
@@ -96,12 +96,12 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
         "provenance": {"input_sha256": f"{seed:064x}", "version": "0.1.0", "seed": 1,
                        "volts_per_radian": SENSOR},
         "warnings": [],
+        "restoring": "linear", "light": "green", "light_reason": "", "decrement_check": [],
     }  # fmt: skip
     write_json(folder / name / "fit.json", fit)
-    rows = zip(*(column.tolist() for column in points.values()), strict=True)
-    head = "# unit: rad\n# samples: 16384\n" + ",".join(points) + "\n"
-    text = head + "".join(",".join(map(repr, row)) + "\n" for row in rows)
-    (folder / name / "turning_points.csv").write_text(text)
+    index = points["half_cycle"].astype(np.int64)
+    table = TurningPoints(**points | {"half_cycle": index}, level_coupling=1.0, samples=16384)  # type: ignore[arg-type]
+    write_turning_points(folder / name / "turning_points.csv", table)
     fit["provenance"] = {}
     return fit
 

@@ -25,9 +25,15 @@ class Truth(NamedTuple):
     lengthening: physics.Lengthening | None
 
 
-def estimate(value: float, sd: float, unit: str) -> dict[str, Any]:
-    half = 1.96 * sd
-    return {"value": value, "sd": sd, "unit": unit, "interval95": [value - half, value + half]}
+def estimate(value: float, sd: float, unit: str, at_bound: bool = False) -> dict[str, Any]:
+    interval = [value - 1.96 * sd, value + 1.96 * sd]
+    return {
+        "value": value,
+        "sd": sd,
+        "unit": unit,
+        "interval95": interval,
+        "at_bound": at_bound,
+    }
 
 
 def parts_of(
