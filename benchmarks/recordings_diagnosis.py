@@ -89,7 +89,7 @@ CIRCULAR = Known("circular error", by_name("circular-error"))
 COULOMB = Known("Coulomb friction", by_name("coulomb-friction"))
 DRAG = Known("quadratic drag", by_name("quadratic-drag"))
 STIFFENING = Known("stiffer below 0.04 rad", stiffens)
-WANDER = Known("slow wander of the offset", warned("the level wanders"))
+WANDER = Known("slow wander of the offset", warned("the offset wanders"))
 SPRING = Known("spring-type period change, no circular error", like_a_spring)
 
 KNOWN: Mapping[str, tuple[Known, ...]] = {

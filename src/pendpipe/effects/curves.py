@@ -278,14 +278,14 @@ class ReadingCurve(Curve):
         return 0.05 * self.span.first_amplitude
 
 
-class BaselineCurve(Curve):
-    """A level that wanders in time."""
+class OffsetCurve(Curve):
+    """An offset that wanders in time."""
 
     in_time = of_anything = True
     identifier = "unnamed-measurement"
-    name = "a level that wanders"
+    name = "a wandering offset"
     equation = r"y = x + s(t)"
-    argument, ordinate = "time, s", "level, rad"
+    argument, ordinate = "time, s", "offset, rad"
     flavour = "time"
     discriminating_test = "record the pendulum at rest for as long"
 
@@ -312,7 +312,7 @@ def usual_loss_rate(pendulum: Pendulum, span: Span) -> float:
 
 CURVES: Sequence[type[Curve]] = (
     RestoringCurve, DampingCurve, FrictionCurve, ProfileCurve, DriveCurve, ReadingCurve,
-    BaselineCurve,
+    OffsetCurve,
 )  # fmt: skip
 
 

@@ -121,7 +121,7 @@ def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
     if lost:
         notes.append(f"{lost} half cycle(s) are left out for lack of readings")
     if level.wanders:
-        notes.append("the level wanders; it is followed by local lines")
+        notes.append("the offset wanders; it is followed by local lines")
     if samples.counts:
         notes.append("one row a count: the times of the counts are the data")
     return tuple(notes)
