@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from pendpipe.estimate import Estimate
 
 FILE_NAME: Final = "diagnosis.json"
+BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
+"""The baselines in words."""
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
 
 

@@ -24,6 +24,7 @@ from pendpipe.diagnosis.one_curve import prefer_one_curve
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import Remainder, remainder_of
+from pendpipe.diagnosis.result import BASELINES
 from pendpipe.diagnosis.review import (
     credible,
     describe_rest,
@@ -49,7 +50,7 @@ _GROSS_SHARE: Final = 0.15
 _LESS_FRICTION: Final = (0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 _LARGE_AMPLITUDE_SHARE: Final = 0.5
-"""The same while the large amplitudes alone are fitted: only what dominates there."""
+"""Part of the misfit that an effect must explain while only the large amplitudes are fitted."""
 
 
 class Reviewed(NamedTuple):
@@ -140,7 +141,7 @@ def search(
         Receives one line for each step.
     """
     data, held = beginning.data, list(beginning.held)
-    progress(f"fitting {baseline} to {data.used} readings")
+    progress(f"fitting {BASELINES.get(baseline, baseline)} to {data.used} readings")
     white = first_noise(beginning)
     fit = refine(beginning.model, data, white, beginning.value, held=held)
     state = State(fit, data, white, held, beginning.value, fit.value)
@@ -244,9 +245,8 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
     if state.now.p_value > threshold or _ends_with_curve(state):
         return False
-    progress(
-        f"chance does not explain the residual ({printed(state.now.p_value)}): refitting leads"
-    )
+    p_value = state.now.p_value / CATALOGUE_SHARE
+    progress(f"chance does not explain the residual ({printed(p_value)}): refitting leads")
     closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
@@ -266,7 +266,7 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         return False
     if not rivals or rivals[0].gain <= max(_NEEDED_CHI2, share * state.fit.chi2 if gross else 0.0):
         return False
-    step = Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, state.fit)
+    step = Step(tuple(rivals), p_value, state.fit)
     if gross and state.steps and not credible(step, state, task.level):
         return False
     if share == _LARGE_AMPLITUDE_SHARE and rivals[0].lead.effect.kind == "unnamed":

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.diagnosis.chance import printed
+from pendpipe.diagnosis.result import BASELINES
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
 
@@ -24,7 +25,6 @@ _IMPROBABLE: Final = 0.01
 """Probability below which a rival is not named beside more probable ones."""
 _SIGNIFICANT: Final = 3.0
 """Standard deviations from which a change of a parameter is reported as a bias."""
-_NAMES = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 _KINDS = {
     "dynamics": "from the model of the pendulum",
     "measurement": "from the model of the measurement",
@@ -105,7 +105,7 @@ def statement(
     notes
         Properties of the time stamps, a clause each.
     """
-    model = _NAMES.get(baseline, baseline)
+    model = BASELINES.get(baseline, baseline)
     stamps = [f"Note: {'; '.join(notes)}."] if notes else []
     if not effects:
         nothing = (
