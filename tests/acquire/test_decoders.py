@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.acquire.drivers.base import Decoder, Loss
-from pendpipe.acquire.drivers.decoders import SyncBitDecoder, WordDecoder
+from pendpipe.acquire.drivers.decoders import Decoder, Loss, SyncBitDecoder, WordDecoder
 from pendpipe.arrays import AnyArray
 
 

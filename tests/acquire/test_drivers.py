@@ -135,7 +135,7 @@ def test_di2108_session(script: Any) -> None:
 def test_di2108_without_an_echo_to_encode_goes_on(script: Any) -> None:
     """Seen on a DI-4108."""
     line = script(*[(b"encode 0\r", b"")] * 3)
-    assert DI2108(line, FAST)._command("encode 0", needed=False) == ""
+    assert DI2108(line, FAST)._send_line("encode 0", needed=False) == ""
     assert line.finished
 
 

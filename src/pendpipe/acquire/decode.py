@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.drivers.base import Loss
+from pendpipe.acquire.drivers.decoders import Loss
 from pendpipe.acquire.raw import COMPLETE, NothingRecordedError, RawRecording, read_raw
 from pendpipe.acquire.segments import Segment, cut, offsets_s, split
 from pendpipe.acquire.timebase import TimeBase, measure_rate

@@ -9,7 +9,8 @@ from typing import TextIO
 
 import numpy as np
 
-from pendpipe.acquire.drivers.base import Decoder, Driver, Setup
+from pendpipe.acquire.drivers.base import Driver, Setup
+from pendpipe.acquire.drivers.decoders import Decoder
 from pendpipe.arrays import AnyArray
 
 _REFRESH_S = 0.2

@@ -15,7 +15,8 @@ from typing import IO, Final, Protocol, cast
 from pendpipe.acquire.clock import Clock, ScaledClock
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.drivers.base import Decoder, Driver, Identity, Setup
+from pendpipe.acquire.drivers.base import Driver, Identity, Setup
+from pendpipe.acquire.drivers.decoders import Decoder
 from pendpipe.acquire.line import Line, LineLostError
 from pendpipe.acquire.noise import NoiseWatch
 from pendpipe.acquire.ports import identify

@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.acquire.drivers.base import Decoder, Driver, Loss
-from pendpipe.acquire.drivers.decoders import WordDecoder
+from pendpipe.acquire.drivers.base import Driver
+from pendpipe.acquire.drivers.decoders import Decoder, Loss, WordDecoder
 from pendpipe.acquire.raw import Hole, RawRecording
 from pendpipe.acquire.slips import find_slips
 from pendpipe.acquire.timebase import find_clock_losses

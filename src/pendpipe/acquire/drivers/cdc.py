@@ -7,14 +7,10 @@ its data and falls silent (dataq-facts A8).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import ClassVar, Final
 
-from pendpipe.acquire.drivers.base import Setup
-from pendpipe.acquire.drivers.choice import choose_channels, choose_range
 from pendpipe.acquire.drivers.decoders import STOP_CODE, STOP_CODE_BYTES, WordDecoder
 from pendpipe.acquire.drivers.text import TextDriver
-from pendpipe.errors import InputError
 
 _BASE_HZ: Final = 60_000_000
 _PACKETS: Final = (16, 32, 64, 128, 256, 512, 1024, 2048)
@@ -23,59 +19,38 @@ _PACKETS_PER_SECOND: Final = 20.0
 
 
 class DI2108(TextDriver):
-    """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode."""
+    """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode.
+
+    The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources disagree
+    whether this is the rate of scans or of samples: it is measured as well.
+    """
 
     model: ClassVar[str] = "DI-2108"
     bits: ClassVar[int] = 16
-    range_volts: ClassVar[float] = 10.0
-    ranges: ClassVar[tuple[float, ...]] = (10.0,)
-    """Full scales in the order of their codes in bits 8 to 11 of a word of the scan list."""
-    channels: ClassVar[int] = 8
     divisors: ClassVar[tuple[int, int]] = (375, 65535)
     decimations: ClassVar[int] = 512
     further_decimations: ClassVar[int] = 40000
     _tail = b""
 
-    def configure(
-        self, channels: Sequence[int], rate_hz: float, range_volts: float | None = None
-    ) -> Setup:
-        """Choose channels, scan rate and range.
-
-        The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources
-        disagree whether this is the rate of scans or of samples: it is measured as well.
-
-        Raises
-        ------
-        InputError
-            On a channel or a range that the box does not have, or a rate out of its reach.
-        """
-        port = self.line.port
-        chosen = choose_channels(port, self.model, channels, self.channels)
-        high = choose_range(port, self.model, self.ranges, range_volts, self.range_volts)
+    def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
         divisor, decimation, further = self._divisors(rate_hz)
-        self._command("encode 0", needed=False)  # binary; a DI-4108 was seen not to echo it
-        for position, channel in enumerate(chosen):
-            word = self.ranges.index(high) << 8 | channel - 1
-            self._command(f"slist {position} {word}")
-        self._command(f"srate {divisor}")
+        self._send_line("encode 0", needed=False)  # binary; a DI-4108 was seen not to echo it
+        for position, channel in enumerate(channels):
+            word = self.ranges.index(range_volts) << 8 | channel - 1
+            self._send_line(f"slist {position} {word}")
+        self._send_line(f"srate {divisor}")
         if self.decimations > 1:
-            self._command(f"dec {decimation}")
+            self._send_line(f"dec {decimation}")
         if self.further_decimations > 1:
-            self._command(f"deca {further}")
+            self._send_line(f"deca {further}")
         # The last reading, no mean: a mean would be a filter.
-        self._command("filter * 0", needed=False)
+        self._send_line("filter * 0", needed=False)
         rate = _BASE_HZ / (divisor * decimation * further)
-        self._command(f"ps {_packet_code(2 * len(chosen) * rate)}", needed=False)
-        self.setup = Setup(chosen, rate, high)
-        return self.setup
+        self._send_line(f"ps {_packet_code(2 * len(channels) * rate)}", needed=False)
+        return rate
 
-    def start(self) -> None:
-        """Begin the stream; the next byte received belongs to the first scan."""
-        if self.setup is None:
-            raise RuntimeError("configure() comes before start()")
-        self._decoder = self.decoder(len(self.setup.channels))
+    def _start_stream(self) -> None:
         self._tail = b""
-        self._clear_the_line(self.patience_s)
         self.line.write(b"start\r")
 
     def ended(self, data: bytes) -> str:
@@ -95,11 +70,7 @@ class DI2108(TextDriver):
         low, high = self.divisors
         slowest = _BASE_HZ / (high * self.decimations * self.further_decimations)
         if not slowest <= rate_hz <= _BASE_HZ / low:
-            raise InputError(
-                self.line.port,
-                f"the {self.model} can't scan at {rate_hz:g} Hz",
-                f"choose a rate between {slowest:.3g} and {_BASE_HZ / low:g} Hz",
-            )
+            raise self._no_rate("", rate_hz, f"{slowest:.3g}", _BASE_HZ / low)
         product = _BASE_HZ / rate_hz
         further = math.ceil(product / (high * self.decimations))
         further = min(self.further_decimations, max(1, further))

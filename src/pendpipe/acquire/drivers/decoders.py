@@ -9,20 +9,84 @@ The CDC family sends little-endian 16-bit words, and nothing between them (dataq
 lost byte shifts all that follows, and only the rate, the range or a channel of known reading
 can tell. A device whose buffer has overflowed says ``stop 01`` among the words, and no
 more.
+
+A *scan* is one reading of every enabled channel at one instant; a *count* is the converter's
+signed number, zero at 0 V.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 import numpy as np
 
-from pendpipe.acquire.drivers.base import Loss, Scans
 from pendpipe.arrays import AnyArray
 
 _BLOCK: Final = 1 << 15
 """Words decoded at a time: few enough to stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A place where the bytes did not make scans.
+
+    Parameters
+    ----------
+    after_scan
+        How many good scans were decoded before it (since the decoder was made).
+    discarded_bytes
+        The bytes that had to be thrown away to get into step again.
+    lost_scans
+        The scans they stand for: the least whole number that could have held them. Whole
+        scans missing besides leave no trace in the bytes, only in the clock.
+    suspect_before
+        Whether the scan before is suspect too: bytes without a frame mark followed it, so
+        that one of them may belong inside it.
+    reason
+        What the device said of it (``"stop 01"``), or ``"clock"`` where the bytes are whole
+        and the recorder's clock tells of the loss.
+    """
+
+    after_scan: int
+    discarded_bytes: int
+    lost_scans: int
+    suspect_before: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Scans:
+    """What a decoder made of some bytes.
+
+    Parameters
+    ----------
+    counts
+        Signed counts, shape (scans, channels), 16-bit integers.
+    losses
+        The losses met, in order.
+    """
+
+    counts: AnyArray
+    losses: tuple[Loss, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+
+class Decoder(Protocol):
+    """Bytes in, scans and losses out; how the bytes are cut into pieces changes nothing."""
+
+    @property
+    def bytes_per_scan(self) -> int:
+        """How many bytes an undamaged scan takes."""
+
+    def feed(self, data: bytes) -> Scans:
+        """Decode further bytes; an unfinished scan waits for the next call."""
+
+    def finish(self) -> Scans:
+        """Say what is left over at the end: scans held back till now, perhaps a loss."""
 
 
 class SyncBitDecoder:

@@ -1,90 +1,81 @@
-"""The part of a driver that is alike wherever commands are lines of text.
+"""The families whose commands are lines of text: DI-149 and DI-155, and the CDC family's base.
 
-Commands end in CR and are echoed with it, perhaps with NULs behind; ``stop`` is echoed in
-the midst of the data (dataq-facts A5, A8).
+Commands end in CR and are echoed with it, perhaps with NULs behind; ``stop`` is echoed among
+the data (dataq-facts A5, A8). The DI-149 and DI-155 echo ``start`` too, and the data follow at
+once; their samples have a frame mark (A6).
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Final
 
-from pendpipe.acquire.drivers.base import Identity, StreamReader
-from pendpipe.acquire.drivers.choice import refuse_another
+from pendpipe.acquire.drivers.base import Driver, Identity
 from pendpipe.errors import InputError
 
+_BASE_HZ: Final = 750_000
+_FASTEST_DIVISOR: Final = 75
+"""For each channel: the box takes 10 000 samples a second."""
+_SLOWEST_DIVISOR: Final = 65535
+_END_OF_LIST: Final = "xffff"
 
-class TextDriver(StreamReader):
-    """Commands of text ended by CR.
 
-    Parameters
-    ----------
-    line
-        An open line; the speed does not matter.
-    clock
-        The recorder's clock, in which the waits for the device are counted.
-    """
+class TextDriver(Driver):
+    """Commands of text ended by CR; the speed of the line does not matter."""
 
-    model: ClassVar[str]
-    baudrate: ClassVar[int] = 115200
-    patience_s: ClassVar[float] = 2.0
-    """How long an answer may take, in seconds of the host; ``stop`` may stall for one."""
-    attempts: int = 3
+    stop_command: ClassVar[tuple[bytes, ...]] = (b"stop\r",)
+    checks: ClassVar[str] = "cable, power, CDC mode"
 
     def hello(self) -> Identity:
-        """End a stream of an earlier run and ask the device who it is.
-
-        Raises
-        ------
-        InputError
-            If nothing answers.
-        """
+        """End a stream of an earlier run and ask the device who it is."""
         self.stop()
-        maker = self._command("info 0")
-        number = self._command("info 1")
+        maker = self._send_line("info 0")
+        number = self._send_line("info 1")
         if maker != "DATAQ":
             return Identity(f"{maker} {number}")
-        return Identity(f"DI-{number}", self._command("info 2"), self._command("info 6"))
+        return Identity(f"DI-{number}", self._send_line("info 2"), self._send_line("info 6"))
 
-    def identify(self) -> Identity:
-        """End a stream of an earlier run and ask who it is; refuse another model.
 
-        Raises
-        ------
-        InputError
-            If nothing answers, or another model does.
-        """
-        return refuse_another(self.line.port, self.hello(), self.model)
+class DI149(TextDriver):
+    """The DI-149: 8 channels, 12 bits, +-10 V, 10 kHz in all; scans at 750 kHz/srate."""
 
-    def stop(self) -> None:
-        """End the stream and throw away what still arrives, the echo among it."""
-        for _ in range(self.attempts):
-            self.line.write(b"stop\r")
-            if b"stop" in self.line.discard(self.quiet_s):
-                return
-            self._doubt = True
-            self._clock.sleep(0.5)
+    model: ClassVar[str] = "DI-149"
+    bits: ClassVar[int] = 12
 
-    def _command(self, text: str, needed: bool = True) -> str:
-        """Send a command and return what its echo says beyond it.
+    def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
+        slowest, fastest = _BASE_HZ / _SLOWEST_DIVISOR, _BASE_HZ / _FASTEST_DIVISOR / len(channels)
+        if not slowest <= rate_hz <= fastest:
+            what = f"{len(channels)} channel(s) "
+            raise self._no_rate(what, rate_hz, f"{slowest:.4g}", fastest)
+        divisor = round(_BASE_HZ / rate_hz)
+        self._send_line("asc")  # the scan list is written in this mode
+        for position, channel in enumerate(channels):
+            word = self.ranges.index(range_volts) << 8 | channel - 1
+            self._send_line(f"slist {position} x{word:04x}")
+        self._send_line(f"slist {len(channels)} {_END_OF_LIST}")
+        self._send_line(f"srate {divisor}")
+        self._send_line("bin")
+        return _BASE_HZ / divisor
 
-        A missing or wrong echo is tried again; without `needed` it is then let pass.
-        """
-        echo = ""
+    def _start_stream(self) -> None:
         for attempt in range(self.attempts):
             if attempt:
-                self._doubt = True
-                self.line.discard(self.quiet_s)
-            self.line.write(text.encode("ascii") + b"\r")
-            answer = self.line.read_until(b"\r", self.patience_s)
-            echo = answer.decode("ascii", "replace").strip("\0\r\n ")
-            if answer.endswith(b"\r") and echo.startswith(text):
-                return echo.removeprefix(text).strip()
-        self._doubt = True
-        if not needed:
-            return ""
-        fault = f"answers {echo[:40]!r} to '{text}'" if echo else "does not answer"
-        raise InputError(
-            self.line.port,
-            f"the device {fault}",
-            f"check cable, power, CDC mode and --model (asked for a {self.model})",
-        )
+                self._clear_the_line()
+            self.line.write(b"start\r")
+            # Byte by byte: the data behind the echo are not to be touched.
+            if self.line.read_until(b"start\r", self.patience_s).endswith(b"start\r"):
+                return
+            # It may have started although its echo was lost.
+            self.stop()
+        raise InputError(self.line.port, "the device does not start", "check cable and power")
+
+
+class DI155(DI149):
+    """The DI-155: 4 channels, frames of 14 bits, +-2.5 to +-50 V, 10 kHz in all.
+
+    How many of the 14 bits carry a signal is not settled: 13 or 14.
+    """
+
+    model: ClassVar[str] = "DI-155"
+    bits: ClassVar[int] = 14
+    ranges: ClassVar[tuple[float, ...]] = (50.0, 25.0, 12.5, 10.0, 6.25, 5.0, 3.125, 2.5)
+    channels: ClassVar[int] = 4
