@@ -43,7 +43,7 @@ from benchmarks import journal
 from pendpipe.acquire.clock import ScaledClock
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.devices.stream import Dialect
+from pendpipe.acquire.devices.simulated import Dialect
 from pendpipe.acquire.drivers import DRIVERS, find_driver
 from pendpipe.acquire.drivers.decoders import SyncBitDecoder
 from pendpipe.acquire.line import Line

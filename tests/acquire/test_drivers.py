@@ -8,8 +8,8 @@ import pytest
 
 from pendpipe.acquire.clock import ScaledClock
 from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.drivers.cdc import DI2108
-from pendpipe.acquire.drivers.legacy import DI154RS
+from pendpipe.acquire.drivers.letters import DI154RS
+from pendpipe.acquire.drivers.text import DI2108
 from pendpipe.errors import InputError
 
 FAST = ScaledClock(1e6)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.acquire.devices.di154rs import SimulatedDI154RS
-from pendpipe.acquire.devices.di2108 import SimulatedDI2108
-from pendpipe.acquire.devices.stream import convert
+from pendpipe.acquire.devices.letters import SimulatedDI154RS
+from pendpipe.acquire.devices.simulated import convert
+from pendpipe.acquire.devices.text import SimulatedDI2108
 
 
 @pytest.mark.parametrize(

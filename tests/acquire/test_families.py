@@ -11,7 +11,7 @@ from pendpipe.acquire.clock import ScaledClock
 from pendpipe.acquire.devices import DEVICES
 from pendpipe.acquire.drivers import DRIVERS, find_driver
 from pendpipe.acquire.drivers.decoders import Loss, WordDecoder
-from pendpipe.acquire.drivers.di245 import DI245
+from pendpipe.acquire.drivers.letters import DI245
 from pendpipe.acquire.drivers.text import DI149, DI155
 from pendpipe.errors import InputError
 

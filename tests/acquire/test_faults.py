@@ -75,7 +75,7 @@ def test_a_spoilt_answer_costs_no_sample(
     kind: str, fault: Fault, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # After an answer was missed, the start waits as long as one may be late.
-    for driver in ("text.TextDriver", "legacy.DI154RS", "di245.DI245"):
+    for driver in ("text.TextDriver", "letters.DI154RS", "letters.DI245"):
         monkeypatch.setattr(f"pendpipe.acquire.drivers.{driver}.patience_s", 0.25)
     recording = recorded(kind, fault, duration_s=20.0)
     assert missing(recording) == 0
@@ -101,7 +101,7 @@ def test_a_device_that_never_echoes_encode_is_recorded(monkeypatch: pytest.Monke
 def test_a_stale_stream_is_ended_before_the_recording(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for driver in ("text.TextDriver", "legacy.DI154RS", "di245.DI245"):
+    for driver in ("text.TextDriver", "letters.DI154RS", "letters.DI245"):
         monkeypatch.setattr(f"pendpipe.acquire.drivers.{driver}.patience_s", 0.1)
     recording = recorded(kind, Fault("stale stream"), duration_s=10.0)
     assert not recording.notes
@@ -243,7 +243,7 @@ def test_a_device_that_stays_away_ends_the_recording(impatient: None) -> None:
 
 
 def test_a_silent_spell_is_a_gap(impatient: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    for driver in ("text.TextDriver", "legacy.DI154RS"):
+    for driver in ("text.TextDriver", "letters.DI154RS"):
         monkeypatch.setattr(f"pendpipe.acquire.drivers.{driver}.patience_s", 0.1)
     for kind in ("di2108",):
         recording = recorded(kind, Fault("silence", at=4000, duration_s=0.5 * SCALE), 250.0)

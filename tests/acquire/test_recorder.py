@@ -16,7 +16,7 @@ import pytest
 
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.drivers.base import Setup
-from pendpipe.acquire.drivers.cdc import DI2108
+from pendpipe.acquire.drivers.text import DI2108
 from pendpipe.acquire.noise import NoiseWatch
 from pendpipe.acquire.progress import ProgressLine
 from pendpipe.acquire.raw import Frame, RawWriter, read_raw

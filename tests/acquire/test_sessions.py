@@ -13,9 +13,8 @@ import pytest
 from pendpipe.acquire.clock import ScaledClock, SimulatedClock
 from pendpipe.acquire.decode import decode_recording
 from pendpipe.acquire.devices.simulated import SimulatedDevice
-from pendpipe.acquire.drivers.cdc import DI2108
-from pendpipe.acquire.drivers.di245 import DI245
-from pendpipe.acquire.drivers.legacy import DI154RS
+from pendpipe.acquire.drivers.letters import DI154RS, DI245
+from pendpipe.acquire.drivers.text import DI2108
 from pendpipe.acquire.line import Line
 from pendpipe.acquire.ports import identify
 from pendpipe.acquire.raw import read_raw

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from pendpipe.acquire.drivers.base import DRIVERS, Driver, plain_name
-from pendpipe.acquire.drivers.cdc import DI2108
-from pendpipe.acquire.drivers.di245 import DI245
-from pendpipe.acquire.drivers.legacy import DI154RS
+from pendpipe.acquire.drivers.letters import DI154RS, DI245
+from pendpipe.acquire.drivers.text import DI2108
 from pendpipe.errors import InputError
 
 __all__ = ["DRIVERS", "FAMILIES", "Driver", "find_driver"]

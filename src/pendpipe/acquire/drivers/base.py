@@ -227,25 +227,6 @@ class Driver(ABC):
         """Return a fresh decoder for scans of so many channels."""
         return SyncBitDecoder(channels, cls.bits)
 
-    def _send_letters(self, letter: bytes, argument: bytes) -> tuple[bool, bytes]:
-        """Send NUL, a letter and its argument, each after the echo of the last.
-
-        Returns
-        -------
-        bool, bytes
-            Whether both were echoed, and the last echo.
-        """
-        self.line.write(b"\0" + letter)
-        echo = self._echo()
-        if echo != letter:
-            return False, echo
-        self.line.write(argument)
-        echo = self.line.read(1, self.patience_s)
-        return echo == argument, echo
-
-    def _echo(self) -> bytes:
-        return self.line.read(1, self.patience_s)
-
     def _send_line(self, text: str, needed: bool = True) -> str:
         """Send a command of text and return what its echo says beyond it.
 
