@@ -222,6 +222,8 @@ def _biased(old: Estimate, new: Estimate) -> bool:
 
 def _like(old: Estimate, new: Estimate) -> str:
     """A value with the digits of another's error, without an error of its own."""
+    if old.value == 0.0:
+        return "0"
     value, _, rest = with_error(old.value, new.sd).strip("(").partition(" ± ")
     return value + rest.partition(")")[2]
 
