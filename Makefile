@@ -1,7 +1,7 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test report bench evidence proof check clean
+.PHONY: campaign test report bench evidence proof check clean wheel
 
 PYTHON ?= python3
 CORES ?= 2
@@ -51,6 +51,13 @@ check: .venv/installed
 .venv/installed-bench: .venv/installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]" --editable ./challenge
 	touch $@
+
+# A wheel that brings the engine's machine code along (for x86-64 processors with AVX2), so that
+# a first call need not compile.
+wheel: .venv/installed
+	rm -rf src/pendpipe/dynamics/shipped
+	NUMBA_CACHE_DIR=$$(mktemp -d) PENDPIPE_SHIP=1 $(BIN)/python -m pendpipe.warm_up
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 # Raw files of an instrument (results/RECORD/raw) can't be made again: they stay.
 clean:

@@ -14,7 +14,7 @@ import pytest
 from numba import cfunc
 
 from pendpipe.dynamics import Eq8, compiled, machine_code
-from pendpipe.dynamics.layout import inputs_size, sums_size, work_size
+from pendpipe.dynamics.layout import FIELDS, REQUEST, sums_size, work_size
 
 FIRST_CALL = """
 import sys
@@ -102,6 +102,32 @@ def test_code_is_kept_and_found_again(tmp_path: Path) -> None:
     assert function(2.0) == math.sqrt(2.0) + math.cos(2.0)
 
 
+def test_shipped_code_runs_on_processors_that_can_and_is_left_alone_by_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not machine_code.can_be_portable():
+        pytest.skip("no code is shipped for this processor")
+    parts = [(a_small_function.inspect_llvm(), a_small_function.native_name)]
+    machine_code.keep(tmp_path / "code", parts, portable=True)
+    loaded = machine_code.load(tmp_path / "code")
+    assert loaded is not None
+    function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[0][0])
+    assert function(2.0) == pytest.approx(math.sqrt(2.0) + math.cos(2.0), rel=1e-15)
+    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_features", dict)
+    assert machine_code.load(tmp_path / "code") is None
+
+
+def test_a_new_process_runs_shipped_code_without_compiling(
+    kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = (kept / compiled.file_name()).read_bytes()
+    (kept / compiled.shipped_name(compiled.file_name())).write_bytes(code)
+    monkeypatch.setattr(compiled, "SHIPPED", kept)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept / "empty"))
+    monkeypatch.setattr(compiled, "_compile", lambda: pytest.fail("compiled"))
+    assert callable(compiled.engine.__wrapped__())
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"{}", b"{}\n", b"\n\n", b"\xff\xfe\n", b'{"digest": 1}\nx']
 )
@@ -127,7 +153,7 @@ def test_every_compiled_source_is_watched() -> None:
     importing_numba = {
         path.name
         for path in folder.glob("*.py")
-        if "kernel" in path.read_text() or "@part" in path.read_text()
+        if "kernel" in path.read_text() or "numba" in path.read_text().split('"""')[2]
     }
     assert importing_numba <= set(compiled.SOURCES)
 
@@ -147,28 +173,25 @@ def test_the_engine_writes_only_where_it_may(
         return array, array.ctypes.data + 8 * guard
 
     model = Eq8(3.2, 0.4, 0.01, 0.02, 1e-4)
-    sensitivities = directions + 1 if directions else 0
-    size = inputs_size(directions) + work_size(sensitivities, sensitivities + 1 if samples else 0)
     columns = directions + 4 if directions else 0
-    buffer, buffer_at = guarded(size)
-    inside = buffer[guard : guard + size]
-    inside[:] = 0.0
-    inside[:10] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0)
-    inside[10 : 10 + directions] = 0.1
-    inside[10 + directions : inputs_size(directions)] = model.shape_derivatives()[
-        :directions
-    ].ravel()
+    buffer, buffer_at = guarded(work_size(directions, samples))
+    inside = buffer[guard:]
+    inside[:12] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0, 0.1, 100.0)
+    inside[FIELDS["rate"].offset :][:directions] = 0.1
+    derivatives = model.shape_derivatives()[:directions].ravel()
+    inside[FIELDS["directions"].offset :][: 4 * directions] = derivatives
     time_s = np.linspace(0.0, 100.0, samples)
     angle, angle_at = guarded(samples)
     jacobian, jacobian_at = guarded(0 if compared else columns * samples)
     sums, sums_at = guarded(sums_size(columns))
     readings = np.zeros(samples)
     turning, turning_at = guarded((2 + 2 * columns) * 50)
-    compiled.engine()(
-        buffer_at, size, directions, 0.1, tabulate, 50 if samples == 0 else 2**60, 100.0,
-        time_s.ctypes.data, samples, angle_at, jacobian_at, turning_at, 50,
-        readings.ctypes.data, samples if compared else 0, sums_at,
+    request = (ctypes.c_int64 * len(REQUEST))(
+        buffer_at, directions, tabulate, 50 if samples == 0 else 2**60, time_s.ctypes.data,
+        samples, angle_at, jacobian_at, turning_at, 50, readings.ctypes.data,
+        samples if compared else 0, sums_at,
     )  # fmt: skip
+    compiled.engine()(request)
     for array in (buffer, angle, jacobian, turning, sums):
         np.testing.assert_array_equal(array[:guard], np.pi)
         np.testing.assert_array_equal(array[-guard:], np.pi)

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.dynamics.layout import MOMENTS, NODE_COUNT, PLACES
-from pendpipe.dynamics.panel import adder, part
+from pendpipe.dynamics.panel import adder, kernel
 from pendpipe.dynamics.polynomials import horner_few
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.workspace import Work
+    from pendpipe.dynamics.layout import Work
 
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(PLACES)
 
@@ -69,7 +69,7 @@ def product(first: FloatArray, second: FloatArray) -> float:
     return total
 
 
-@part
+@kernel
 def compare(work: Work, residual: FloatArray, start: float, duration: float) -> None:
     """Add what a block of one panel says to `work.sums`.
 
@@ -80,7 +80,7 @@ def compare(work: Work, residual: FloatArray, start: float, duration: float) -> 
     start, duration
         Of the panel, in radians since the release.
     """
-    columns, directions = work.some.shape[0], work.rates.size
+    columns, directions = work.parameters, work.rates
     theta = work.theta[: residual.size]
     work.sums[0] += take_moments(residual, theta, work.power, work.moments)
     gradient, moments = work.sums[1 : 1 + columns], work.moments
@@ -91,7 +91,7 @@ def compare(work: Work, residual: FloatArray, start: float, duration: float) -> 
     for c in range(directions):
         by_rate = product(work.total[3 + c], moments[:NODE_COUNT])
         gradient[c] += by_rate
-        moving -= work.rates[c] * by_rate
+        moving -= work.rate[c] * by_rate
     gradient[directions] += moving / omega
     gradient[directions + 1] += product(work.total[2], moments[:NODE_COUNT])
     gradient[directions + 2] -= omega * speed
@@ -111,21 +111,21 @@ def add_scaled(
             normal[p * columns.shape[0] + q] += product(scaled, columns[q])
 
 
-@part
+@kernel
 def add_batch(work: Work) -> None:
     """Add the products of the Jacobian's columns at the places that wait for it."""
     taken = int(work.wanted[2])
-    normal = work.sums[1 + work.some.shape[0] :]
+    normal = work.sums[1 + work.parameters :]
     add_scaled(work.some, work.weights[:taken], work.power[:taken], normal)
     work.wanted[2] = 0.0
 
 
-@part
+@kernel
 def _take_places(work: Work, theta: FloatArray, middle: float, half: float) -> None:
     """Write the Jacobian's columns at Gauss's places among the readings of the panel."""
     if work.wanted[2] + PLACES > work.weights.size:
         add_batch(work)
-    directions, omega = work.rates.size, work.motion[0]
+    directions, omega = work.rates, work.motion[0]
     taken = int(work.wanted[2])
     here = slice(taken, taken + PLACES)
     place, weights, readings = work.power[here], work.weights[here], float(theta.size)
@@ -144,19 +144,19 @@ def _take_places(work: Work, theta: FloatArray, middle: float, half: float) -> N
         by_time[i] *= -omega
         by_offset[i] = 1.0
     for c in range(directions):
-        column, rate = work.some[c, here], work.rates[c] / omega
+        column, rate = work.some[c, here], work.rate[c] / omega
         horner_few(work.total[3 + c], place, column)
         for i in range(place.size):
             by_omega[i] -= rate * column[i]
     work.wanted[2] += PLACES
 
 
-@part
+@kernel
 def compare_rest(work: Work, level: float, first: int) -> None:
     """Add what the readings after the stop say; the columns there are in `work.some[:, 0]`."""
-    columns, count = work.some.shape[0], float(work.readings.size - first)
+    columns, count = work.parameters, float(work.compared - first)
     total, square = 0.0, 0.0
-    for i in range(first, work.readings.size):
+    for i in range(first, work.compared):
         residual = work.readings[i] - level
         total += residual
         square += residual * residual

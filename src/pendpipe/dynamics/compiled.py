@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import hashlib
 import os
+import sys
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
 SOURCES = (
     "chebyshev.py", "comparison.py", "emission.py", "entry.py", "half_cycle.py", "layout.py",
     "march.py", "panel.py", "polynomials.py", "sensitivities.py", "table.py", "views.py",
-    "workspace.py",
 )  # fmt: skip
-_POINTER, _INTEGER, _NUMBER = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_ENTRY = ctypes.CFUNCTYPE(
-    _INTEGER,
-    _POINTER, _INTEGER, _INTEGER, _NUMBER, _INTEGER, _INTEGER, _NUMBER,
-    _POINTER, _INTEGER, _POINTER, _POINTER, _POINTER, _INTEGER, _POINTER, _INTEGER, _POINTER,
-)  # fmt: skip
+SHIPPED = Path(__file__).parent / "shipped"
+"""Machine code for many machines, which a wheel may bring along."""
+SHIP = "PENDPIPE_SHIP"
+"""The variable of the environment that asks for it to be made (`make wheel`)."""
+_FUNCTIONS = {"engine": 92, "turning": 33}
+"""About how many functions the compiler has to do."""
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
 def file_name() -> str:
@@ -39,6 +40,12 @@ def name_of(stem: str, paths: Iterable[Path]) -> str:
     sources = hashlib.blake2b(text, digest_size=8).hexdigest()
     machine = hashlib.blake2b(machine_code.platform().encode(), digest_size=8).hexdigest()
     return f"{stem}-{machine}-{sources}.bin"
+
+
+def shipped_name(name: str) -> str:
+    """Return the name of the code for many machines that belongs to one for this machine."""
+    stem, _, sources = name.rsplit("-", 2)
+    return f"{stem}-{sources}"
 
 
 def folders() -> Iterator[Path]:
@@ -68,12 +75,16 @@ def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int]
     # It brings llvmlite, which who calls nothing compiled can do without.
     from pendpipe.dynamics import machine_code
 
-    for folder in folders():
-        loaded = machine_code.load(folder / name)
+    kept_here = [folder / name for folder in folders()]
+    for path in (*kept_here, SHIPPED / shipped_name(name)):
+        loaded = machine_code.load(path)
         if loaded is not None:
             return loaded
-    entries = compile_all()
+    with _progress(name.partition("-")[0]):
+        entries = compile_all()
     parts = [(entry.inspect_llvm(), entry.native_name) for entry in entries]
+    if SHIP in os.environ and machine_code.can_be_portable():
+        machine_code.keep(SHIPPED / shipped_name(name), parts, portable=True)
     for folder in folders():
         try:
             machine_code.keep(folder / name, parts)
@@ -84,6 +95,38 @@ def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int]
                 old.unlink(missing_ok=True)
         break
     return [entry.address for entry in entries], entries
+
+
+@contextlib.contextmanager
+def _progress(stem: str) -> Iterator[None]:
+    """Show on a terminal how far the compiler is; elsewhere nothing."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from numba.core import event
+
+    register: Any = event.register
+    unregister: Any = event.unregister
+
+    class Listener(event.Listener):
+        done = 0
+
+        def on_start(self, event: Any) -> None:
+            pass
+
+        def on_end(self, event: Any) -> None:  # noqa: ARG002
+            self.done += 1
+            part = min(self.done / _FUNCTIONS[stem], 1.0)
+            bar = ("#" * round(20 * part)).ljust(20)
+            print(f"\rcompiling, once: [{bar}] {stem}", end="", file=sys.stderr, flush=True)
+
+    listener = Listener()
+    register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        unregister("numba:compile", listener)
+        print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
 
 
 def _compile() -> list[Any]:

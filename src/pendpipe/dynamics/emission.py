@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
 from pendpipe.dynamics.layout import NODE_COUNT
-from pendpipe.dynamics.panel import angle_of, curve, kernel, part
+from pendpipe.dynamics.panel import angle_of, curve, inlined, kernel
 from pendpipe.dynamics.polynomials import horner
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.workspace import Work
+    from pendpipe.dynamics.layout import Work
 
 _BLOCK = 16
 
 
-@kernel
+@inlined
 def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> int:
     """Return the index of the first sample from `first` on that is not before `end_s`."""
     i = min(first + guess, time_s.size)
@@ -28,7 +28,7 @@ def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> 
     return i
 
 
-@kernel
+@inlined
 def combine(
     polynomials: FloatArray,
     duration: float,
@@ -65,11 +65,10 @@ def combine(
             total[2 + c, j] = outer * weight * own[j] + moved * by_start[j] - late * total[1, j]
 
 
-@part
+@kernel
 def emit(
-    work: Work, polynomials: FloatArray, start: float, duration: float, y: float,
-    signs: FloatArray, time_s: FloatArray, first: int, guess: int, angle_rad: FloatArray,
-    jacobian: FloatArray,
+    work: Work, polynomials: FloatArray, start: float, duration: float, y: float, first: int,
+    guess: int,
 ) -> int:  # fmt: skip
     """Write the samples of one panel; return the index of the first sample after it.
 
@@ -79,14 +78,11 @@ def emit(
         Of the panel, as in a row of `half_cycle.py`.
     start, duration
         Of the panel, in radians since the release.
-    signs
-        The side of the turning point before the panel, and that of the release.
     first, guess
         The index of the first sample, and about how many lie in the panel.
-    jacobian
-        (rates + 4, samples): by the rates, omega, the release's angle and time, the offset.
     """
     omega, release_s = work.motion[0], work.motion[1]
+    time_s, angle_rad, signs = work.time_s, work.angle_rad, work.signs
     end = samples_before(time_s, first, release_s + (start + duration) / omega, guess)
     if end == first:
         return end
@@ -102,25 +98,23 @@ def emit(
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
         horner(work.total[0], z, angle_rad[at:stop])
-        if work.readings.size > 0:
+        if work.compared > 0:
             subtract(work.readings[at:stop], angle_rad[at:stop])
-            if work.amplitude.size > 0:
+            if work.sensitivities > 0:
                 compare(work, angle_rad[at : min(stop, end)], start, duration)
-        elif work.amplitude.size > 0:
-            _emit_derivatives(work, z, t, jacobian, at)
+        elif work.sensitivities > 0:
+            _emit_derivatives(work, z, t, at)
         at = stop
-    if end == time_s.size and work.readings.size > 0 and work.amplitude.size > 0:
+    if end == time_s.size and work.compared > 0 and work.sensitivities > 0:
         add_batch(work)
     return end
 
 
-@part
-def _emit_derivatives(
-    work: Work, theta: FloatArray, time_s: FloatArray, jacobian: FloatArray, at: int
-) -> None:
+@kernel
+def _emit_derivatives(work: Work, theta: FloatArray, time_s: FloatArray, at: int) -> None:
     """Write the columns of the Jacobian for a block of samples."""
-    omega, release_s, directions = work.motion[0], work.motion[1], work.rates.size
-    stop = at + theta.size
+    omega, release_s, directions = work.motion[0], work.motion[1], work.rates
+    stop, jacobian = at + theta.size, work.jacobian
     by_omega, by_time = jacobian[directions, at:stop], jacobian[directions + 2, at:stop]
     horner(work.total[1], theta, by_time)
     horner(work.total[2], theta, jacobian[directions + 1, at:stop])
@@ -129,35 +123,33 @@ def _emit_derivatives(
         by_omega[i] = (time_s[i] - release_s) * by_time[i]
         by_time[i] *= -omega
     for c in range(directions):
-        column, rate = jacobian[c, at:stop], work.rates[c] / omega
+        column, rate = jacobian[c, at:stop], work.rate[c] / omega
         horner(work.total[3 + c], theta, column)
         for i in range(theta.size):
             by_omega[i] -= rate * column[i]
 
 
-@part
-def rest(
-    work: Work, y: float, signs: FloatArray, first: int, angle_rad: FloatArray,
-    jacobian: FloatArray,
-) -> None:  # fmt: skip
+@kernel
+def rest(work: Work, y: float, first: int) -> None:
     """Write the samples after the stop: the last turning point, exactly."""
-    directions, omega = work.rates.size, work.motion[0]
+    directions, omega, signs = work.rates, work.motion[0], work.signs
+    angle_rad, jacobian = work.angle_rad, work.jacobian
     level, bend = signs[0] * angle_of(work.shape, y) + work.motion[2], curve(work.shape, y)
-    if work.amplitude.size > 0:
-        if work.readings.size > 0:
+    if work.sensitivities > 0:
+        if work.compared > 0:
             add_batch(work)
         by_omega = 0.0
         for c in range(directions):
             work.some[c, 0] = signs[0] * work.amplitude[c + 1] / bend
-            by_omega -= work.rates[c] / omega * work.some[c, 0]
+            by_omega -= work.rate[c] / omega * work.some[c, 0]
         work.some[directions, 0] = by_omega
         work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0] / bend
         work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
-        if work.readings.size > 0:
+        if work.compared > 0:
             compare_rest(work, level, first)
     for i in range(first, angle_rad.size):
         angle_rad[i] = level
-    if work.readings.size > 0:
+    if work.compared > 0:
         subtract(work.readings[first:], angle_rad[first:])
         return
     for c in range(min(jacobian.shape[0], directions + 3)):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import math
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pendpipe.dynamics.compiled import engine
-from pendpipe.dynamics.layout import CONSTANTS, OVERDAMPED, STOPPED, inputs_size, work_size
+from pendpipe.dynamics.layout import FIELDS, OVERDAMPED, REQUEST, STOPPED, work_size
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 NO_SAMPLES: FloatArray = np.empty(0)
 NONE: FloatArray = np.empty((0, 0))
 NO_LIMIT = 2**62
+_REQUEST = ctypes.c_int64 * len(REQUEST)
+_LOSSES, _DIRECTIONS = FIELDS["rate"].offset, FIELDS["directions"].offset
 
 
 def run(
@@ -42,35 +43,24 @@ def run(
         message = f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
         raise ValueError(message)
     count = rates.size
-    sensitivities = count + 1 if count else 0
-    polynomials = sensitivities + 1 if time_s.size else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
-    buffer = np.empty(_buffer_size(count, sensitivities, polynomials))
-    buffer[:CONSTANTS] = (
+    workspace = np.empty(work_size(count, time_s.size))
+    workspace[:_LOSSES] = (
         *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
+        abs(release.angle_rad), until_s,
     )  # fmt: skip
-    if count:
-        buffer[CONSTANTS : CONSTANTS + count] = rates
-        buffer[CONSTANTS + count : inputs_size(count)] = directions.ravel()
-    found, state = divmod(
-        engine()(
-            _address(buffer), buffer.size, count, abs(release.angle_rad), tabulate,
-            most, until_s, _address(time_s), time_s.size, _address(angle_rad),
-            _address(jacobian), _address(turning), turning.shape[1],
-            _address(readings), readings.size, _address(sums),
-        ),
-        OVERDAMPED + 1,
+    workspace[_LOSSES : _LOSSES + count] = rates
+    workspace[_DIRECTIONS : _DIRECTIONS + directions.size] = directions.ravel()
+    request = _REQUEST(
+        _address(workspace), count, tabulate, most, _address(time_s), time_s.size,
+        _address(angle_rad), _address(jacobian), _address(turning), turning.shape[1],
+        _address(readings), readings.size, _address(sums),
     )  # fmt: skip
+    found, state = divmod(engine()(request), OVERDAMPED + 1)
     if state == OVERDAMPED:
         message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
         raise ValueError(message)
     return found, state == STOPPED
-
-
-@cache
-def _buffer_size(count: int, sensitivities: int, polynomials: int) -> int:
-    """Return how many numbers a call works on."""
-    return inputs_size(count) + work_size(sensitivities, polynomials)
 
 
 def _address(array: FloatArray) -> int:

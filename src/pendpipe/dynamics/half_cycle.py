@@ -28,8 +28,9 @@ from pendpipe.dynamics.panel import (
     angle_of,
     complement_for,
     curve,
+    kernel,
     log_amplitude,
-    part,
+    panel_width,
     place,
     polynomial,
     solve,
@@ -37,11 +38,10 @@ from pendpipe.dynamics.panel import (
     unresolved,
 )
 from pendpipe.dynamics.sensitivities import sensitivities
-from pendpipe.dynamics.workspace import panel_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.workspace import Work
+    from pendpipe.dynamics.layout import Work
 
 LOSS_TOLERANCE = 5e-9
 """Bound of `solve`'s estimate, a thousand times the error: that is 5e-12 of a half cycle's loss."""
@@ -51,18 +51,18 @@ FINEST = 30
 """The finest panel is a half cycle halved so often; it is accepted as it is."""
 
 
-@part
+@kernel
 def _start(work: Work, radius: float) -> None:
     """Set d ln r/dp and dtau/dp at the turning point y = m + r."""
-    for c in range(work.sigma.size):
+    for c in range(work.sensitivities):
         work.sigma[c] = 1.0 / radius if c == 0 else -work.directions[c - 1, 0] / radius
         work.shift[c] = 0.0
 
 
-@part
+@kernel
 def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
     """Write the derivatives of the next turning point, y' = r - m, to the row's head."""
-    columns = work.sigma.size
+    columns = work.sensitivities
     for c in range(columns):
         if c == 0:
             row[HEAD] = radius * work.sigma[0]
@@ -72,7 +72,7 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
             row[HEAD + columns + c] = work.shift[c]
 
 
-@part
+@kernel
 def _solve_panel(
     work: Work, node: FloatArray, radius: float, p: int, panels: int, y: float, complement: float,
     finest: bool, polynomials: FloatArray,
@@ -83,7 +83,7 @@ def _solve_panel(
     tolerance = math.inf if finest else LOSS_TOLERANCE
     if not solve(node, work.shape, radius, half_width, tolerance):
         return False
-    if work.sigma.size > 0:
+    if work.sensitivities > 0:
         sensitivities(
             node, work.shape, work.directions, radius, half_width,
             work.sigma, work.shift, work.columns,
@@ -93,13 +93,13 @@ def _solve_panel(
     return _in_time(work, node, radius, half_width, y, polynomials) or finest
 
 
-@part
+@kernel
 def _in_time(
     work: Work, node: FloatArray, radius: float, half_width: float, y: float,
     polynomials: FloatArray,
 ) -> bool:  # fmt: skip
     """Write a solved panel's polynomials in time; say whether they resolve the waveform."""
-    n, count = NODE_COUNT, work.sigma.size
+    n, count = NODE_COUNT, work.sensitivities
     time_nodes(node, half_width, work.chebyshev)
     waveform = work.columns[count]
     for j in range(n):
@@ -117,17 +117,15 @@ def _in_time(
     return resolved
 
 
-@part
-def even_half_cycle(
-    work: Work, y: float, complement: float, panels: int, polynomials: int, row: FloatArray
-) -> bool:
+@kernel
+def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: FloatArray) -> bool:
     """Solve a half cycle on `panels` equal panels into `row`; say whether these resolve it."""
     m = work.shape[0]
     radius = y - m
     _start(work, radius)
     change, excess = 0.0, 0.0
-    width = panel_width(polynomials)
-    at = HEAD + 2 * work.sigma.size
+    width = panel_width(work.polynomials)
+    at = HEAD + 2 * work.sensitivities
     for p in range(panels):
         node = work.nodes[(panels + p) % SLOTS]
         if not _solve_panel(
@@ -136,7 +134,7 @@ def even_half_cycle(
         ):  # fmt: skip
             return False
         excess += node[EXCESS + DEGREE]
-        if polynomials > 0:
+        if width > 0:
             row[at] = excess
             at += width
         change += node[LOSS + DEGREE] * (1.0 + change)
@@ -149,11 +147,10 @@ def even_half_cycle(
     return True
 
 
-@part
+@kernel
 def direct_half_cycle(
-    work: Work, y: float, begin: float, signs: FloatArray, level: int, polynomials: int,
-    time_s: FloatArray, first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,
-) -> tuple[float, float, int, int]:  # fmt: skip
+    work: Work, y: float, begin: float, level: int, first: int, guess: int
+) -> tuple[float, float, int, int]:
     """Solve a half cycle on panels as fine as it needs, and write its samples.
 
     `begin` is its start in radians since the release, `level` the number of halvings to begin
@@ -166,12 +163,12 @@ def direct_half_cycle(
     complement = complement_for(work.shape, log_amplitude(work.shape, y))
     _start(work, radius)
     change, excess, k = 0.0, 0.0, 0
-    coarsest, at = -1, HEAD + 2 * work.sigma.size
-    width = polynomials * NODE_COUNT
+    coarsest, at = -1, HEAD + 2 * work.sensitivities
+    width = work.polynomials * NODE_COUNT
     while k < 1 << level:
         panels = 1 << level
         node = work.nodes[(panels + k) % SLOTS]
-        for c in range(work.sigma.size):
+        for c in range(work.sensitivities):
             work.kept[0, c], work.kept[1, c] = work.sigma[c], work.shift[c]
         if not _solve_panel(
             work, node, radius * (1.0 + change), k, panels, y, complement, level >= FINEST,
@@ -179,18 +176,16 @@ def direct_half_cycle(
         ):  # fmt: skip
             if level >= FINEST:
                 return y, 0.0, first, -1
-            for c in range(work.sigma.size):
+            for c in range(work.sensitivities):
                 work.sigma[c], work.shift[c] = work.kept[0, c], work.kept[1, c]
             level, k = level + 1, 2 * k
             continue
         if coarsest < 0:
             coarsest = level
         duration = math.pi / panels + node[EXCESS + DEGREE]
-        if polynomials > 0:
-            end = emit(
-                work, row[at : at + width], begin + math.pi * k / panels + excess, duration, y,
-                signs, time_s, first, guess, angle_rad, jacobian,
-            )  # fmt: skip
+        if width > 0:
+            begins = begin + math.pi * k / panels + excess
+            end = emit(work, row[at : at + width], begins, duration, y, first, guess)
             first, guess = end, end - first
         excess += node[EXCESS + DEGREE]
         change += node[LOSS + DEGREE] * (1.0 + change)

@@ -1,32 +1,131 @@
-"""Sizes that the engine and its callers must agree on; free of Numba."""
+"""What the engine and its callers must agree on, free of Numba: sizes, and where what lies.
+
+A call hands over one array of integers (`REQUEST`) and one of numbers, the workspace: the engine
+allocates nothing. `FIELDS` says where in the workspace each array of the engine lies.
+"""
 
 from __future__ import annotations
 
-DEGREE = 16
+from typing import Any, Final, NamedTuple
+
+DEGREE: Final = 16
 """Of the polynomials on a panel."""
-NODE_COUNT = DEGREE + 1
-NODE_SIZE = 504
+NODE_COUNT: Final = DEGREE + 1
+NODE_SIZE: Final = 504
 """Of the workspace of one panel; see `panel.py`."""
-SLOTS = 16
+SLOTS: Final = 16
 """Panels whose nodes and last solutions are kept."""
-HEAD = 2
+HEAD: Final = 2
 """The first numbers of a half cycle's row; see `half_cycle.py`."""
 FEW_POINTS, MOST_POINTS = 12, 18
 """Half cycles in a table: multiples of six (see `table.look_up`)."""
-MOST_PANELS = 8
+MOST_PANELS: Final = 8
 """Panels to a half cycle in a table."""
-DESCRIPTION = 6
-THETA = 512
-CONSTANTS = 10
-"""m, h, q, g, k, omega; time and offset of the release, and twice the side of the release."""
-MOMENTS = NODE_COUNT + 1
-PLACES = 8
+THETA: Final = 512
+MOMENTS: Final = NODE_COUNT + 1
+PLACES: Final = 8
 """Of a panel, at which the normal matrix is taken; see `comparison.py`."""
-BATCH = 8 * PLACES
+BATCH: Final = 8 * PLACES
 """Places that are multiplied in one go."""
 
 RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
+
+REQUEST: Final = (
+    "workspace", "rates", "tabulate", "most", "time_s", "samples", "angle_rad", "jacobian",
+    "turning", "room", "readings", "compared", "sums",
+)  # fmt: skip
+"""A call's integers: addresses of arrays; numbers of rates, samples, turning points, readings."""
+COUNTS: Final = (
+    "rates", "sensitivities", "parameters", "samples", "written", "recorded", "room", "compared",
+    "summed", "polynomials", "width",
+)  # fmt: skip
+"""Numbers of rates; of sensitivities (to the amplitude and those); of columns of the Jacobian; of
+samples, and of those of which the Jacobian is written; of what is recorded of a turning point, and
+of how many; of readings to compare with, and of the sums that this gives; of the polynomials of a
+panel; the width of a row."""
+Work = Any
+"""What the engine works on: the arrays of `FIELDS` and the numbers of `COUNTS`, as attributes."""
+
+
+class Field(NamedTuple):
+    """An array of the engine: where it lies, and its shape.
+
+    Parameters
+    ----------
+    owner
+        The name in `REQUEST` of the array of which it is a part.
+    offset, widths
+        Where it begins: so many numbers, and widths of a row, behind the owner's first.
+    rows, columns
+        Its shape, each a number or the name of one that the engine knows (`COUNTS`),
+        with what is added to it; `rows` is None for a vector.
+    """
+
+    owner: str
+    offset: int
+    widths: int
+    rows: tuple[str, int] | None
+    columns: tuple[str, int]
+
+
+_MOST_RATES, _MOST_COLUMNS = 4, 8
+_S, _C = _MOST_RATES + 1, _MOST_COLUMNS
+_INSIDE: Final[dict[str, tuple[int, tuple[str, int] | None, tuple[str, int]]]] = {
+    # name: room, rows, columns
+    "shape": (5, None, ("", 5)),  # m, h, q, g, k of `panel.py`
+    "motion": (3, None, ("", 3)),  # omega, the time of the release, the offset
+    "signs": (2, None, ("", 2)),  # the side of the turning point in hand, and of the release
+    "limits": (2, None, ("", 2)),  # the angle of the release, and the time of the end
+    "rate": (_MOST_RATES, None, ("rates", 0)),  # the rates themselves
+    "directions": (4 * _MOST_RATES, ("rates", 0), ("", 4)),  # of m, h, q and g by each rate
+    # d ln r/dp and dtau/dp at fixed phase, at the end of the panel in hand, and at its start
+    "sigma": (_S, None, ("sensitivities", 0)),
+    "shift": (_S, None, ("sensitivities", 0)),
+    "kept": (2 * _S, ("", 2), ("sensitivities", 0)),
+    # dy/dp and dtau/dp at the last turning point
+    "amplitude": (_S, None, ("sensitivities", 0)),
+    "clock": (_S, None, ("sensitivities", 0)),
+    "segment": (6, None, ("", 6)),  # what the table spans; see `table.py`
+    "wanted": (3, None, ("", 3)),  # how `march` lays out its tables; how many places are taken
+    "columns": ((_S + 1) * NODE_COUNT, ("sensitivities", 1), ("", NODE_COUNT)),  # dx/dp, and x
+    "chebyshev": (NODE_COUNT * NODE_COUNT, ("", NODE_COUNT), ("", NODE_COUNT)),
+    # the polynomials of the angle, its velocity and its derivatives
+    "total": ((_S + 2) * NODE_COUNT, ("sensitivities", 2), ("", NODE_COUNT)),
+    "theta": (THETA, None, ("", THETA)),  # a block of places within a panel
+    "power": (THETA, None, ("", THETA)),  # residuals times a power of their place
+    "moments": (MOMENTS, None, ("", MOMENTS)),  # of the residuals of a block
+    # the Jacobian's columns at some places of the last panels, and how many readings each is
+    "some": (_C * BATCH, ("parameters", 0), ("", BATCH)),
+    "weights": (BATCH, None, ("", BATCH)),
+    "nodes": (SLOTS * NODE_SIZE, ("", SLOTS), ("", NODE_SIZE)),  # panels; see `panel.py`
+}
+
+
+def _placed() -> tuple[dict[str, Field], int]:
+    """Return the fields of the workspace, one behind the other, and their fixed room."""
+    fields, offset = {}, 0
+    for name, (room, rows, columns) in _INSIDE.items():
+        fields[name] = Field("workspace", offset, 0, rows, columns)
+        offset += room
+    return fields, offset
+
+
+_FIELDS, _FIXED = _placed()
+FIELDS: Final[dict[str, Field]] = _FIELDS | {
+    # the half cycle in hand (see `half_cycle.py`), those that a table is made of (and one row of
+    # scratch), and the table
+    "row": Field("workspace", _FIXED, 0, None, ("width", 0)),
+    "rows": Field("workspace", _FIXED, 1, ("", MOST_POINTS + 1), ("width", 0)),
+    "table": Field("workspace", _FIXED, MOST_POINTS + 2, ("", MOST_POINTS), ("width", 0)),
+    "time_s": Field("time_s", 0, 0, None, ("samples", 0)),
+    "angle_rad": Field("angle_rad", 0, 0, None, ("samples", 0)),
+    "jacobian": Field("jacobian", 0, 0, ("parameters", 0), ("written", 0)),
+    "turning": Field("turning", 0, 0, ("recorded", 0), ("room", 0)),
+    "readings": Field("readings", 0, 0, None, ("compared", 0)),
+    "sums": Field("sums", 0, 0, None, ("summed", 0)),
+}
+"""Every array that the engine works on, by name."""
 
 
 def panel_width(polynomials: int) -> int:
@@ -40,17 +139,12 @@ def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
     return HEAD + 2 * sensitivities + panels * width
 
 
-def work_size(sensitivities: int, polynomials: int) -> int:
-    """Return how many numbers `workspace.carve` needs."""
-    s, n, width = sensitivities, NODE_COUNT, row_width(sensitivities, polynomials, MOST_PANELS)
-    matrices = (2 * s + 3 + n) * n + (2 * MOST_POINTS + 2) * width
-    compared = MOMENTS + THETA + (most_columns(s) + 1) * BATCH
-    return SLOTS * NODE_SIZE + 3 + 6 * s + matrices + DESCRIPTION + THETA + compared
-
-
-def most_columns(sensitivities: int) -> int:
-    """Return the columns of the Jacobian: rates, omega, angle, time, offset."""
-    return sensitivities + 3 if sensitivities > 0 else 0
+def work_size(rates: int, samples: int) -> int:
+    """Return how many numbers the workspace has."""
+    sensitivities = rates + 1 if rates else 0
+    polynomials = sensitivities + 1 if samples else 0
+    width = row_width(sensitivities, polynomials, MOST_PANELS)
+    return _FIXED + (2 * MOST_POINTS + 2) * width
 
 
 def sums_size(columns: int) -> int:
@@ -58,6 +152,5 @@ def sums_size(columns: int) -> int:
     return 1 + columns * (1 + columns)
 
 
-def inputs_size(directions: int) -> int:
-    """Return how many numbers tell the engine what to do: constants, rates, directions."""
-    return CONSTANTS + 5 * directions
+ADDRESSES: Final = tuple({field.owner: None for field in FIELDS.values()})
+"""The names in `REQUEST` of arrays."""

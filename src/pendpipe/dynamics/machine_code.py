@@ -32,23 +32,32 @@ def platform() -> str:
     )
 
 
-def _target_machine() -> Any:
-    """Return LLVM's idea of this machine."""
+PORTABLE = {"x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))}
+"""By architecture: the processors for which code is shipped, and what they can do."""
+
+
+def can_be_portable() -> bool:
+    """Say whether code made here runs on other machines: only where PORTABLE names processors."""
+    return llvm.get_default_triple().partition("-")[0] in PORTABLE
+
+
+def _target_machine(portable: bool = False) -> Any:
+    """Return LLVM's idea of this machine, or of all those that `PORTABLE` names."""
     with contextlib.suppress(RuntimeError):  # newer versions have done it already, and say so
         llvm.initialize()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    if portable:
+        cpu, features = PORTABLE[llvm.get_default_triple().partition("-")[0]][0], ""
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=llvm.get_host_cpu_features().flatten(),
-        opt=3,
-        jit=True,
+        cpu=cpu, features=features, opt=3, jit=True
     )
 
 
-def keep(path: Path, parts: Sequence[tuple[str, str]]) -> None:
+def keep(path: Path, parts: Sequence[tuple[str, str]], portable: bool = False) -> None:
     """Write the machine code of modules, each with the function that will be called, to `path`."""
-    machine = _target_machine()
+    machine = _target_machine(portable)
     heads, codes = [], []
     for assembly, name in parts:
         module = llvm.parse_assembly(assembly)
@@ -60,11 +69,21 @@ def keep(path: Path, parts: Sequence[tuple[str, str]]) -> None:
         codes.append(machine.emit_object(module))
         heads.append({"name": name, "needs": declared, "size": len(codes[-1])})
     code = b"".join(codes)
-    head = {"parts": heads, "digest": hashlib.blake2b(code).hexdigest()}
+    head = {
+        "parts": heads,
+        "digest": hashlib.blake2b(code).hexdigest(),
+        "triple": llvm.get_default_triple(),
+        "features": _portable_features() if portable else [],
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}")
     part.write_bytes(json.dumps(head).encode() + b"\n" + code)
     part.replace(path)
+
+
+def _portable_features() -> list[str]:
+    """Return what a processor must be able to do to run portable code."""
+    return list(PORTABLE[llvm.get_default_triple().partition("-")[0]][1])
 
 
 def load(path: Path) -> tuple[list[int], Any] | None:
@@ -77,6 +96,9 @@ def load(path: Path) -> tuple[list[int], Any] | None:
         head = json.loads(line)
         parts = head["parts"]
         sound = hashlib.blake2b(code).hexdigest() == head["digest"]
+        host = llvm.get_host_cpu_features()
+        sound = sound and head["triple"] == llvm.get_default_triple()
+        sound = sound and all(host.get(feature) for feature in head["features"])
     except (OSError, ValueError, KeyError):
         return None
     if not sound:

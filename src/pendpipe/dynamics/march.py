@@ -16,7 +16,8 @@ from pendpipe.dynamics.panel import (
     curve,
     kernel,
     log_amplitude,
-    part,
+    panel_width,
+    row_width,
 )
 from pendpipe.dynamics.table import (
     DONE,
@@ -33,11 +34,10 @@ from pendpipe.dynamics.table import (
     points_for,
     widest,
 )
-from pendpipe.dynamics.workspace import carve, panel_width, row_width
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.workspace import Work
+    from pendpipe.dynamics.layout import Work
 
 
 @kernel
@@ -55,10 +55,10 @@ def sticks(shape: FloatArray, y: float) -> bool:
     return bool(h + q * (y + m) >= slope)
 
 
-@part
+@kernel
 def _advance(work: Work, y: float) -> None:
     """Carry dy/dp and dtau/dp over the half cycle in `work.row`, which started at y."""
-    row, columns = work.row, work.amplitude.size
+    row, columns = work.row, work.sensitivities
     for c in range(columns):
         before = work.amplitude[c]
         work.amplitude[c] = row[HEAD] * before
@@ -68,21 +68,21 @@ def _advance(work: Work, y: float) -> None:
             work.clock[c] += row[HEAD + columns + c]
 
 
-@part
-def _lay_out(
-    work: Work, log_y: float, half_cycles: float, polynomials: int, wanted: FloatArray
-) -> bool:
+@kernel
+def _lay_out(work: Work, log_y: float, half_cycles: float) -> bool:
     """Tabulate from ln y downwards if it pays; else note how far to go without a table.
 
-    `wanted` holds the number of panels last used, and the ln y down to which no table is tried.
+    `work.wanted` holds the number of panels last used, and the ln y down to which no table is
+    tried.
     """
+    wanted = work.wanted
     room = widest(work.shape, log_y)
     if work.shape[0] > 0.0:
         room = min(room, log_y - math.log(SMOOTH_FROM * work.shape[0]))
     count, span = half_cycles_and_span(work.shape, log_y, half_cycles, room)
     panels = max(1, int(wanted[0]) // 2)  # what is smaller may need fewer
     while count > 1.5 * points_for(work.shape, log_y, span) and span >= NARROWEST:
-        outcome = build(work, log_y, span, panels, polynomials)
+        outcome = build(work, log_y, span, panels)
         if outcome == DONE:
             wanted[0] = panels
             return True
@@ -95,15 +95,14 @@ def _lay_out(
     return False
 
 
-@part
-def _record(
-    work: Work, k: int, tau: float, y: float, signs: FloatArray, turning: FloatArray
-) -> None:
+@kernel
+def _record(work: Work, k: int, tau: float, y: float) -> None:
     """Write the time and the angle of turning point k, and their derivatives if there is room."""
     omega, release_s, offset = work.motion[0], work.motion[1], work.motion[2]
+    turning, signs = work.turning, work.signs
     turning[0, k] = release_s + tau / omega
     turning[1, k] = signs[0] * angle_of(work.shape, y) + offset
-    directions, columns = work.rates.size, work.amplitude.size
+    directions, columns = work.rates, work.sensitivities
     if columns == 0:
         return
     times, angles = turning[2 : 2 + directions + 4, k], turning[6 + directions :, k]
@@ -112,109 +111,95 @@ def _record(
     for c in range(directions):
         times[c] = work.clock[c + 1] / omega
         angles[c] = signs[0] * work.amplitude[c + 1] / bend
-        times[directions] -= work.rates[c] / omega * times[c]
-        angles[directions] -= work.rates[c] / omega * angles[c]
+        times[directions] -= work.rate[c] / omega * times[c]
+        angles[directions] -= work.rate[c] / omega * angles[c]
     times[directions + 1] = signs[1] * work.clock[0] / omega
     angles[directions + 1] = signs[0] * signs[1] * work.amplitude[0] / bend
     times[directions + 2], angles[directions + 2] = 1.0, 0.0
     times[directions + 3], angles[directions + 3] = 0.0, 1.0
 
 
-@part
-def _emit_row(
-    work: Work, y: float, tau: float, signs: FloatArray, polynomials: int, time_s: FloatArray,
-    first: int, guess: int, angle_rad: FloatArray, jacobian: FloatArray,
-) -> tuple[int, int]:  # fmt: skip
+@kernel
+def _emit_row(work: Work, y: float, tau: float, first: int, guess: int) -> tuple[int, int]:
     """Write the samples of a half cycle read from the table."""
     row, panels = work.row, int(work.segment[PANELS])
-    width, at, start = panel_width(polynomials), HEAD + 2 * work.sigma.size, 0.0
+    width, at, start = panel_width(work.polynomials), HEAD + 2 * work.sensitivities, 0.0
     for p in range(panels):
         end = math.pi * (p + 1) / panels + row[at]
-        stop = emit(
-            work, row[at + 1 : at + width], tau + start, end - start, y, signs,
-            time_s, first, guess, angle_rad, jacobian,
-        )  # fmt: skip
+        own = row[at + 1 : at + width]
+        stop = emit(work, own, tau + start, end - start, y, first, guess)
         first, guess, at, start = stop, stop - first, at + width, end
     return first, guess
 
 
-def march(
-    constants: FloatArray, directions: FloatArray, rates: FloatArray, angle: float, tabulate: bool,
-    most: int, until_s: float, time_s: FloatArray, angle_rad: FloatArray, jacobian: FloatArray,
-    turning: FloatArray, readings: FloatArray, sums: FloatArray, buffer: FloatArray,
-) -> tuple[int, int]:  # fmt: skip
+@kernel
+def _begin(work: Work) -> float:
+    """Forget what an earlier call left in the workspace; return the amplitude of the release."""
+    shape, angle = work.shape, work.limits[0]
+    work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
+    for slot in range(SLOTS):
+        work.nodes[slot, PLACED + 1] = 0.0  # and no panel
+    y = 2.0 * math.sin(0.5 * angle) if shape[CURVATURE] > 0.0 else angle
+    for c in range(work.sensitivities):
+        work.amplitude[c], work.clock[c] = (curve(shape, y) if c == 0 else 0.0), 0.0
+    work.wanted[0], work.wanted[1], work.wanted[2] = 1.0, math.inf, 0.0
+    return y
+
+
+@kernel
+def march(work: Work, tabulate: bool, most: int) -> tuple[int, int]:
     """Follow the pendulum from its release.
+
+    With samples the residuals or they themselves are written to `work.angle_rad`, with rates
+    their Jacobian or, with readings, the sums of their comparison; the last column of the
+    Jacobian, by the offset, is left to the caller. Turning points are written as far as there
+    is room for them.
 
     Parameters
     ----------
-    constants
-        m, h, q, g, k, omega; time and offset of the release, and its side twice (the first is
-        changed: the side of the turning point in hand).
-    directions, rates
-        See `workspace.Work`.
-    angle
-        Of the release, positive.
+    work
+        The arrays, see `layout.FIELDS`; in `work.limits` the release's angle, positive, and the
+        time after which no turning point is wanted (with samples, that of the last of these).
     tabulate
         Whether to tabulate the half-cycle map where that pays.
-    most, until_s
-        Where to end: at this number of turning points, or with the last not after this time
-        (with samples, the time of the last of these).
-    time_s, angle_rad, jacobian
-        Ascending times, and what receives the samples and their derivatives; may be empty.
-        The last column of the Jacobian, by the offset, is left to the caller.
-    turning
-        Receives the turning points, a column each; may be empty.
-    readings, sums
-        Readings at the times: `angle_rad` then receives the residuals, and with rates `sums`
-        their comparison (see `comparison.py`). Both may be empty.
+    most
+        At most so many turning points.
 
     Returns
     -------
     The number of turning points, and RUNNING, STOPPED or OVERDAMPED.
     """
-    columns = rates.size + 1 if rates.size > 0 else 0
-    polynomials = columns + 1 if time_s.size > 0 else 0
-    work = carve(buffer, constants, directions, rates, readings, sums, columns, polynomials)
-    shape, motion, signs = work.shape, work.motion, constants[8:10]
-    work.segment[LOW], work.segment[HIGH] = 1.0, 0.0  # no table yet
-    for slot in range(SLOTS):
-        work.nodes[slot, PLACED + 1] = 0.0  # and no panel
-    y = 2.0 * math.sin(0.5 * angle) if shape[CURVATURE] > 0.0 else angle
-    for c in range(columns):
-        work.amplitude[c], work.clock[c] = (curve(shape, y) if c == 0 else 0.0), 0.0
-    wanted = work.wanted
-    wanted[0], wanted[1], wanted[2] = 1.0, math.inf, 0.0
+    shape, motion, until_s, samples = work.shape, work.motion, work.limits[1], work.samples
+    y = _begin(work)
     log_y, excess, k, level, first, guess = log_amplitude(shape, y), 0.0, 0, 0, 0, 0
-    narrow = columns == 0 and polynomials == 0
     while True:
         tau = math.pi * k + excess
         now_s = motion[1] + tau / motion[0]
-        if now_s > until_s and time_s.size == 0:
+        if now_s > until_s and samples == 0:
             return k, RUNNING
-        if k < turning.shape[1]:
-            _record(work, k, tau, y, signs, turning)
+        if k < work.room:
+            _record(work, k, tau, y)
         k += 1
         if sticks(shape, y):
-            rest(work, y, signs, first, angle_rad, jacobian)
+            rest(work, y, first)
             return k, STOPPED
-        if k >= most or (time_s.size > 0 and first >= time_s.size):
+        if k >= most or (samples > 0 and first >= samples):
             return k, RUNNING
         listed = work.segment[LOW] <= log_y <= work.segment[HIGH]
-        if tabulate and not listed and log_y < wanted[1] and y > SMOOTH_FROM * shape[0]:
+        untried = log_y < work.wanted[1] and y > SMOOTH_FROM * shape[0]
+        if tabulate and not listed and untried:
             ahead = min(float(most - k), (until_s - now_s) * motion[0] / math.pi) + 2.0
-            listed = _lay_out(work, log_y, ahead, polynomials, wanted)
-        if listed and narrow:
+            listed = _lay_out(work, log_y, ahead)
+        if listed and work.sensitivities == 0 and samples == 0:
             loss, more = look_up_turning_point(work.segment, work.table, log_y)
             log_y -= loss
             y = amplitude_at(shape, log_y)
             excess += more
         elif listed:
-            width = row_width(columns, polynomials, int(work.segment[PANELS]))
+            width = row_width(work.sensitivities, work.polynomials, int(work.segment[PANELS]))
             look_up(work.segment, work.table, log_y, width, work.row)
-            if polynomials > 0:
-                first, guess = _emit_row(
-                    work, y, tau, signs, polynomials, time_s, first, guess, angle_rad, jacobian
-                )
+            if samples > 0:
+                first, guess = _emit_row(work, y, tau, first, guess)
             _advance(work, y)
             log_y -= work.row[0]
             y = amplitude_at(shape, log_y)
@@ -222,13 +207,11 @@ def march(
         else:
             if k % 8 == 0 and level > 0:
                 level -= 1  # the damping may have eased
-            after, more, first, level = direct_half_cycle(
-                work, y, tau, signs, level, polynomials, time_s, first, guess, angle_rad, jacobian
-            )
+            after, more, first, level = direct_half_cycle(work, y, tau, level, first, guess)
             if level < 0:
                 return k, OVERDAMPED
             _advance(work, y)
             y = after
             log_y = log_amplitude(shape, y)
             excess += more
-        signs[0] = -signs[0]
+        work.signs[0] = -work.signs[0]

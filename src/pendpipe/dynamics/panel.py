@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import njit
 
+from pendpipe.dynamics import layout
 from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
 from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 
@@ -74,17 +75,21 @@ def kernel(function: _F) -> _F:
     return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
+def inlined(function: _F) -> _F:
+    """Compile a function into its callers, where it knows what does not overlap."""
+    return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]
+
+
 def adder(function: _F) -> _F:
     """Compile a function whose sums may be taken in any order."""
     return njit(**(_OPTIONS | {"fastmath": {"contract", "reassoc", "nsz"}}))(function)  # type: ignore[no-any-return]
 
 
-def part(function: _F) -> _F:
-    """Compile a function that takes the whole workspace, too much to hand over, into its caller."""
-    return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]
+panel_width = kernel(layout.panel_width)
+row_width = kernel(layout.row_width)
 
 
-@kernel
+@inlined
 def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to: int) -> None:
     """Write the product of a matrix, given transposed, and the 17 values x[p:] to out[to:].
 
@@ -105,7 +110,7 @@ def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to:
         )
 
 
-@kernel
+@inlined
 def unresolved(values: FloatArray, at: int) -> float:
     """Return the estimated size of the Chebyshev coefficients left out, extrapolated."""
     c13, c14, c15, c16 = 0.0, 0.0, 0.0, 0.0
@@ -120,14 +125,14 @@ def unresolved(values: FloatArray, at: int) -> float:
     return last * min(1.0, last / before)
 
 
-@kernel
+@inlined
 def curve(shape: FloatArray, s: float) -> float:
     """Return C at s."""
     # |.| because rounding can make the square negative at the top
     return math.sqrt(abs(1.0 - 0.25 * shape[CURVATURE] * s * s))
 
 
-@kernel
+@inlined
 def angle_of(shape: FloatArray, s: float) -> float:
     """Return x at s."""
     return 2.0 * math.asin(0.5 * s) if shape[CURVATURE] > 0.0 else s
@@ -187,7 +192,7 @@ def complement_for(shape: FloatArray, log_y: float) -> float:
     return 1.0 / math.sqrt(1.0 + tangent * tangent)
 
 
-@kernel
+@inlined
 def _bend(node: FloatArray, shape: FloatArray, radius: float) -> None:
     """Write 1/C, and what the sine adds to C nu about a shifted centre."""
     if shape[CURVATURE] == 0.0:
@@ -201,7 +206,7 @@ def _bend(node: FloatArray, shape: FloatArray, radius: float) -> None:
         node[LEAN + j] = 0.25 * m * cos * (s + m) / (c + centre)
 
 
-@kernel
+@inlined
 def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
     """Take over the iterate; return the sums of its changes and of its values.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.layout import NODE_COUNT
-from pendpipe.dynamics.panel import kernel
+from pendpipe.dynamics.panel import inlined, kernel
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -26,7 +26,7 @@ def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
         out[i] = (((lower + c3) * z + c2) * z + c1) * z + c0
 
 
-@kernel
+@inlined
 def horner_few(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
     """As `horner`, at a few places: even and odd powers apart, so that each step waits less."""
     for i in range(theta.size):

@@ -14,12 +14,19 @@ from typing import TYPE_CHECKING
 from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS
-from pendpipe.dynamics.panel import CURVATURE, amplitude_at, complement_for, curve, kernel, part
-from pendpipe.dynamics.workspace import panel_width, row_width
+from pendpipe.dynamics.panel import (
+    CURVATURE,
+    amplitude_at,
+    complement_for,
+    curve,
+    kernel,
+    panel_width,
+    row_width,
+)
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.workspace import Work
+    from pendpipe.dynamics.layout import Work
 
 _WIDEST, _FEW = 5.2, 0.31
 """The widest range of ln y that one table spans, and the share of it that few points resolve."""
@@ -86,8 +93,8 @@ def half_cycles_and_span(
     return count, room
 
 
-@part
-def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) -> int:
+@kernel
+def build(work: Work, log_y: float, span: float, panels: int) -> int:
     """Tabulate the half cycles with ln y from log_y - span to log_y.
 
     Returns DONE, or what stands in the way: a half cycle needs more panels, or the span is too
@@ -97,16 +104,16 @@ def build(work: Work, log_y: float, span: float, panels: int, polynomials: int) 
     segment = work.segment
     segment[MIDDLE], segment[INVERSE] = log_y - half, 1.0 / half
     segment[POINTS], segment[PANELS] = points, panels
-    width = row_width(work.sigma.size, polynomials, panels)
+    width = row_width(work.sensitivities, work.polynomials, panels)
     complement = complement_for(work.shape, log_y)
     nodes = _MANY_NODES if points == MOST_POINTS else _FEW_NODES
     for i in range(points):
         y = amplitude_at(work.shape, log_y - half + half * nodes[i])
-        if not even_half_cycle(work, y, complement, panels, polynomials, work.rows[i]):
+        if not even_half_cycle(work, y, complement, panels, work.rows[i]):
             return MORE_PANELS
     # The sine's excess is no work of the losses, and not to be measured by them.
     excess = _EXCESS_TOLERANCE if work.shape[CURVATURE] > 0.0 else 0.0
-    first, per_panel = HEAD + 2 * work.sigma.size, panel_width(polynomials)
+    first, per_panel = HEAD + 2 * work.sensitivities, panel_width(work.polynomials)
     if not _interpolate(points, width, work.rows, first, per_panel, excess, work.table):
         return LESS_SPAN
     segment[LOW], segment[HIGH] = log_y - span, log_y
