@@ -6,8 +6,8 @@ A statement's module is drawn by its number of statements, and in it an operator
 constant, a sign or a statement that is changed or dropped. A clone of the commit in
 ``.evidence/mutations`` gets one mutation at a time. The test files nearest to it by imports run
 first; what they miss meets the whole suite. A test counts if it fails with the mutation and
-passes without; so do tests that take too long with the mutation only. Each outcome is kept in a journal
-beside the clone, so that a run can be broken off and taken up.
+passes without; so do tests that take too long with the mutation only. Each outcome is kept in a
+journal beside the clone, so that a run can be broken off and taken up.
 """
 
 from __future__ import annotations
