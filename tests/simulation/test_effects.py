@@ -240,3 +240,26 @@ def test_two_jumps_are_two_tables_of_one_effect(tmp_path: Path) -> None:
     np.testing.assert_allclose(both[time_s < 20.0], one[time_s < 20.0], 0.0, 1e-9)
     assert np.max(np.abs(both - one)[time_s > 20.0]) > 1e-3
     assert np.max(np.abs(one - bare)) > 1e-3
+
+
+SINE = quiet(TOML).replace(
+    "release_angle_rad = 0.15", 'release_angle_rad = 2.5\nrestoring = "sine"'
+)
+
+
+def test_a_pendulum_with_sin_x_swings_as_the_engine_has_it(tmp_path: Path) -> None:
+    recording = simulate(model(tmp_path, text=SINE))
+    equation = model(tmp_path, text=SINE).pendulum.equation()
+    assert equation.restoring == "sine"
+    expected = sample(equation, Release(-0.2, 2.5), recording.time_s)
+    np.testing.assert_array_equal(recording.values, expected)
+    # At 2.5 rad the frequency is three fifths of that at small amplitudes.
+    turned = np.sum(np.diff(np.sign(recording.values)) != 0) / 2.0 / 40.0
+    assert 0.5 * 0.9 < turned < 0.9 * 0.9
+
+
+def test_sin_x_is_not_combined_with_effects_and_ends_at_the_top(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="circular-error"):
+        simulate(model(tmp_path, table("sensor-cubic", s3=0.05), SINE))
+    with pytest.raises(InputError, match="beyond pi"):
+        simulate(model(tmp_path, text=SINE.replace("2.5", "3.2")))

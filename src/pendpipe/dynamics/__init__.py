@@ -4,15 +4,17 @@ Eq. 8 goes through the compiled engine (`eq8`); any other law through `any_law`.
 """
 
 from pendpipe.dynamics.eq8 import (
+    Comparison,
     Method,
     TurningPoints,
+    compare,
+    residuals,
     sample,
     sample_with_jacobian,
     turning_points,
     turning_points_with_jacobian,
 )
 from pendpipe.dynamics.model import JACOBIAN_COLUMNS, JOINT_JACOBIAN_COLUMNS, Eq8, Release
-from pendpipe.dynamics.residuals import Comparison, compare, residuals
 
 __all__ = [
     "JACOBIAN_COLUMNS",

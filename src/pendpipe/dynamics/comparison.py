@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.dynamics.layout import MOMENTS, NODE_COUNT, PLACES
-from pendpipe.dynamics.panel import adder, kernel
-from pendpipe.dynamics.polynomials import horner_few
+from pendpipe.dynamics.panel import adder, horner_few, kernel
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

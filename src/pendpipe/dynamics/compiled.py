@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SOURCES = (
     "chebyshev.py", "comparison.py", "emission.py", "entry.py", "half_cycle.py", "layout.py",
-    "march.py", "panel.py", "polynomials.py", "sensitivities.py", "table.py", "views.py",
+    "march.py", "panel.py", "sensitivities.py", "table.py", "views.py",
 )  # fmt: skip
 SHIPPED = Path(__file__).parent / "shipped"
 """Machine code for many machines, which a wheel may bring along."""

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
 from pendpipe.dynamics.layout import NODE_COUNT
-from pendpipe.dynamics.panel import angle_of, curve, inlined, kernel
-from pendpipe.dynamics.polynomials import horner
+from pendpipe.dynamics.panel import angle_of, curve, horner, inlined, kernel
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

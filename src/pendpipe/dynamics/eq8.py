@@ -1,18 +1,26 @@
-"""Turning points and samples of Eq. 8, with exact derivatives by every parameter."""
+"""Eq. 8's turning points, samples, derivatives by every parameter, and comparison with readings."""
 
 from __future__ import annotations
 
+import ctypes
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from pendpipe.dynamics.engine import NO_LIMIT, directions_of, run
+from pendpipe.dynamics.compiled import engine
+from pendpipe.dynamics.layout import FIELDS, OVERDAMPED, REQUEST, STOPPED, sums_size, work_size
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.model import Eq8, Release
+
+_NO_SAMPLES: FloatArray = np.empty(0)
+_NONE: FloatArray = np.empty((0, 0))
+_NO_LIMIT = 2**62
+_REQUEST = ctypes.c_int64 * len(REQUEST)
+_LOSSES, _DIRECTIONS = FIELDS["rate"].offset, FIELDS["directions"].offset
 
 Method = Literal["map", "clock"]
 """``"map"`` tabulates the half-cycle map and is the fast way; ``"clock"`` solves every half cycle
@@ -74,7 +82,7 @@ def turning_points(
     if count is not None and count < 1:
         message = f"count must be at least 1, not {count}"
         raise ValueError(message)
-    most = NO_LIMIT if count is None else count
+    most = _NO_LIMIT if count is None else count
     _check_method(method)
     end_s = math.inf if until_s is None else until_s
     if not end_s >= release.time_s:
@@ -83,7 +91,7 @@ def turning_points(
     room = 1024 if math.isinf(end_s) else _half_cycles(model, release, end_s) + 16
     while True:
         turning = np.empty((2, min(most, room)))
-        found, stopped = run(
+        found, stopped = _run(
             model,
             release,
             tabulate=method == "map",
@@ -131,10 +139,10 @@ def turning_points_with_jacobian(
         message = f"count must be at least 1, not {count}"
         raise ValueError(message)
     _check_method(method)
-    directions, rates = directions_of(model, hysteretic_share)
+    directions, rates = _directions_of(model, hysteretic_share)
     columns = rates.size + 4
     turning = np.empty((2 + 2 * columns, count))
-    found, stopped = run(
+    found, stopped = _run(
         model,
         release,
         tabulate=method == "map",
@@ -169,12 +177,12 @@ def sample(
     ValueError
         If the times are not as required, or `model` is overdamped.
     """
-    times = checked_times(time_s, release)
+    times = _checked_times(time_s, release)
     _check_method(method)
     angle_rad = np.empty(times.size)
     if times.size:
         until_s = float(times[-1])
-        run(
+        _run(
             model,
             release,
             tabulate=method == "map",
@@ -211,13 +219,13 @@ def sample_with_jacobian(
     jacobian
         (n, 8) or (n, 7), stored by columns. At c = 0 the derivative by c is that towards c > 0.
     """
-    times = checked_times(time_s, release)
+    times = _checked_times(time_s, release)
     _check_method(method)
-    directions, rates = directions_of(model, hysteretic_share)
+    directions, rates = _directions_of(model, hysteretic_share)
     angle_rad = np.empty(times.size)
     jacobian = np.empty((rates.size + 4, times.size))
     if times.size:
-        run(
+        _run(
             model, release, tabulate=method == "map", directions=directions, rates=rates,
             until_s=float(times[-1]), time_s=times, angle_rad=angle_rad, jacobian=jacobian,
         )  # fmt: skip
@@ -225,7 +233,7 @@ def sample_with_jacobian(
     return angle_rad, jacobian.T
 
 
-def checked_times(time_s: FloatArray, release: Release) -> FloatArray:
+def _checked_times(time_s: FloatArray, release: Release) -> FloatArray:
     """Return the times as the engine needs them."""
     times = np.ascontiguousarray(time_s, dtype=np.float64)
     if times.ndim != 1 or (times.size and not math.isfinite(times[0] + times[-1])):
@@ -239,3 +247,132 @@ def checked_times(time_s: FloatArray, release: Release) -> FloatArray:
         message = f"time_s starts at {times[0]}, before the release at {release.time_s}"
         raise ValueError(message)
     return times
+
+
+class Comparison(NamedTuple):
+    """Readings against Eq. 8; J is the Jacobian of `sample_with_jacobian`, r the residual."""
+
+    square: float
+    """r' r."""
+    gradient: FloatArray
+    """J' r, shape (8,)."""
+    normal: FloatArray
+    """J' J, shape (8, 8), for readings spread evenly within each half cycle."""
+    residual: FloatArray
+    """r, shape (n,)."""
+
+
+def residuals(
+    model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatArray
+) -> FloatArray:
+    """Return readings less model, shape (n,)."""
+    times = _checked_times(time_s, release)
+    readings = np.ascontiguousarray(angle_rad, dtype=np.float64)
+    residual = np.empty(times.size)
+    if times.size:
+        _run(
+            model, release, tabulate=True, until_s=float(times[-1]), time_s=times,
+            angle_rad=residual, readings=readings, sums=np.zeros(sums_size(0)),
+        )  # fmt: skip
+    return residual
+
+
+def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatArray) -> Comparison:
+    """Compare readings with Eq. 8, with the columns `JACOBIAN_COLUMNS`.
+
+    The Jacobian is never written: the products that a fit needs are summed half cycle by
+    half cycle. The gradient is exact; the normal matrix takes the readings as spread evenly
+    within each half cycle (or its panels), and is exact but for that.
+
+    Parameters
+    ----------
+    model, release, time_s
+        As in `sample`.
+    angle_rad
+        The readings, shape (n,).
+    """
+    times = _checked_times(time_s, release)
+    readings = np.ascontiguousarray(angle_rad, dtype=np.float64)
+    directions, rates = _directions_of(model, None)
+    columns = rates.size + 4
+    sums, residual = np.zeros(sums_size(columns)), np.empty(times.size)
+    if times.size:
+        _run(
+            model, release, tabulate=True, directions=directions, rates=rates,
+            until_s=float(times[-1]), time_s=times, angle_rad=residual, readings=readings,
+            sums=sums,
+        )  # fmt: skip
+    lower = sums[1 + columns :].reshape(columns, columns)
+    normal = lower + lower.T
+    normal.flat[:: columns + 1] *= 0.5
+    return Comparison(float(sums[0]), sums[1 : 1 + columns], normal, residual)
+
+
+def _run(
+    model: Eq8,
+    release: Release,
+    *,
+    tabulate: bool,
+    directions: FloatArray = _NONE,
+    rates: FloatArray = _NO_SAMPLES,
+    most: int = _NO_LIMIT,
+    until_s: float = math.inf,
+    time_s: FloatArray = _NO_SAMPLES,
+    angle_rad: FloatArray = _NO_SAMPLES,
+    jacobian: FloatArray = _NONE,
+    turning: FloatArray = _NONE,
+    readings: FloatArray = _NO_SAMPLES,
+    sums: FloatArray = _NO_SAMPLES,
+) -> tuple[int, bool]:
+    """Call the engine; return the number of turning points and whether the last is the stop."""
+    if model.restoring == "sine" and not abs(release.angle_rad) < math.pi:
+        message = f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
+        raise ValueError(message)
+    count = rates.size
+    side = -1.0 if release.angle_rad < 0.0 else 1.0
+    workspace = np.empty(work_size(count, time_s.size))
+    workspace[:_LOSSES] = (
+        *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
+        abs(release.angle_rad), until_s,
+    )  # fmt: skip
+    workspace[_LOSSES : _LOSSES + count] = rates
+    workspace[_DIRECTIONS : _DIRECTIONS + directions.size] = directions.ravel()
+    request = _REQUEST(
+        _address(workspace), count, tabulate, most, _address(time_s), time_s.size,
+        _address(angle_rad), _address(jacobian), _address(turning), turning.shape[1],
+        _address(readings), readings.size, _address(sums),
+    )  # fmt: skip
+    found, state = divmod(engine()(request), OVERDAMPED + 1)
+    if state == OVERDAMPED:
+        message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
+        raise ValueError(message)
+    return found, state == STOPPED
+
+
+def _address(array: FloatArray) -> int:
+    """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
+    if array is _NO_SAMPLES or array is _NONE or array.size == 0:
+        return 0
+    if not array.flags.writeable:
+        return array.ctypes.data
+    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
+
+
+def _directions_of(model: Eq8, hysteretic_share: float | None) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of the model's shape by its rates, and the rates."""
+    derivatives = model.shape_derivatives()
+    rates = np.array([model.quadratic, model.hysteretic, model.viscous, model.coulomb])
+    if hysteretic_share is None:
+        return derivatives, rates
+    total = model.hysteretic + model.viscous
+    if not 0.0 <= hysteretic_share <= 1.0:
+        message = f"hysteretic_share must lie between 0 and 1, not {hysteretic_share}"
+        raise ValueError(message)
+    if abs(model.hysteretic - hysteretic_share * total) > 1e-9 * total:
+        message = f"hysteretic_share is {hysteretic_share}, but {model} has another"
+        raise ValueError(message)
+    joint = hysteretic_share * derivatives[1] + (1.0 - hysteretic_share) * derivatives[2]
+    return (
+        np.stack([derivatives[0], joint, derivatives[3]]),
+        np.array([model.quadratic, total, model.coulomb]),
+    )

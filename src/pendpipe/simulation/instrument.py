@@ -1,4 +1,4 @@
-"""Faults of the instrument that have no template: jitter, glitches, clipping, codes, noise."""
+"""The instrument: an ideal converter, and faults without a signature (jitter, glitches, ...)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Instrument:
     Parameters
     ----------
     given
-        The effects; those with a template are none of its business.
+        The effects; those with a signature in the readings are ignored.
     random
         Numbers for what is drawn.
     place
@@ -111,3 +111,13 @@ def _limited(angle: FloatArray, low: float, high: float, width: float) -> FloatA
     if np.isfinite(low):
         angle = low + width * np.logaddexp(0.0, (angle - low) / width)
     return angle
+
+
+def quantised(volts: FloatArray, step_volts: float) -> FloatArray:
+    """Round to the nearest code: ``step round(volts/step)``; the error is at most half a step."""
+    return step_volts * np.round(volts / step_volts)
+
+
+def clipped(volts: FloatArray, range_volts: float, step_volts: float) -> FloatArray:
+    """Limit to the codes of an offset-binary converter: from -range to +range less a step."""
+    return np.clip(volts, -range_volts, range_volts - step_volts)

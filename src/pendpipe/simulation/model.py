@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -16,10 +17,8 @@ from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
-from pendpipe.simulation.converter import clipped, quantised
 from pendpipe.simulation.effects import Given, read_effects
-from pendpipe.simulation.in_vain import refuse_in_vain
-from pendpipe.simulation.instrument import Instrument
+from pendpipe.simulation.instrument import Instrument, clipped, quantised
 
 
 class PendulumModel(Section):
@@ -30,6 +29,9 @@ class PendulumModel(Section):
     quality_factor_viscous: Positive | None = Field(None, description="Q_v; blank: none")
     a: NotNegative = Field(0.0, description="quadratic drag's rate in Eq. 13, 1/(rad s)")
     c: NotNegative = Field(0.0, description="Coulomb friction's rate in Eq. 13, rad/s")
+    restoring: Literal["linear", "sine"] = Field(
+        "linear", description="torque omega^2 x, or omega^2 sin x for any amplitude below pi"
+    )
     release_angle_rad: float = Field(description="angle from which it is let go, at rest")
     release_time_s: float = Field(
         0.0, le=0.0, description="when it is let go; the record starts at 0"
@@ -45,6 +47,7 @@ class PendulumModel(Section):
             hysteretic=omega / (2.0 * hysteretic) if hysteretic else 0.0,
             viscous=omega / (2.0 * viscous) if viscous else 0.0,
             coulomb=self.c,
+            restoring=self.restoring,
         )
 
 
@@ -116,6 +119,51 @@ def _toml(path: Path) -> dict[str, Any]:
         raise InputError(path, f"this is no TOML ({problem})", "correct it") from None
 
 
+def refuse_inert_effects(model: Model, given: Sequence[Given], place: str) -> None:
+    """Refuse effects that have nothing to act on, and instrument faults that are given twice.
+
+    Raises
+    ------
+    InputError
+        Which effect, what is missing, what to do.
+    """
+    seen: set[str] = set()
+    for number, one in enumerate(given, start=1):
+        name = one.effect.identifier
+        where = f"{place}, effects {number} ({name})"
+        if not one.effect.has_signature and name in seen:
+            raise InputError(where, "it is given before", "write one table of it")
+        seen.add(name)
+        lacking = _lacking(model, one)
+        if lacking is not None:
+            raise InputError(where, *lacking)
+
+
+def _lacking(model: Model, one: Given) -> tuple[str, str] | None:
+    """What an effect acts on and a model lacks, and what to do; None where it has it."""
+    name, pendulum = one.effect.identifier, model.pendulum
+    for need in one.effect.needs:
+        if not getattr(pendulum, need):
+            return f"it does nothing where the pendulum's {need} is 0", f"give {need}"
+    linear = pendulum.quality_factor_hysteretic or pendulum.quality_factor_viscous
+    if name == "damping-step" and not (pendulum.a or pendulum.c or linear):
+        return "it does nothing where the pendulum has no damping", "give a, c or a quality factor"
+    if name == "missing-codes" and model.converter is None:
+        return "there are no missing codes without a converter", "add [converter]"
+    if name == "coloured-noise" and not _noise(model):
+        return "it colours the noise, and there is none", "give noise_rad, or noise_volts"
+    if name == "clipping" and not any(
+        math.isfinite(one.named()[level]) for level in ("lower_level", "upper_level")
+    ):
+        return "neither of its levels is given", "give upper_level or lower_level, in rad"
+    return None
+
+
+def _noise(model: Model) -> bool:
+    """Whether the readings have any."""
+    return model.noise_rad > 0.0 or (model.sensor is not None and model.sensor.noise_volts > 0.0)
+
+
 def simulate(model: Model, source: str = "simulated", place: str = "the model") -> Recording:
     """Make the recording that a model describes.
 
@@ -132,7 +180,7 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
         In volts where there is a sensor, else in radians, with its metadata.
     """
     given = read_effects(place, model.effects)
-    refuse_in_vain(model, given, place)
+    refuse_inert_effects(model, given, place)
     rate = model.sampling.sample_rate_hz
     time = np.arange(int(np.floor(model.sampling.duration_s * rate + 1e-9))) / rate
     instrument = Instrument(given, np.random.default_rng([model.seed, 1]), place)
@@ -187,11 +235,16 @@ def _angles(
     equation = model.pendulum.equation()
     release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
     taken = instrument.times(time)
-    templates = [one for one in given if one.effect.has_signature]
-    if templates:
+    moving = [one for one in given if one.effect.has_signature]
+    if equation.restoring == "sine" and not abs(release.angle_rad) < math.pi:
+        raise InputError(place, "with sin x it is released beyond pi", "release it below 3.14 rad")
+    if moving and equation.restoring == "sine":
+        remedy = 'leave restoring out and add the effect "circular-error"'
+        raise InputError(place, "effects are solved for a linear torque", remedy)
+    if moving:
         from pendpipe.simulation.motion import angles
 
-        angle = angles(equation, release, templates, taken, place)
+        angle = angles(equation, release, moving, taken, place)
     else:
         angle = sample(equation, release, taken)
     return instrument.shaken(angle, time, equation)
