@@ -36,10 +36,13 @@ def test_the_user_has_the_say_about_threads(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's")
 def test_memory_that_is_kept_is_not_mapped_again() -> None:
     mapped, kept = (
-        int(subprocess.run([sys.executable, "-c", _FAULTS, *words], check=True,
-                           capture_output=True, text=True).stdout)
+        int(
+            subprocess.run(
+                [sys.executable, "-c", _FAULTS, *words], check=True, capture_output=True, text=True
+            ).stdout
+        )
         for words in ([], ["keep"])
-    )  # fmt: skip
+    )
     if mapped < 100:
         pytest.skip("this system's library keeps memory by itself")
     assert kept < 0.2 * mapped

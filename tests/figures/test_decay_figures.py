@@ -42,8 +42,9 @@ def quiet_decay(a: float, b: float, c: float, *, sd: float = 1e-9) -> Decay:
         )
     }
     y = physics.amplitude(time, 0.07, a, b, c)
-    return Decay("quiet", time, y, np.full_like(time, sd), 0.0 * time, parameters,
-                 ("b",), np.array([[1e-8]]))  # fmt: skip
+    return Decay(
+        "quiet", time, y, np.full_like(time, sd), 0.0 * time, parameters, ("b",), np.array([[1e-8]])
+    )
 
 
 def test_figure_7_draws_all_samples_inside_the_envelope(example: Any) -> None:

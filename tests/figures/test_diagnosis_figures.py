@@ -141,8 +141,12 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
             draw(content)
     drawn = draw_diagnosis(outcome, tmp_path)
     assert [path.stem for path in drawn] == [
-        "decay", "residual_map", "residual_spectrum", "damping", "frequency",
-    ]  # fmt: skip
+        "decay",
+        "residual_map",
+        "residual_spectrum",
+        "damping",
+        "frequency",
+    ]
     for path in drawn:
         words = "".join(ET.parse(path).getroot().itertext())
         assert "Eq. 8" in words
@@ -152,9 +156,13 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
 def curve(**more: Any) -> dict[str, Any]:
     at = np.geomspace(0.02, 0.2, 20)
     return {
-        "argument": "amplitude, rad", "ordinate": "extra loss rate, 1/s", "at": at,
-        "value": 1e-3 * at, "sd": np.full(20, 1e-4), **more,
-    }  # fmt: skip
+        "argument": "amplitude, rad",
+        "ordinate": "extra loss rate, 1/s",
+        "at": at,
+        "value": 1e-3 * at,
+        "sd": np.full(20, 1e-4),
+        **more,
+    }
 
 
 def named(outcome: Any, found: dict[str, Any]) -> Shown:

@@ -86,8 +86,11 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
     content, folder = small
     bare = {
         "records": [*content["records"], {"record": "gone", "refused": "gone.csv: no decay"}],
-        "has_theory": False, "typical_record": None, "calibration": None, "tail": [],
-    }  # fmt: skip
+        "has_theory": False,
+        "typical_record": None,
+        "calibration": None,
+        "tail": [],
+    }
     drawn = draw_all(bare, folder, folder / "figures")
     assert not (folder / "figures").exists()
     assert len(drawn.files) == len(content["records"])

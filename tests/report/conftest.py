@@ -52,5 +52,10 @@ def page(example: Any) -> str:
     from pendpipe.report.page import render
 
     configuration = json.loads(example.campaign.read_text())
-    return render(configuration, example.content, {"schema_version": 1}, example.folder,
-                  example.folder / "figures")  # fmt: skip
+    return render(
+        configuration,
+        example.content,
+        {"schema_version": 1},
+        example.folder,
+        example.folder / "figures",
+    )

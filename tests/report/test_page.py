@@ -143,10 +143,14 @@ def test_a_simulated_campaign_says_so_and_a_real_one_does_not(example: Any, page
 def test_refused_records_stand_with_their_line_and_without_folders(example: Any) -> None:
     content = copy.deepcopy(example.content)
     content["records"][3] = {
-        "record": "water-high-4", "source": "run.csv", "fluid": "", "branch": "", "geometry": "",
+        "record": "water-high-4",
+        "source": "run.csv",
+        "fluid": "",
+        "branch": "",
+        "geometry": "",
         "temperature_c": None,
         "refused": "/home/someone/lab/run.csv, line 7: 'x' is no number; mend the row",
-    }  # fmt: skip
+    }
     text = rendered(example, content)
     assert "run.csv, line 7: &#39;x&#39; is no number; mend the row" in text
     assert "someone" not in text
@@ -171,12 +175,26 @@ def test_hostile_names_stay_text(example: Any) -> None:
 
 def test_without_theory_only_the_records_are_told(example: Any, tmp_path: Path) -> None:
     bare = {
-        "title": "Others", "has_theory": False, "typical_record": None, "calibration": None,
-        "records": example.content["records"][:2], "curves": {}, "tail": [],
+        "title": "Others",
+        "has_theory": False,
+        "typical_record": None,
+        "calibration": None,
+        "records": example.content["records"][:2],
+        "curves": {},
+        "tail": [],
         "provenance": example.content["provenance"],
-        **dict.fromkeys(("hysteretic_coefficient", "viscous_exponents", "theory_factor", "budget",
-                         "history_coefficient", "steady_stokes_percent", "checks")),
-    }  # fmt: skip
+        **dict.fromkeys(
+            (
+                "hysteretic_coefficient",
+                "viscous_exponents",
+                "theory_factor",
+                "budget",
+                "history_coefficient",
+                "steady_stokes_percent",
+                "checks",
+            )
+        ),
+    }
     text = render({}, bare, {}, example.folder, tmp_path / "none")
     Outline(text)
     assert 'id="figures"' not in text
@@ -203,8 +221,13 @@ def test_all_numbers_can_be_saved_without_a_script(page: str) -> None:
 
 def test_the_same_results_make_the_same_page(page: str, example: Any) -> None:
     configuration = json.loads(example.campaign.read_text())
-    again = render(configuration, example.content, {"schema_version": 1}, example.folder,
-                   example.folder / "figures")  # fmt: skip
+    again = render(
+        configuration,
+        example.content,
+        {"schema_version": 1},
+        example.folder,
+        example.folder / "figures",
+    )
     assert again == page
 
 
@@ -217,8 +240,16 @@ def test_the_command_writes_the_page_whole_or_not_at_all(
     example: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "report.html"
-    words = ["report", "--campaign", str(example.campaign), "--comparison",
-             str(example.comparison), "--out", str(out), "--summary"]  # fmt: skip
+    words = [
+        "report",
+        "--campaign",
+        str(example.campaign),
+        "--comparison",
+        str(example.comparison),
+        "--out",
+        str(out),
+        "--summary",
+    ]
     assert main([*words, str(tmp_path / "missing.json")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not out.exists()
@@ -230,17 +261,23 @@ def diagnosed(name: str) -> dict[str, Any]:
     """A diagnosis that has found one of two effects which it can't tell apart."""
     model = {
         "parameters": {"amplitude": {"value": 0.25, "unit": "rad"}},
-        "residual_rms_rad": 2.36e-3, "chi2_per_dof": 569.0,
-    }  # fmt: skip
+        "residual_rms_rad": 2.36e-3,
+        "chi2_per_dof": 569.0,
+    }
     effect = {
-        "id": "circular-error", "probability": 0.7,
+        "id": "circular-error",
+        "probability": 0.7,
         "indistinguishable_from": [{"id": "cubic-stiffness", "probability": 0.25}],
-    }  # fmt: skip
+    }
     return {
-        "verdict": "missing-physics", "p_value": 1e-9, "noise_rms_rad": 1e-4, "baseline": model,
+        "verdict": "missing-physics",
+        "p_value": 1e-9,
+        "noise_rms_rad": 1e-4,
+        "baseline": model,
         "improved": {**model, "residual_rms_rad": 1e-4, "chi2_per_dof": 1.01},
-        "effects": [effect], "statement": f"Eq. 8 leaves 2.36 mrad in {name}.",
-    }  # fmt: skip
+        "effects": [effect],
+        "statement": f"Eq. 8 leaves 2.36 mrad in {name}.",
+    }
 
 
 def test_the_verdicts_of_the_diagnosis_are_on_the_page(example: Any, tmp_path: Path) -> None:

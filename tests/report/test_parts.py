@@ -7,18 +7,23 @@ from typing import Any
 import pytest
 
 from pendpipe.files import without_folders
-from pendpipe.report.findings import findings
 from pendpipe.report.health import STATES, health
 from pendpipe.report.records import table_of_records
-from pendpipe.report.remarks import budget_rows, exponent_tables, grouped_warnings
+from pendpipe.report.remarks import budget_rows, exponent_tables, findings, grouped_warnings
 from pendpipe.report.vector import inline_svg
 
 
 def entry(**changes: Any) -> dict[str, Any]:
     value = {"value": 1.0, "sd": 0.1, "unit": "", "at_bound": False}
     names = ("frequency", "a", "b", "c", "amplitude", "quality_factor_limit")
-    return {"record": "r", "refused": None, "chi2_per_dof": 1.0, "turning_points": 9,
-            **dict.fromkeys(names, value), **changes}  # fmt: skip
+    return {
+        "record": "r",
+        "refused": None,
+        "chi2_per_dof": 1.0,
+        "turning_points": 9,
+        **dict.fromkeys(names, value),
+        **changes,
+    }
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_an_added_unknown_key_names_its_place(content: dict[str, Any]) -> None:
         (lambda c: c["geometries"]["low-1"]["weights_m"].update(uper=0.1), "did you mean 'upper'"),
         (lambda c: c.update(typical_record="water-low-9"), "no record 'water-low-9'"),
         (lambda c: c.pop("simulated"), "a simulated record needs simulated"),
-        (lambda c: c["simulated"]["release"].pop("air"), "nothing says how it is released"),
+        (lambda c: c["simulated"]["release"].pop("air"), "its release is not described"),
         (lambda c: c["apparatus"]["rod"].update(mass_kg=float("inf")), "finite number"),
         (lambda c: c["geometries"]["low-1"]["weights_m"].update(upper=float("nan")), "finite"),
         (lambda c: c.update(results=".inj;touch PWNED;"), "';' can't stand in its name"),

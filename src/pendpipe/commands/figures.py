@@ -18,17 +18,26 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe figures``."""
     parser.add_argument(
-        "--campaign", required=True, type=Path, metavar="CONFIG.json",
+        "--campaign",
+        required=True,
+        type=Path,
+        metavar="CONFIG.json",
         help="the campaign's configuration, as the workflow stores it",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--comparison", required=True, type=Path, metavar="FILE",
+        "--comparison",
+        required=True,
+        type=Path,
+        metavar="FILE",
         help="comparison.json, from pendpipe compare",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--out", required=True, type=Path, metavar="FOLDER",
+        "--out",
+        required=True,
+        type=Path,
+        metavar="FOLDER",
         help="where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--processes", type=int, default=1, metavar="N", help="how many may draw at once (1)"
     )

@@ -15,25 +15,38 @@ from pathlib import Path
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe report``."""
     parser.add_argument(
-        "--campaign", required=True, type=Path, metavar="CONFIG.json",
+        "--campaign",
+        required=True,
+        type=Path,
+        metavar="CONFIG.json",
         help="the campaign's configuration, as the workflow stores it",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--comparison", required=True, type=Path, metavar="FILE",
+        "--comparison",
+        required=True,
+        type=Path,
+        metavar="FILE",
         help="comparison.json, from pendpipe compare",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--summary", required=True, type=Path, metavar="FILE",
+        "--summary",
+        required=True,
+        type=Path,
+        metavar="FILE",
         help="campaign.json, from pendpipe compare; it can be saved from the page",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--figures", type=Path, metavar="FOLDER",
+        "--figures",
+        type=Path,
+        metavar="FOLDER",
         help="where figures 3 to 10 are; the folder figures beside the page by default",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--proof", type=Path, metavar="FOLDER",
+        "--proof",
+        type=Path,
+        metavar="FOLDER",
         help="scores of a challenge, if there is one, from pendpipe challenge score",
-    )  # fmt: skip
+    )
     parser.add_argument("--out", required=True, type=Path, metavar="PAGE.html", help="the page")
 
 

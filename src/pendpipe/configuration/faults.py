@@ -1,4 +1,4 @@
-"""Faults in a configuration, said in one line each with the nearest known name."""
+"""Errors in a configuration, one line each with the nearest known name."""
 
 from __future__ import annotations
 

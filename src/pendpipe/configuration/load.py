@@ -54,7 +54,7 @@ def read_configuration(path: str | Path) -> dict[str, Any]:
 
 
 def _yaml(place: Path, text: str) -> Any:
-    """Parse YAML; a fault names its line."""
+    """Parse YAML; an error names its line."""
     import yaml
 
     try:
@@ -79,7 +79,7 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
     Raises
     ------
     InputError
-        On the first fault: the place, what is wrong, what to do.
+        On the first error: the place, what is wrong, what to do.
     """
     try:
         configuration = Configuration.model_validate(content)
@@ -124,7 +124,7 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
         if name and name not in names:
             raise InputError(where, f"unknown {column} '{name}'", nearest(name, names))
     if entry.start_s is not None and entry.stop_s is not None and entry.stop_s <= entry.start_s:
-        raise InputError(where, "stop_s is not after start_s", "mend or blank the cells")
+        raise InputError(where, "stop_s is not after start_s", "fix or blank the cells")
     if entry.source != "simulated":
         return
     missing = [
@@ -142,7 +142,7 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
     assert configuration.simulated is not None
     releases = configuration.simulated.release
     if entry.record not in releases and entry.fluid not in releases:
-        raise InputError(where, "nothing says how it is released", "add it to simulated.release")
+        raise InputError(where, "its release is not described", "add it to simulated.release")
 
 
 def _check_geometries(configuration: Configuration, place: str | Path) -> None:

@@ -175,9 +175,9 @@ def _number(where: str, row: dict[str, str], name: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        raise InputError(where, f"{name} '{text}' is no number", "mend or blank the cell") from None
+        raise InputError(where, f"{name} '{text}' is no number", "fix or blank the cell") from None
     if not math.isfinite(value):
-        raise InputError(where, f"{name} is not finite", "mend or blank the cell")
+        raise InputError(where, f"{name} is not finite", "fix or blank the cell")
     return value
 
 

@@ -63,9 +63,15 @@ def draw_fig03(calibration: Mapping[str, Any] | None) -> Figure:
     label = f"line: {with_error(slope, error(calibration['volts_per_radian']), 'V/rad')}"
     upper.plot(turn * ends, offset + slope * ends, color=INK, zorder=3, label=label)
     upper.errorbar(
-        turn * angle, volts, volts_sd, turn * angle_sd,
-        fmt="o", color=BLUE, markersize=4.5, label=f"caliper run, {len(angle)} positions",
-    )  # fmt: skip
+        turn * angle,
+        volts,
+        volts_sd,
+        turn * angle_sd,
+        fmt="o",
+        color=BLUE,
+        markersize=4.5,
+        label=f"caliper run, {len(angle)} positions",
+    )
     upper.set_ylabel("Sensor output (V)")
     key_above(upper)
     lower.errorbar(
@@ -108,18 +114,28 @@ def draw_fig04(comparison: Mapping[str, Any]) -> Figure:
     label = f"$Q = k\\,f^{{\\,2}}$, $k$ = {with_error(coefficient, error(fitted), 's^2')}"
     upper.plot([0.0, edge], [0.0, coefficient * edge], color=INK, label=label)
     upper.errorbar(
-        squared, points.y, points.y_sd, squared_sd,
-        fmt="^", color=BLUE, zorder=3, label="in air",
-    )  # fmt: skip
+        squared,
+        points.y,
+        points.y_sd,
+        squared_sd,
+        fmt="^",
+        color=BLUE,
+        zorder=3,
+        label="in air",
+    )
     upper.set(ylabel="Quality factor $Q$", xlim=(0.0, edge), ylim=(0.0, None))
     upper.legend(loc="upper left")
     _periods_on_top(upper, edge)
 
     line = coefficient * squared
     lower.errorbar(
-        squared, 100.0 * (points.y / line - 1.0), 100.0 * points.y_sd / line,
-        fmt="^", color=BLUE, markersize=4.5,
-    )  # fmt: skip
+        squared,
+        100.0 * (points.y / line - 1.0),
+        100.0 * points.y_sd / line,
+        fmt="^",
+        color=BLUE,
+        markersize=4.5,
+    )
     band = 100.0 * error(fitted) / coefficient
     lower.axhspan(-band, band, color=GREY, alpha=0.18, linewidth=0.0)
     lower.set(xlabel="Frequency squared $f^{\\,2}$ (Hz²)", ylabel="Data over\nline − 1 (%)")
@@ -169,9 +185,11 @@ def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
             ]
             axes.plot(*np.array(dots).reshape(-1, 2).T, marker, color=colour, markersize=4.5)
     axes.set(
-        yscale="log", xlabel="Frequency (Hz)", ylabel="Lengthening of the period (%)",
+        yscale="log",
+        xlabel="Frequency (Hz)",
+        ylabel="Lengthening of the period (%)",
         xlim=(0.0, None),
-    )  # fmt: skip
+    )
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_minor_formatter(NullFormatter())
@@ -199,14 +217,24 @@ def _keys(axes: Any, names: list[str]) -> None:
         for text, colour, dashes in CAUSES.values()
     ]
     kinds = [
-        Line2D([], [], color=INK, marker=branch(name).marker, linestyle="", markersize=4.5,
-               label=branch(name).name)
+        Line2D(
+            [],
+            [],
+            color=INK,
+            marker=branch(name).marker,
+            linestyle="",
+            markersize=4.5,
+            label=branch(name).name,
+        )
         for name in names
-    ]  # fmt: skip
+    ]
     axes.legend(
-        handles=causes + kinds, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2,
+        handles=causes + kinds,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=2,
         borderaxespad=0.3,
-    )  # fmt: skip
+    )
 
 
 @styled
@@ -219,26 +247,43 @@ def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     for name in names:
         look = branch(name)
         frequency, steady = curve(comparison, name, "quality_factor_viscous_steady")
-        axes.plot(frequency, np.log10(steady), color=look.colour, linestyle="--",
-                  label=f"{name}: steady Stokes, Eq. 1")  # fmt: skip
+        axes.plot(
+            frequency,
+            np.log10(steady),
+            color=look.colour,
+            linestyle="--",
+            label=f"{name}: steady Stokes, Eq. 1",
+        )
         _, full = curve(comparison, name, "quality_factor_viscous_theory")
-        axes.plot(frequency, np.log10(full), color=look.colour,
-                  label=f"{name}: with history term, Eq. 16")  # fmt: skip
+        axes.plot(
+            frequency, np.log10(full), color=look.colour, label=f"{name}: with history term, Eq. 16"
+        )
         _say_how_many_times(axes, frequency, steady, full, look.colour)
         points = series(of_branch(comparison, name), "quality_factor_viscous")
         points = points.mapped(np.log10, 1.0 / (points.y * np.log(10.0)))
         axes.errorbar(
-            points.x, points.y, points.y_sd, points.x_sd, fmt=look.marker, color=look.colour,
-            markerfacecolor="white", markersize=4.5, label=f"{name}: measured, Eq. 17",
-        )  # fmt: skip
+            points.x,
+            points.y,
+            points.y_sd,
+            points.x_sd,
+            fmt=look.marker,
+            color=look.colour,
+            markerfacecolor="white",
+            markersize=4.5,
+            label=f"{name}: measured, Eq. 17",
+        )
     axes.set(xlabel="Frequency (Hz)", ylabel="$\\log_{10}\\, Q_v$", xlim=(0.0, None))
     handles, labels = axes.get_legend_handles_labels()
     # A column of the key for each branch, theory before measurement.
     order = sorted(range(len(labels)), key=lambda i: names.index(labels[i].partition(":")[0]))
     axes.legend(
-        [handles[i] for i in order], [labels[i] for i in order], loc="lower left",
-        bbox_to_anchor=(0.0, 1.0), ncols=len(names), borderaxespad=0.3,
-    )  # fmt: skip
+        [handles[i] for i in order],
+        [labels[i] for i in order],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=len(names),
+        borderaxespad=0.3,
+    )
     return figure
 
 
@@ -249,13 +294,20 @@ def _say_how_many_times(
     middle = len(frequency) // 2
     x, low, high = frequency[middle], np.log10(full[middle]), np.log10(steady[middle])
     axes.annotate(
-        "", (x, low), (x, high),
+        "",
+        (x, low),
+        (x, high),
         arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 0.9, "shrinkB": 3.0},
-    )  # fmt: skip
+    )
     axes.annotate(
-        f"÷ {steady[middle] / full[middle]:.0f}", (x, 0.5 * (low + high)), (5.0, 0.0),
-        textcoords="offset points", va="center", fontsize=8.5, color=colour,
-    )  # fmt: skip
+        f"÷ {steady[middle] / full[middle]:.0f}",
+        (x, 0.5 * (low + high)),
+        (5.0, 0.0),
+        textcoords="offset points",
+        va="center",
+        fontsize=8.5,
+        color=colour,
+    )
 
 
 @styled
@@ -292,9 +344,15 @@ def draw_measured(axes: Axes, comparison: Mapping[str, Any]) -> None:
     for name, points in found.items():
         look = branch(name)
         axes.errorbar(
-            points.x, points.y, points.y_sd, points.x_sd,
-            fmt=look.marker, color=look.colour, zorder=3, label=f"measured, {look.name}",
-        )  # fmt: skip
+            points.x,
+            points.y,
+            points.y_sd,
+            points.x_sd,
+            fmt=look.marker,
+            color=look.colour,
+            zorder=3,
+            label=f"measured, {look.name}",
+        )
 
 
 def _theory_spread(comparison: Mapping[str, Any]) -> float:
@@ -312,9 +370,14 @@ def _ratio(axes: Axes, comparison: Mapping[str, Any], name: str) -> None:
     theory = {e["record"]: number(e["quality_factor_limit_theory"]) for e in entries}
     own = np.array([theory[record] for record in points.names])
     axes.errorbar(
-        points.x, points.y / own, points.y_sd / own,
-        fmt=look.marker, color=look.colour, markersize=4.5, ecolor=GREY,
-    )  # fmt: skip
+        points.x,
+        points.y / own,
+        points.y_sd / own,
+        fmt=look.marker,
+        color=look.colour,
+        markersize=4.5,
+        ecolor=GREY,
+    )
 
 
 @styled
@@ -328,13 +391,21 @@ def draw_fig10(comparison: Mapping[str, Any]) -> Figure:
         frequency, viscous = curve(comparison, name, "quality_factor_viscous_theory")
         axes.plot(frequency, viscous, color=VERMILION, linestyle="--", linewidth=1.8, zorder=1.5)
         axes.fill_between(frequency, full, viscous, color=VERMILION, alpha=0.10, linewidth=0.0)
-    axes.plot([], [], color=VERMILION, linestyle="--", linewidth=1.8,
-              label="Eq. 16 alone: hysteresis left out")  # fmt: skip
+    axes.plot(
+        [],
+        [],
+        color=VERMILION,
+        linestyle="--",
+        linewidth=1.8,
+        label="Eq. 16 alone: hysteresis left out",
+    )
     axes.plot([], [], color=GREY, linewidth=1.0, label="Eq. 16 and hysteresis together")
     axes.set(
-        xlabel="Frequency (Hz)", ylabel="Limiting quality factor $Q$",
-        xlim=(0.0, None), ylim=(0.0, None),
-    )  # fmt: skip
+        xlabel="Frequency (Hz)",
+        ylabel="Limiting quality factor $Q$",
+        xlim=(0.0, None),
+        ylim=(0.0, None),
+    )
     key_above(axes, 1)
     return figure
 
@@ -362,14 +433,22 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
         factor, unit = _scale(name, values)
         # The whole record's value with its 95 % band, against the tails' error bars.
         panel.axhspan(
-            factor * (values[0] - 1.96 * errors[0]), factor * (values[0] + 1.96 * errors[0]),
-            color=BLUE, alpha=0.22, linewidth=0.0,
-        )  # fmt: skip
+            factor * (values[0] - 1.96 * errors[0]),
+            factor * (values[0] + 1.96 * errors[0]),
+            color=BLUE,
+            alpha=0.22,
+            linewidth=0.0,
+        )
         panel.axhline(factor * values[0], color=BLUE, label="whole record, 95 % band")
         panel.errorbar(
-            start[1:], factor * values[1:], factor * errors[1:],
-            fmt="o", color=VERMILION, markersize=4.5, label="fit to the tail from here on",
-        )  # fmt: skip
+            start[1:],
+            factor * values[1:],
+            factor * errors[1:],
+            fmt="o",
+            color=VERMILION,
+            markersize=4.5,
+            label="fit to the tail from here on",
+        )
         panel.set_ylabel(f"${name}$ ({unit})")
         panel.set_ylim(*(factor * end for end in _window(values, errors)))
     panels[-1].set_xlabel("Start of the fitted part (s)")
@@ -389,7 +468,7 @@ def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Limits about the whole record's value: the tails' errors, but no more than themselves.
 
     The shortest tails know nothing any more (errors of ten thousand times the value); their
-    bars leave the panel, or no other fit could be told from the line.
+    bars leave the panel, or no other fit could be distinguished from the line.
     """
     whole = values[0]
     reach = np.abs(values - whole) + errors

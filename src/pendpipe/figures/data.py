@@ -22,7 +22,7 @@ Entry = Mapping[str, Any]
 
 
 class NothingToDrawError(Exception):
-    """A figure's data are not there; the message is a clause that says what is missing."""
+    """A figure's data are not there; the message names what is missing."""
 
 
 class Series(NamedTuple):
@@ -106,10 +106,15 @@ def series(entries: Iterable[Entry], quantity: str) -> Series:
     Records without a finite value of either are left out.
     """
     rows = [
-        (number(e["frequency"]), error(e["frequency"]), number(e.get(quantity)),
-         error(e.get(quantity)), e["record"])
+        (
+            number(e["frequency"]),
+            error(e["frequency"]),
+            number(e.get(quantity)),
+            error(e.get(quantity)),
+            e["record"],
+        )
         for e in entries
-    ]  # fmt: skip
+    ]
     rows = sorted(row for row in rows if np.isfinite(row[0]) and np.isfinite(row[2]))
     table = np.array([row[:4] for row in rows], dtype=np.float64).reshape(-1, 4)
     x, x_sd, y, y_sd = table.T

@@ -54,9 +54,13 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
     figure, upper, lower = figure_with_residuals(4.4)
     # Every sample is drawn; as pixels, since ten thousand line segments help nobody.
     upper.plot(
-        recording.time_s, large * recording.values, color=PALE, linewidth=0.6, rasterized=True,
+        recording.time_s,
+        large * recording.values,
+        color=PALE,
+        linewidth=0.6,
+        rasterized=True,
         label=plain_text(f"all {len(recording)} samples of {decay.record}"),
-    )  # fmt: skip
+    )
     moment = decay.time_s[0] + time
     upper.plot(moment, large * (level + envelope), color=INK, label="envelope of the fit, Eq. 14")
     upper.plot(moment, large * (level - envelope), color=INK)
@@ -64,9 +68,15 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
     upper.set(ylabel=f"{name} ({large_unit})")
     key_above(upper, 1)
     lower.errorbar(
-        decay.time_s, small * misfit, small * misfit_sd,
-        fmt="o", color=BLUE, markersize=2.0, elinewidth=0.6, capsize=0.0,
-    )  # fmt: skip
+        decay.time_s,
+        small * misfit,
+        small * misfit_sd,
+        fmt="o",
+        color=BLUE,
+        markersize=2.0,
+        elinewidth=0.6,
+        capsize=0.0,
+    )
     lower.set(xlabel="Time (s)", ylabel=f"Turning points\n− envelope ({small_unit})")
     lower.margins(x=0.01, y=0.1)
     return figure
@@ -101,25 +111,41 @@ def draw_fig08(decay: Decay) -> Figure:
 
     figure, axes = new_figure(3.6)
     axes.fill_between(
-        moment, quality - half_width, quality + half_width,
-        color=BLUE, alpha=0.22, linewidth=0.0, label="95 % band",
-    )  # fmt: skip
+        moment,
+        quality - half_width,
+        quality + half_width,
+        color=BLUE,
+        alpha=0.22,
+        linewidth=0.0,
+        label="95 % band",
+    )
     axes.plot(moment, quality, color=BLUE, label="Eq. 15 with the fitted $a$, $b$, $c$")
     measured = local_quality(decay)
     axes.errorbar(
-        measured.time_s, measured.value, measured.sd, fmt="o", color=INK, markersize=3.5,
-        markerfacecolor="white", elinewidth=0.8, label="turning points alone, no model",
-    )  # fmt: skip
+        measured.time_s,
+        measured.value,
+        measured.sd,
+        fmt="o",
+        color=INK,
+        markersize=3.5,
+        markerfacecolor="white",
+        elinewidth=0.8,
+        label="turning points alone, no model",
+    )
     top = float(np.nanmax(quality))
     if b > 0.0:
         limit = float(physics.quality_factor_limit(frequency, b))
         top = max(top, limit)
         axes.axhline(limit, color=VERMILION, linestyle="--", linewidth=1.1)
         axes.annotate(
-            f"limit for $a = c = 0$: {limit:.1f}", (0.02, limit), (0.0, 4.0),
-            xycoords=("axes fraction", "data"), textcoords="offset points",
-            color=VERMILION, fontsize=8.5,
-        )  # fmt: skip
+            f"limit for $a = c = 0$: {limit:.1f}",
+            (0.02, limit),
+            (0.0, 4.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            color=VERMILION,
+            fontsize=8.5,
+        )
         _mark_maximum(axes, decay, time, quality)
     axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$")
     axes.set_ylim(0.0, 1.16 * top)
@@ -138,10 +164,15 @@ def _mark_maximum(axes: Axes, decay: Decay, time: FloatArray, quality: FloatArra
     moment = float(decay.time_s[0] + time[index])
     axes.plot([moment], [largest], "D", color=BLUE, markersize=5, zorder=4)
     axes.annotate(
-        f"maximum {largest:.1f}\nwhere $y$ = √($c$/$a$)", (moment, largest), (0.0, -30.0),
-        textcoords="offset points", ha="center", va="top", fontsize=8.5,
+        f"maximum {largest:.1f}\nwhere $y$ = √($c$/$a$)",
+        (moment, largest),
+        (0.0, -30.0),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize=8.5,
         arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7},
-    )  # fmt: skip
+    )
 
 
 def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -228,13 +259,23 @@ def draw_decay(decay: Decay) -> Figure:
 
     figure, upper, lower = figure_with_residuals(4.2, constrained=False, residual_share=0.5)
     _amplitudes(upper, time, large * y, large * sd)
-    upper.plot(time[0] + moment, large * smooth, color=INK, linewidth=1.0, zorder=3,
-               label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})")  # fmt: skip
     upper.plot(
-        time[0] + moment, large * start * np.exp(-rate * moment), color=VERMILION,
-        linestyle="--", linewidth=1.1, zorder=3,
+        time[0] + moment,
+        large * smooth,
+        color=INK,
+        linewidth=1.0,
+        zorder=3,
+        label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})",
+    )
+    upper.plot(
+        time[0] + moment,
+        large * start * np.exp(-rate * moment),
+        color=VERMILION,
+        linestyle="--",
+        linewidth=1.1,
+        zorder=3,
         label=f"linear damping ({_rms(y - linear, decay.unit)})",
-    )  # fmt: skip
+    )
     # The logarithm of an amplitude within its own noise is chance.
     lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
     upper.set_yscale("log")
@@ -252,9 +293,17 @@ def draw_decay(decay: Decay) -> Figure:
 def _amplitudes(axes: Axes, time_s: FloatArray, values: FloatArray, errors: FloatArray) -> None:
     """Draw points with error bars."""
     axes.errorbar(
-        time_s, values, errors, fmt="o", color=BLUE, markersize=2.4, elinewidth=0.6,
-        capsize=0.0, rasterized=len(time_s) > MANY, label=f"{len(time_s)} turning points",
-    )  # fmt: skip
+        time_s,
+        values,
+        errors,
+        fmt="o",
+        color=BLUE,
+        markersize=2.4,
+        elinewidth=0.6,
+        capsize=0.0,
+        rasterized=len(time_s) > MANY,
+        label=f"{len(time_s)} turning points",
+    )
 
 
 def _rms(misfit: FloatArray, unit: str) -> str:

@@ -212,9 +212,14 @@ def draw_residual_map(content: Shown) -> Figure:
 def _panel(axes: Axes, content: Shown, values: FloatArray, norm: AsinhNorm) -> AxesImage:
     time = content.data.time_s
     image = axes.imshow(
-        values, norm=norm, cmap=_COLOURS, aspect="auto", origin="lower", interpolation="nearest",
+        values,
+        norm=norm,
+        cmap=_COLOURS,
+        aspect="auto",
+        origin="lower",
+        interpolation="nearest",
         extent=(float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
-    )  # fmt: skip
+    )
     axes.grid(visible=False)
     axes.set_yticks(
         [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi, 2.0 * math.pi], ["0", "π/2", "π", "3π/2", "2π"]
@@ -277,8 +282,9 @@ def draw_residual_spectrum(content: Shown) -> Figure:
         extended = spectrum(content, content.extended)[1]
         curves.append((content.extended_name, extended, BLUE, 0.8))
     level = noise_level(content, frequency)
-    factor, unit = axis_unit(np.array([float(np.max(each)) for _, each, _, _ in curves]),
-                             content.data.unit)  # fmt: skip
+    factor, unit = axis_unit(
+        np.array([float(np.max(each)) for _, each, _, _ in curves]), content.data.unit
+    )
     figure = Figure(figsize=(WIDTH_IN, 3.3))
     figure.subplots_adjust(left=0.135, right=0.975, bottom=0.14, top=0.8)
     axes = figure.subplots()
@@ -317,9 +323,15 @@ def _mark_harmonics(axes: Axes, content: Shown) -> None:
         axes.axvline(line, color=GREY, linewidth=0.6, linestyle=":", zorder=0)
         if harmonic in (1, 2, 3, 5, 8):
             axes.annotate(
-                f"{harmonic}", (line, 1.0), (0.0, 2.0), xycoords=("data", "axes fraction"),
-                textcoords="offset points", ha="center", fontsize=7.5, color=GREY,
-            )  # fmt: skip
+                f"{harmonic}",
+                (line, 1.0),
+                (0.0, 2.0),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7.5,
+                color=GREY,
+            )
 
 
 def even_residual(content: Shown, fit: Fit) -> FloatArray:
@@ -389,15 +401,21 @@ def draw_damping(content: Shown) -> Figure:
     x = across * measured.amplitude
     _points(upper, x, 1e3 * quality, 1e3 * quality_sd, "readings")
     for name, colour, dashes, spans in curves:
-        upper.plot(x, 2e3 * spans.loss / omega, color=colour, linestyle=dashes, label=name,
-                   linewidth=1.2)  # fmt: skip
+        upper.plot(
+            x, 2e3 * spans.loss / omega, color=colour, linestyle=dashes, label=name, linewidth=1.2
+        )
     upper.set_ylabel("Loss 1/Q (10⁻³)")
     expected = 2.0 * curves[0][3].loss / omega
     power, factor = _power(np.concatenate([quality - expected, quality_sd]))
     _points(lower, x, factor * (quality - expected), factor * quality_sd, "")
     for _, colour, dashes, spans in curves:
-        lower.plot(x, factor * (2.0 * spans.loss / omega - expected), color=colour,
-                   linestyle=dashes, linewidth=1.2)  # fmt: skip
+        lower.plot(
+            x,
+            factor * (2.0 * spans.loss / omega - expected),
+            color=colour,
+            linestyle=dashes,
+            linewidth=1.2,
+        )
     lower.set_ylabel(f"1/Q − {content.baseline_name}'s ({power})")
     _amplitude_axis(lower, x, unit)
     key_above(upper, 3 if content.extended is None else 2)
@@ -421,8 +439,14 @@ def draw_frequency(content: Shown) -> Figure:
     x = across * measured.amplitude
     _points(axes, x, factor * shift, factor * shift_sd, "readings")
     for name, colour, dashes, spans in curves:
-        axes.plot(x, factor * (spans.frequency_hz / origin - 1.0), color=colour, linestyle=dashes,
-                  label=name, linewidth=1.2)  # fmt: skip
+        axes.plot(
+            x,
+            factor * (spans.frequency_hz / origin - 1.0),
+            color=colour,
+            linestyle=dashes,
+            label=name,
+            linewidth=1.2,
+        )
     axes.set_ylabel(f"Frequency/({origin:.6g} Hz) − 1 ({power})")
     _amplitude_axis(axes, x, unit)
     key_above(axes, 3 if content.extended is None else 2)
@@ -439,9 +463,16 @@ def _models(content: Shown) -> list[tuple[str, str, str, Spans]]:
 
 def _points(axes: Axes, x: FloatArray, y: FloatArray, sd: FloatArray, label: str) -> None:
     axes.errorbar(
-        x, y, sd, fmt="o", color=BLUE, markersize=3.2, elinewidth=0.7, capsize=0.0,
+        x,
+        y,
+        sd,
+        fmt="o",
+        color=BLUE,
+        markersize=3.2,
+        elinewidth=0.7,
+        capsize=0.0,
         label=label or None,
-    )  # fmt: skip
+    )
 
 
 def _power(values: FloatArray) -> tuple[str, float]:

@@ -138,7 +138,7 @@ def plain_text(text: str) -> str:
 
 @styled
 def placeholder(reason: str) -> Figure:
-    """A figure that says why it is empty."""
+    """An empty figure with the reason in it."""
     figure = Figure(figsize=(WIDTH_IN, 1.4))
     text = "\n".join(textwrap.wrap(f"Not drawn: {reason}.", 60))
     figure.text(0.5, 0.5, plain_text(text), ha="center", va="center", color=GREY)

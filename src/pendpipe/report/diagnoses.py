@@ -94,12 +94,17 @@ def _diagnosed(
     noise = number(content["noise_rms_rad"])
     p_value = number(content["p_value"])
     return Diagnosed(
-        name, anchor, VERDICTS[content["verdict"]],
+        name,
+        anchor,
+        VERDICTS[content["verdict"]],
         f"{p_value:.2g}" if math.isfinite(p_value) else "–",
         [_effect(effect) for effect in content["effects"]],
-        " → ".join(sizes[shown]) or "–", compact(noise, unit) if math.isfinite(noise) else "–",
-        " → ".join(chi2[shown]) or "–", without_folders(str(content["statement"])), figure,
-    )  # fmt: skip
+        " → ".join(sizes[shown]) or "–",
+        compact(noise, unit) if math.isfinite(noise) else "–",
+        " → ".join(chi2[shown]) or "–",
+        without_folders(str(content["statement"])),
+        figure,
+    )
 
 
 def _three_digits(value: float) -> str:
@@ -107,7 +112,7 @@ def _three_digits(value: float) -> str:
 
 
 def _effect(effect: Mapping[str, Any]) -> str:
-    """An effect with its probability and what can't be told from it."""
+    """An effect with its probability and what it can't be distinguished from."""
     rest = ", ".join(
         f"{other['id']} {100.0 * other['probability']:.0f} %"
         for other in effect["indistinguishable_from"]

@@ -4,12 +4,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pendpipe import physics
 from pendpipe.figures.data import Entry, error, number, used
 from pendpipe.quantities import with_error
-from pendpipe.report.paper import NUMBERS, TYPICAL_FREQUENCY_HZ, Printed
+
+
+class Printed(NamedTuple):
+    """A number as the paper prints it, and its value where it is one."""
+
+    text: str
+    value: float | None = None
+
+
+TYPICAL_FREQUENCY_HZ: Final = 0.516
+"""The frequency of the paper's figures 7 and 8."""
+
+NUMBERS: Final = {
+    "hysteretic_coefficient": Printed("3940 s²", 3940.0),
+    "volts_per_radian": Printed("3.85 V/rad", 3.85),
+    "limit": Printed("136", 136.0),
+    "largest": Printed("about 120", 120.0),
+    "first": Printed("below 40"),
+    "hysteretic": Printed("1049", 1049.0),
+    "viscous": Printed("156", 156.0),
+    "viscous_theory": Printed("176", 176.0),
+    "inertia": Printed("0.099 kg m²", 0.099),
+    "theory_factor": Printed("1.13 (176/156)", 176.0 / 156.0),
+    "history_coefficient": Printed("1 (assumed)", 1.0),
+    "exponent_high": Printed("−5.6", -5.6),
+    "exponent_low": Printed("0.50", 0.50),
+    "steady": Printed("1000 to 3000 %"),
+    "smallest": Printed("about 10", 10.0),
+    "ratio": Printed("about ten and more"),
+}
+
 
 Comparison = Mapping[str, Any]
 
@@ -43,20 +73,34 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
     """
     calibration = comparison.get("calibration") or {}
     rows = [
-        _row("Sensor constant", calibration.get("volts_per_radian"), "volts_per_radian",
-             (truth.get("sensor") or {}).get("volts_per_radian")),
-        _row("Hysteretic coefficient k of Q = k f², from the air benchmark",
-             comparison.get("hysteretic_coefficient"), "hysteretic_coefficient",
-             truth.get("hysteretic_coefficient_s2")),
-        _row("Drag measured over Eq. 16", comparison.get("theory_factor"), "theory_factor",
-             truth.get("drag_factor")),
-        _row("History coefficient C_H of Eq. 2, if it takes the whole difference",
-             comparison.get("history_coefficient"), "history_coefficient",
-             truth.get("history_coefficient") if truth.get("drag_factor") == 1.0 else None),
+        _row(
+            "Sensor constant",
+            calibration.get("volts_per_radian"),
+            "volts_per_radian",
+            (truth.get("sensor") or {}).get("volts_per_radian"),
+        ),
+        _row(
+            "Hysteretic coefficient k of Q = k f², from the air benchmark",
+            comparison.get("hysteretic_coefficient"),
+            "hysteretic_coefficient",
+            truth.get("hysteretic_coefficient_s2"),
+        ),
+        _row(
+            "Drag measured over Eq. 16",
+            comparison.get("theory_factor"),
+            "theory_factor",
+            truth.get("drag_factor"),
+        ),
+        _row(
+            "History coefficient C_H of Eq. 2, if it takes the whole difference",
+            comparison.get("history_coefficient"),
+            "history_coefficient",
+            truth.get("history_coefficient") if truth.get("drag_factor") == 1.0 else None,
+        ),
         *_exponents(comparison),
         *_typical(comparison),
         *_extremes(comparison),
-    ]  # fmt: skip
+    ]
     return [row for row in rows if row is not None]
 
 
@@ -66,8 +110,8 @@ def as_text(rows: list[Row]) -> str:
     lines = []
     for row in rows:
         beside = {"paper": row.paper, "truth": row.truth}
-        told = "; ".join(f"{whose} {value}" for whose, value in beside.items() if value)
-        lines.append(f"{row.name:<{first}}{row.found:<{second}}{told}".rstrip())
+        others = "; ".join(f"{whose} {value}" for whose, value in beside.items() if value)
+        lines.append(f"{row.name:<{first}}{row.found:<{second}}{others}".rstrip())
     return "\n".join(lines)
 
 
@@ -79,8 +123,14 @@ def _row(name: str, found: Any, key: str, truth: float | None = None) -> Row | N
     unit = found.get("unit", "") if isinstance(found, Mapping) else ""
     pull = f"{(value - truth) / sd:+.1f}".replace("-", "−") if truth is not None and sd else ""
     shown = "" if truth is None else with_error(float(truth), None, unit)
-    return Row(name, with_error(value, sd, unit), NUMBERS[key].text,
-               _percent(value, NUMBERS[key]), shown, pull)  # fmt: skip
+    return Row(
+        name,
+        with_error(value, sd, unit),
+        NUMBERS[key].text,
+        _percent(value, NUMBERS[key]),
+        shown,
+        pull,
+    )
 
 
 def _percent(value: float, printed: Printed) -> str:
@@ -126,13 +176,14 @@ def _typical(comparison: Comparison) -> Iterator[Row | None]:
     if all(map(math.isfinite, rates)):
         largest = float(physics.largest_quality_factor(frequency, *rates))
         first = float(physics.quality_factor(number(entry["amplitude"]), frequency, *rates))
-        found = {"Largest Q in the decay": (largest, "largest"),
-                 "Q at the first turning point": (first, "first")}  # fmt: skip
+        found = {
+            "Largest Q in the decay": (largest, "largest"),
+            "Q at the first turning point": (first, "first"),
+        }
         rows += [
-            Row(f"{name}: {text}", f"{value:.1f}", NUMBERS[key].text,
-                _percent(value, NUMBERS[key]))
+            Row(f"{name}: {text}", f"{value:.1f}", NUMBERS[key].text, _percent(value, NUMBERS[key]))
             for text, (value, key) in found.items()
-        ]  # fmt: skip
+        ]
     # The paper's numbers are those of one frequency; they say nothing about another.
     same = abs(frequency / TYPICAL_FREQUENCY_HZ - 1.0) < 0.01
     for row in rows:
@@ -147,9 +198,13 @@ def _extremes(comparison: Comparison) -> Iterator[Row | None]:
         yield Row("Smallest limiting Q in water", f"{min(limits):.1f}", NUMBERS["smallest"].text)
     if wet:
         ratios = [number(entry["a_over_delta"]) for entry in wet]
-        yield Row("History term a/δ", f"{min(ratios):.1f} to {max(ratios):.1f}",
-                  NUMBERS["ratio"].text)  # fmt: skip
+        yield Row(
+            "History term a/δ", f"{min(ratios):.1f} to {max(ratios):.1f}", NUMBERS["ratio"].text
+        )
     steady = comparison.get("steady_stokes_percent")
     if steady:
-        yield Row("Steady Stokes law underestimates the damping by",
-                  f"{steady[0]:.0f} to {steady[1]:.0f} %", NUMBERS["steady"].text)  # fmt: skip
+        yield Row(
+            "Steady Stokes law underestimates the damping by",
+            f"{steady[0]:.0f} to {steady[1]:.0f} %",
+            NUMBERS["steady"].text,
+        )

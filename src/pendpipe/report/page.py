@@ -16,14 +16,13 @@ from markupsafe import Markup
 
 from pendpipe.analysis.fit.result import read_fit
 from pendpipe.report import remarks
-from pendpipe.report.captions import CAPTIONS
+from pendpipe.report.captions import CAPTIONS, GLOSSARY
 from pendpipe.report.diagnoses import Diagnosed, diagnoses
-from pendpipe.report.findings import findings
-from pendpipe.report.glossary import GLOSSARY
 from pendpipe.report.headline import headline
 from pendpipe.report.health import CHI2_RANGE
 from pendpipe.report.proof import proof
 from pendpipe.report.records import Line, Table, table_of_records
+from pendpipe.report.remarks import findings
 from pendpipe.report.vector import inline_svg
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -35,9 +34,13 @@ Content = Mapping[str, Any]
 
 
 def render(
-    configuration: Content, comparison: Content, summary: Content, folder: Path, figures: Path,
+    configuration: Content,
+    comparison: Content,
+    summary: Content,
+    folder: Path,
+    figures: Path,
     challenge: Path | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Make the page.
 
     Parameters
@@ -69,9 +72,12 @@ def render(
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
     environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return environment.get_template("page.html").render(
         title=comparison.get("title") or "A campaign of free decays",
         has_theory=has_theory,
@@ -145,8 +151,9 @@ def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Mark
             continue
         # The prefix is a number: a record's name need not be an identifier.
         words = f"{CAPTIONS['decay'].shows} Record {line.name}."
-        svg = inline_svg(path.read_text(encoding="utf-8"), line.anchor,
-                         f"Decay of {line.name}", words)  # fmt: skip
+        svg = inline_svg(
+            path.read_text(encoding="utf-8"), line.anchor, f"Decay of {line.name}", words
+        )
         left -= len(svg.encode())
         if left < 0:
             outside.append(line.name)

@@ -1,4 +1,4 @@
-"""The table of records, and what is told of each one."""
+"""The table of records, and the facts about each one."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def table_of_records(entries: list[Entry], hashes: Mapping[str, str], *, has_the
     """Prepare every record, refused ones included, in the order of the table of records.
 
     A column that no record fills is left out. Beside a theory there is no room for the
-    misfits, which are then told in each record's own section only.
+    misfits, which then stand in each record's own section only.
     """
     columns = [
         column._replace(unit=_common_unit(entries, column.quantity))
@@ -97,7 +97,7 @@ def _common_unit(entries: list[Entry], quantity: str) -> str:
 
 
 def _found(entry: Entry, quantity: str) -> Any:
-    """A quantity of a record; the misfits are told in a group of their own."""
+    """A quantity of a record; the misfits are in a group of their own."""
     if quantity not in _MISFITS:
         return entry.get(quantity)
     value = number((entry.get("misfit") or {}).get(quantity))

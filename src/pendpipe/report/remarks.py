@@ -1,10 +1,10 @@
-"""What the page says beside the numbers: steps, warnings, and the sections of the campaign."""
+"""The sentences of the page beside its numbers: findings, steps, warnings, sections."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,86 @@ from pendpipe.quantities import with_error
 from pendpipe.report.health import STATES
 
 Comparison = Mapping[str, Any]
+
+
+def findings(comparison: Comparison) -> list[str]:
+    """A sentence or two for each thing that the campaign can tell."""
+    return [
+        *_hysteresis(comparison),
+        *_drag(comparison),
+        *_left_out(comparison),
+        *_exponents(comparison),
+    ]
+
+
+def _hysteresis(comparison: Comparison) -> Iterator[str]:
+    fitted = comparison.get("hysteretic_coefficient") or {}
+    exponent = fitted.get("free_exponent")
+    if not exponent or not error(exponent):
+        return
+    away = abs(number(exponent) - 2.0) / error(exponent)
+    verdict = (
+        "the square that internal friction of the structure gives"
+        if away < 3.0
+        else f"{away:.1f} standard deviations from the square that internal friction gives"
+    )
+    text = with_error(number(exponent), error(exponent))
+    yield f"In air Q grows as the frequency to the power {text}: {verdict}."
+
+
+def _drag(comparison: Comparison) -> Iterator[str]:
+    factor = comparison.get("theory_factor") or {}
+    value, sd = number(factor), error(factor)
+    if not math.isfinite(value) or not sd:
+        return
+    away = abs(value - 1.0) / sd
+    if away < 3.0:
+        yield f"The drag in water is that of Eq. 16 ({with_error(value, sd)} times it)."
+        return
+    yield (
+        f"The drag in water is {with_error(value, sd)} times that of Eq. 16,"
+        f" {away:.0f} standard deviations from 1 (paper: 1.13)."
+    )
+    history = comparison.get("history_coefficient") or {}
+    better = (history.get("chi2") or 0.0) - (factor.get("chi2") or 0.0)
+    if better > 9.0:
+        yield (
+            "A common factor describes that better than a larger history term"
+            f" (χ² lower by {better:.0f})."
+        )
+    worst = max(comparison.get("budget") or [], key=lambda part: part["relative_sd"], default=None)
+    if worst:
+        yield (
+            f"What limits that number most is the {worst['source']}"
+            f" ({100 * worst['relative_sd']:.2g} %)."
+        )
+
+
+def _left_out(comparison: Comparison) -> Iterator[str]:
+    steady = comparison.get("steady_stokes_percent")
+    if steady:
+        yield (
+            f"Stokes' law for steady flow, without the history term, would underestimate the"
+            f" damping by {steady[0]:.0f} to {steady[1]:.0f} %."
+        )
+    for check in comparison.get("checks") or []:
+        if check["history"] and not check["hysteresis"] and check.get("ratio"):
+            yield (
+                f"Eq. 16 without the hysteretic part overestimates Q by a factor of up to"
+                f" {max(check['ratio']):.1f}."
+            )
+
+
+def _exponents(comparison: Comparison) -> Iterator[str]:
+    for branch, found in (comparison.get("viscous_exponents") or {}).items():
+        exponents = [part["exponent"] for part in (found or {}).get("ranges") or []]
+        # Worth a sentence where the choice of the ends matters more than a tenth.
+        if len(exponents) > 1 and max(exponents) - min(exponents) > 0.1 * abs(number(found)):
+            low, high = (f"{end:.2f}".replace("-", "−") for end in (min(exponents), max(exponents)))
+            yield (
+                f"The exponent of the {branch} branch is no constant of nature: over parts of the"
+                f" branch it lies between {low} and {high}."
+            )
 
 
 class Step(NamedTuple):
@@ -47,18 +127,34 @@ def steps(comparison: Comparison, drawn: Sequence[str], folder: Path) -> list[St
     )
     return [
         _step("acquire", bool(entries), f"{len(entries)} records{left}"),
-        _step("calibrate", bool(calibration), "caliper run" if calibration else
-              "no caliper run: records bring their own constant, or are in rad already"),
-        _step("turning points", bool(fitted),
-              f"{sum(int(e.get('turning_points') or 0) for e in fitted)} found"),
+        _step(
+            "calibrate",
+            bool(calibration),
+            "caliper run"
+            if calibration
+            else "no caliper run: records bring their own constant, or are in rad already",
+        ),
+        _step(
+            "turning points",
+            bool(fitted),
+            f"{sum(int(e.get('turning_points') or 0) for e in fitted)} found",
+        ),
         _step("fit a, b, c", bool(fitted), f"{len(fitted)} records"),
-        _step("separate (Eq. 17)", bool(coefficient),
-              "k from the benchmark in air" if coefficient else "no benchmark in air"),
+        _step(
+            "separate (Eq. 17)",
+            bool(coefficient),
+            "k from the benchmark in air" if coefficient else "no benchmark in air",
+        ),
         _step("compare (Eq. 16)", theory, "" if theory else "no apparatus is described"),
-        _step("diagnose", bool(diagnosed), f"{diagnosed} records" if diagnosed else
-              "not part of this run: pendpipe diagnose looks for physics left out"),
+        _step(
+            "diagnose",
+            bool(diagnosed),
+            f"{diagnosed} records"
+            if diagnosed
+            else "not part of this run: pendpipe diagnose looks for physics left out",
+        ),
         _step("figures", bool(drawn), f"{len(drawn)} of the campaign"),
-    ]  # fmt: skip
+    ]
 
 
 def _step(name: str, done: bool, remark: str) -> Step:
@@ -67,7 +163,7 @@ def _step(name: str, done: bool, remark: str) -> Step:
 
 
 def grouped_warnings(entries: Sequence[Entry]) -> list[Warned]:
-    """Warnings that differ in their numbers only, told once with all their records."""
+    """Warnings that differ in their numbers only, listed once with all their records."""
     groups: dict[str, Warned] = {}
     for entry in entries:
         for warning in entry.get("warnings") or []:
@@ -85,16 +181,18 @@ def exponent_tables(comparison: Comparison) -> list[dict[str, Any]]:
             continue
         curvature = found.get("curvature")
         slopes = found.get("local_slopes") or []
-        tables.append({
-            "branch": branch,
-            "value": with_error(number(found), error(found)),
-            "curvature": with_error(number(curvature), error(curvature)) if curvature else "",
-            "slopes": ", ".join(_slope(slope) for slope in slopes),
-            "ranges": [
-                (part["first"], part["last"], with_error(part["exponent"], part["sd"]))
-                for part in found.get("ranges") or []
-            ],
-        })  # fmt: skip
+        tables.append(
+            {
+                "branch": branch,
+                "value": with_error(number(found), error(found)),
+                "curvature": with_error(number(curvature), error(curvature)) if curvature else "",
+                "slopes": ", ".join(_slope(slope) for slope in slopes),
+                "ranges": [
+                    (part["first"], part["last"], with_error(part["exponent"], part["sd"]))
+                    for part in found.get("ranges") or []
+                ],
+            }
+        )
     return tables
 
 
@@ -124,10 +222,12 @@ def check_rows(comparison: Comparison) -> list[tuple[str, str, str, str]]:
     for check in comparison.get("checks") or []:
         ratio = [value for value in check.get("ratio") or [] if value is not None]
         chi2 = float(f"{number(check.get('chi2')):.2g}")
-        rows.append((
-            "with" if check["history"] else "left out",
-            "with" if check["hysteresis"] else "left out",
-            f"{min(ratio):.3g} to {max(ratio):.3g}" if ratio else "–",
-            f"{with_error(chi2, None)} / {check['dof']}" if math.isfinite(chi2) else "–",
-        ))  # fmt: skip
+        rows.append(
+            (
+                "with" if check["history"] else "left out",
+                "with" if check["hysteresis"] else "left out",
+                f"{min(ratio):.3g} to {max(ratio):.3g}" if ratio else "–",
+                f"{with_error(chi2, None)} / {check['dof']}" if math.isfinite(chi2) else "–",
+            )
+        )
     return rows

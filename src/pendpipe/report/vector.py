@@ -27,7 +27,7 @@ def inline_svg(text: str, prefix: str, title: str, description: str) -> Markup:
     prefix
         Set before every identifier, so that several figures in one page do not clash.
     title, description
-        What a screen reader says: the name, and what the figure shows.
+        What a screen reader reads out: the name, and what the figure shows.
     """
     body = _DROPPED.sub("", text)
     start = body.index("<svg")

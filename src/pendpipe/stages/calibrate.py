@@ -35,7 +35,7 @@ def calibrate_record(
     Raises
     ------
     InputError
-        If the recording is in volts and nothing says what a volt means.
+        If the recording is in volts and no sensor constant is known.
     """
     recording = read_plain(recording_path)
     content: dict[str, Any] = {"schema_version": 1, "volts_per_radian": None, "warnings": []}

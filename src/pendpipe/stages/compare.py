@@ -1,12 +1,11 @@
-"""A campaign beside its theory: ``comparison.json`` with everything that is drawn and told,
-and ``campaign.json`` with the numbers alone.
-"""  # noqa: D205
+"""A campaign beside its theory: comparison.json, and campaign.json with its numbers alone."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,15 +16,16 @@ from pendpipe.analysis.shared_fit import SharedEstimate
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, Surroundings
 from pendpipe.configuration.apparatus import pendulum
+from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
-from pendpipe.stages.provenance import stamp
+from pendpipe.provenance import code_version
 from pendpipe.stages.results import RecordResult, read_results, sensor_file
 from pendpipe.stages.separate import Separation, read_separation
-from pendpipe.stages.summary import campaign_summary
 from pendpipe.stages.theory import branch_curves, record_theory
+from pendpipe.version import __version__
 
 
 def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:
@@ -265,3 +265,69 @@ def _calibration(campaign: Campaign) -> dict[str, Any] | None:
         return None
     content: dict[str, Any] = read_json(sensor_file(campaign))
     return content
+
+
+NUMBERS: Final = (
+    "frequency",
+    "moment_of_inertia",
+    "a",
+    "b",
+    "c",
+    "quality_factor_limit",
+    "quality_factor_hysteretic",
+    "quality_factor_viscous",
+    "quality_factor_viscous_theory",
+)
+
+
+def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
+    """Take the contract's numbers out of the comparison; each has value, sd and unit."""
+    exponents = comparison["viscous_exponents"] or {}
+    calibration = comparison["calibration"]
+    return {
+        "schema_version": 1,
+        "hysteretic_coefficient": _number(comparison["hysteretic_coefficient"]),
+        "viscous_exponents": {branch: _number(exponents.get(branch)) for branch in ("low", "high")},
+        "theory_factor": _number(comparison["theory_factor"]),
+        "history_coefficient": _number(comparison["history_coefficient"]),
+        "volts_per_radian": _number(calibration and calibration["volts_per_radian"]),
+        "records": [
+            {name: record[name] for name in ("record", "fluid", "branch")}
+            | {name: _number(record.get(name)) for name in NUMBERS}
+            for record in comparison["records"]
+            if record["refused"] is None
+        ],
+        "refused": [
+            {"record": record["record"], "reason": record["refused"]}
+            for record in comparison["records"]
+            if record["refused"] is not None
+        ],
+    }
+
+
+def _number(content: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Value, sd and unit of a number; ``None`` where the campaign has none."""
+    if content is None:
+        return None
+    return {name: content[name] for name in ("value", "sd", "unit")}
+
+
+PACKAGES: Final = ("numpy", "scipy", "numba", "matplotlib", "pyserial", "snakemake")
+
+
+def stamp(campaign: Campaign) -> dict[str, Any]:
+    """Versions of the program and its libraries, digest of the configuration, seed."""
+    return {
+        "version": __version__,
+        "code": code_version("pendpipe.stages.compare"),
+        "configuration": digest(campaign.configuration.model_dump(exclude={"results", "records"})),
+        "seed": campaign.configuration.seed,
+        "packages": {name: _version(name) for name in PACKAGES},
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

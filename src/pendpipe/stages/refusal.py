@@ -1,4 +1,4 @@
-"""A record that can't be used: said in one line, and no obstacle to the others.
+"""A record that can't be used leaves one line, and is no obstacle to the others.
 
 Snakemake wants every declared output of a job. A refused record therefore gets a stub in
 the place of each: whole, valid, and holding nothing but the reason. The stages after it
@@ -87,24 +87,24 @@ def _work_or_refuse(
         work()
     except DamagedError:
         raise
-    except InputError as fault:
-        reason = within_results(fault, refused)
+    except InputError as error:
+        reason = within_results(error, refused)
         write_json(
             refused, {"schema_version": 1, "record": record, "stage": stage, "reason": reason}
         )
         _write_stubs(outputs, reason)
-        print(f"pendpipe: {record} is refused: {fault}", file=sys.stderr)
+        print(f"pendpipe: {record} is refused: {error}", file=sys.stderr)
     return 0
 
 
-def within_results(fault: InputError, refused: Path | None) -> str:
+def within_results(error: InputError, refused: Path | None) -> str:
     """What is written of an error: a campaign's own files go by ``record/name``.
 
     Results name no path of the machine they were made on: others go by their name alone.
     """
     if refused is None:
-        return str(fault)
-    return without_folders(str(fault).replace(f"{refused.parent.parent}/", ""))
+        return str(error)
+    return without_folders(str(error).replace(f"{refused.parent.parent}/", ""))
 
 
 def reason_of(refused: Path, *, before: str | None = None) -> str | None:

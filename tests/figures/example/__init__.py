@@ -86,18 +86,32 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
     parameters["offset"] = estimate(0.0031, 1e-6, "rad")
     limit = np.pi * truth.frequency / values[2]
     fit = {
-        "schema_version": 1, "method": "waveform", "baseline": "eq8", "parameters": parameters,
+        "schema_version": 1,
+        "method": "waveform",
+        "baseline": "eq8",
+        "parameters": parameters,
         "quality_factor_limit": estimate(limit, limit * sd[2] / values[2], ""),
-        "quality_factor_hysteretic": None, "quality_factor_viscous": None,
+        "quality_factor_hysteretic": None,
+        "quality_factor_viscous": None,
         "covariance": {"order": list(FIT_NAMES), "matrix": covariance.tolist()},
-        "noise_rms_rad": NOISE_RAD, "residual_rms_rad": NOISE_RAD * 1.004,
-        "chi2_per_dof": 1.008, "samples": 16384, "turning_points": len(points["time_s"]),
+        "noise_rms_rad": NOISE_RAD,
+        "residual_rms_rad": NOISE_RAD * 1.004,
+        "chi2_per_dof": 1.008,
+        "samples": 16384,
+        "turning_points": len(points["time_s"]),
         "cuts": [{"start_s": 0.0, "stop_s": 0.2, "reason": "before the first turning point"}],
-        "provenance": {"input_sha256": f"{seed:064x}", "version": "0.1.0", "seed": 1,
-                       "volts_per_radian": SENSOR},
+        "provenance": {
+            "input_sha256": f"{seed:064x}",
+            "version": "0.1.0",
+            "seed": 1,
+            "volts_per_radian": SENSOR,
+        },
         "warnings": [],
-        "restoring": "linear", "light": "green", "light_reason": "", "decrement_check": [],
-    }  # fmt: skip
+        "restoring": "linear",
+        "light": "green",
+        "light_reason": "",
+        "decrement_check": [],
+    }
     write_json(folder / name / "fit.json", fit)
     index = points["half_cycle"].astype(np.int64)
     table = TurningPoints(**points | {"half_cycle": index}, level_coupling=1.0, samples=16384)  # type: ignore[arg-type]
@@ -126,8 +140,9 @@ def make_example(folder: Path, *, records: int | None = None) -> Example:
     for number, row in enumerate(rows):
         if records is not None and row["record"] != TYPICAL and number % 8 >= records:
             continue
-        truth = truth_of(settings, settings["geometries"][row["geometry"]]["weights_m"],
-                         row["fluid"])  # fmt: skip
+        truth = truth_of(
+            settings, settings["geometries"][row["geometry"]]["weights_m"], row["fluid"]
+        )
         fit = write_record(results, row["record"], truth, number + 1)
         entries.append(record_entry(row, truth, fit, int(fit["turning_points"])))
         if row["record"] == TYPICAL:
@@ -138,10 +153,18 @@ def make_example(folder: Path, *, records: int | None = None) -> Example:
     campaign.write_text(json.dumps(settings | {"results": results.as_posix()}))
     write_json(results / "comparison.json", content)
     write_json(results / "campaign.json", {"schema_version": 1})
-    return Example(results, campaign, results / "comparison.json", results / "campaign.json",
-                   content)  # fmt: skip
+    return Example(
+        results, campaign, results / "comparison.json", results / "campaign.json", content
+    )
 
 
 def refused_entry(record: str, reason: str) -> dict[str, Any]:
-    return {"record": record, "source": "file", "fluid": "", "branch": "", "geometry": "",
-            "temperature_c": None, "refused": reason}  # fmt: skip
+    return {
+        "record": record,
+        "source": "file",
+        "fluid": "",
+        "branch": "",
+        "geometry": "",
+        "temperature_c": None,
+        "refused": reason,
+    }

@@ -25,28 +25,47 @@ def record_entry(
     lengthening = truth.lengthening
     return {
         **{key: row[key] for key in ("record", "source", "fluid", "branch", "geometry")},
-        "temperature_c": 20.0, "refused": None,
+        "temperature_c": 20.0,
+        "refused": None,
         **{key: parameters[key] for key in ("frequency", "a", "b", "c", "amplitude", "offset")},
         "quality_factor_limit": limit,
         "quality_factor_hysteretic": estimate(hysteretic, 0.002 * hysteretic, ""),
         "quality_factor_viscous": estimate(viscous, 0.006 * viscous, "") if viscous else None,
-        "quality_factor_viscous_theory":
-            estimate(truth.viscous, 0.004 * truth.viscous, "") if wet else None,
+        "quality_factor_viscous_theory": estimate(truth.viscous, 0.004 * truth.viscous, "")
+        if wet
+        else None,
         "quality_factor_viscous_steady": truth.steady if wet else None,
         "quality_factor_limit_theory": 1 / (1 / truth.viscous + 1 / hysteretic) if wet else None,
         "a_over_delta": truth.depth_ratio if wet else None,
         "moment_of_inertia": estimate(truth.inertia, 1e-4 * truth.inertia, "kg m^2"),
-        "moment_of_inertia_from_frequency":
-            estimate(truth.inertia * 1.001, 0.002 * truth.inertia, "kg m^2"),
+        "moment_of_inertia_from_frequency": estimate(
+            truth.inertia * 1.001, 0.002 * truth.inertia, "kg m^2"
+        ),
         "lengthening": {k: float(v) for k, v in lengthening._asdict().items()}
-        if lengthening else None,
-        **{key: fit[key] for key in ("method", "noise_rms_rad", "residual_rms_rad",
-                                     "chi2_per_dof", "samples", "cuts", "warnings")},
-        "turning_points": points, "start_s": 0.2, "stop_s": truth.duration_s,
+        if lengthening
+        else None,
+        **{
+            key: fit[key]
+            for key in (
+                "method",
+                "noise_rms_rad",
+                "residual_rms_rad",
+                "chi2_per_dof",
+                "samples",
+                "cuts",
+                "warnings",
+            )
+        },
+        "turning_points": points,
+        "start_s": 0.2,
+        "stop_s": truth.duration_s,
         "volts_per_radian": estimate(SENSOR, 0.0009, "V/rad"),
-        "misfit": {"amplitude_rms_rad": 1.1e-5, "linear_damping_rms_rad": 1.9e-3,
-                   "half_cycles": points},
-    }  # fmt: skip
+        "misfit": {
+            "amplitude_rms_rad": 1.1e-5,
+            "linear_damping_rms_rad": 1.9e-3,
+            "half_cycles": points,
+        },
+    }
 
 
 def branch_curve(settings: dict[str, Any], branch: str) -> dict[str, list[float]]:
@@ -67,13 +86,14 @@ def branch_curve(settings: dict[str, Any], branch: str) -> dict[str, list[float]
         "frequency_hz": [t.frequency for t in curve],
         "quality_factor_viscous_theory": [t.viscous for t in curve],
         "quality_factor_viscous_steady": [t.steady for t in curve],
-        "quality_factor_limit_theory":
-            [1 / (1 / t.viscous + 1 / (HYSTERETIC * t.frequency**2)) for t in curve],
+        "quality_factor_limit_theory": [
+            1 / (1 / t.viscous + 1 / (HYSTERETIC * t.frequency**2)) for t in curve
+        ],
         "lengthening_buoyancy": [float(x.buoyancy) for x in lengthening],
         "lengthening_added_mass": [float(x.added_mass) for x in lengthening],
         "lengthening_both": [float(x.both) for x in lengthening],
         "moment_of_inertia_kg_m2": [t.inertia for t in curve],
-    }  # fmt: skip
+    }
 
 
 def tail_fits(truth: Truth) -> list[dict[str, Any]]:
@@ -91,9 +111,11 @@ def tail_fits(truth: Truth) -> list[dict[str, Any]]:
         units = ("1/(rad s)", "1/s", "rad/s")
         entries.append(
             {"start_s": float(start), "amplitude_rad": amplitude}
-            | {key: estimate(float(drawn[i]), float(sd[i]), units[i])
-               for i, key in enumerate("abc")}
-        )  # fmt: skip
+            | {
+                key: estimate(float(drawn[i]), float(sd[i]), units[i])
+                for i, key in enumerate("abc")
+            }
+        )
     return entries
 
 
@@ -118,23 +140,36 @@ def comparison(
 ) -> dict[str, Any]:
     """The content of comparison.json."""
     ranges = [
-        {"first": "water-high-1", "last": f"water-high-{last}", "exponent": -4.9 - 0.1 * last,
-         "sd": 0.05}
+        {
+            "first": "water-high-1",
+            "last": f"water-high-{last}",
+            "exponent": -4.9 - 0.1 * last,
+            "sd": 0.05,
+        }
         for last in (5, 6, 7, 8)
-    ]  # fmt: skip
+    ]
     return {
-        "schema_version": 1, "title": settings["title"], "typical_record": TYPICAL,
-        "has_theory": True, "records": entries,
+        "schema_version": 1,
+        "title": settings["title"],
+        "typical_record": TYPICAL,
+        "has_theory": True,
+        "records": entries,
         "curves": {branch: branch_curve(settings, branch) for branch in ("high", "low")},
         "hysteretic_coefficient": estimate(3938.0, 6.0, "s^2")
         | {"chi2": 10.2, "dof": 11, "p_value": 0.51, "free_exponent": estimate(1.9993, 0.0011, "")},
         "viscous_exponents": {
             "high": estimate(-5.68, 0.04, "")
-            | {"local_slopes": [-4.1, -4.4, -4.9, -5.4, -6.1, -7.2, -9.4], "curvature":
-               estimate(-3.1, 0.2, ""), "ranges": ranges},
+            | {
+                "local_slopes": [-4.1, -4.4, -4.9, -5.4, -6.1, -7.2, -9.4],
+                "curvature": estimate(-3.1, 0.2, ""),
+                "ranges": ranges,
+            },
             "low": estimate(0.506, 0.006, "")
-            | {"local_slopes": [0.48, 0.5, 0.52, 0.5, 0.49, 0.51], "curvature":
-               estimate(0.01, 0.02, ""), "ranges": []},
+            | {
+                "local_slopes": [0.48, 0.5, 0.52, 0.5, 0.49, 0.51],
+                "curvature": estimate(0.01, 0.02, ""),
+                "ranges": [],
+            },
         },
         "theory_factor": estimate(1.1165, 0.0062, "")
         | {"sd_own": 0.0011, "sd_common": 0.0061, "chi2": 13.1, "dof": 14},
@@ -147,8 +182,13 @@ def comparison(
             {"source": "hysteretic coefficient", "relative_sd": 0.0003},
             {"source": "sensor constant", "relative_sd": 0.0002},
         ],
-        "tail": tail, "calibration": calibration(),
-        "provenance": {"version": "0.1.0", "code": "0123456789ab", "configuration":
-                       "fedcba987654", "seed": 1,
-                       "packages": {"numpy": np.__version__, "python": "3.11.7"}},
-    }  # fmt: skip
+        "tail": tail,
+        "calibration": calibration(),
+        "provenance": {
+            "version": "0.1.0",
+            "code": "0123456789ab",
+            "configuration": "fedcba987654",
+            "seed": 1,
+            "packages": {"numpy": np.__version__, "python": "3.11.7"},
+        },
+    }

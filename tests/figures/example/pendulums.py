@@ -60,11 +60,13 @@ def truth_of(settings: dict[str, Any], weights: dict[str, float], fluid_name: st
     frequency = float(moving.frequency_hz)
     hysteretic = HYSTERETIC * frequency**2
     viscous, steady = (
-        float(physics.viscous_quality_factor(
-            inertia, omega, 0.01895, 0.452, fluid[1], fluid[0], history
-        ))
+        float(
+            physics.viscous_quality_factor(
+                inertia, omega, 0.01895, 0.452, fluid[1], fluid[0], history
+            )
+        )
         for history in (1.0, 0.0)
-    )  # fmt: skip
+    )
     loss = 1 / hysteretic + (DRAG / viscous if wet else 0.0)
     reach = (0.01895, 0.452) if wet else (0.023, 0.35)
     quadratic = float(
@@ -72,9 +74,13 @@ def truth_of(settings: dict[str, Any], weights: dict[str, float], fluid_name: st
     )
     coulomb = float(physics.bearing_friction_rate(7.1e-7, inertia, omega))
     return Truth(
-        frequency, (quadratic, np.pi * frequency * loss, coulomb),
-        0.068 if wet else 0.25, 300.0 if wet else 1500.0,
-        float(inertia), viscous, steady,
+        frequency,
+        (quadratic, np.pi * frequency * loss, coulomb),
+        0.068 if wet else 0.25,
+        300.0 if wet else 1500.0,
+        float(inertia),
+        viscous,
+        steady,
         0.01895 / float(physics.penetration_depth(omega, fluid[1], fluid[0])),
         physics.period_lengthening(parts, fluid) if wet else None,
-    )  # fmt: skip
+    )
