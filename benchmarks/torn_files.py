@@ -46,7 +46,6 @@ FILES = (
     "figures/fig05.svg",
     "figures/drawn.json",
     "report.html",
-    "manifest/report.json",
 )
 
 
