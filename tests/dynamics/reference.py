@@ -87,9 +87,12 @@ class MpmathPendulum:
     def of(cls, model: Eq8) -> MpmathPendulum:
         """Return the same pendulum."""
         numbers = (
-            model.angular_frequency, model.quadratic, model.hysteretic, model.viscous,
+            model.angular_frequency,
+            model.quadratic,
+            model.hysteretic,
+            model.viscous,
             model.coulomb,
-        )  # fmt: skip
+        )
         return cls(*(mpf(number) for number in numbers))
 
     def forces(self) -> tuple[Any, Any, Any, Any]:
@@ -184,9 +187,12 @@ def _heyoka_integrator(restoring: str) -> tuple[Any, list[tuple[float, float]]]:
     # The velocity falls from zero at the start, and rises to zero at the end.
     event = heyoka.t_event(v, callback=turned, direction=heyoka.event_direction.positive)
     integrator = heyoka.taylor_adaptive(
-        [(x, v), (v, friction - torque - damping * v)], [1.0, 0.0], pars=[0.0] * 5,
-        tol=1e-16, t_events=[event],
-    )  # fmt: skip
+        [(x, v), (v, friction - torque - damping * v)],
+        [1.0, 0.0],
+        pars=[0.0] * 5,
+        tol=1e-16,
+        t_events=[event],
+    )
     return integrator, log
 
 
@@ -197,9 +203,12 @@ def _released(model: Eq8, amplitude: float) -> tuple[Any, list[tuple[float, floa
     # In units of the amplitude: below 1 heyoka's tolerance is absolute. (sin x has no unit.)
     unit = amplitude if model.restoring == "linear" else 1.0
     integrator.pars[:] = [
-        math.pi * w * model.coulomb / 2 / unit, math.pi * model.hysteretic / 2,
-        math.pi * model.quadratic / (2 * w) * unit, 2 * model.viscous, w**2,
-    ]  # fmt: skip
+        math.pi * w * model.coulomb / 2 / unit,
+        math.pi * model.hysteretic / 2,
+        math.pi * model.quadratic / (2 * w) * unit,
+        2 * model.viscous,
+        w**2,
+    ]
     integrator.time, integrator.state[:] = 0.0, [amplitude / unit, 0.0]
     integrator.reset_cooldowns()
     log.clear()
@@ -209,7 +218,7 @@ def _released(model: Eq8, amplitude: float) -> tuple[Any, list[tuple[float, floa
 def heyoka_turning_points(
     model: Eq8, y: float, count: int, moves: Any = lambda _: True
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return turning points by heyoka; `moves(amplitude)` says if the pendulum leaves one."""
+    """Return turning points by heyoka; `moves(amplitude)` is whether the pendulum leaves one."""
     times, angles = [0.0], [y]
     while len(times) < count and moves(abs(angles[-1])):
         integrator, log, unit = _released(model, abs(angles[-1]))

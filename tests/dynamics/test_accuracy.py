@@ -94,9 +94,7 @@ def test_forty_half_cycles_of_any_pendulum_agree_with_heyoka(drawn: tuple[Eq8, f
         np.testing.assert_allclose(points.angle_rad, angles, rtol=1e-10, atol=1e-12 * y)
 
 
-@given(
-    st.floats(1.001, 45.0), st.floats(0.0, 0.15), st.floats(0.0, 0.15), st.floats(0.0, 0.1)
-)  # fmt: skip
+@given(st.floats(1.001, 45.0), st.floats(0.0, 0.15), st.floats(0.0, 0.15), st.floats(0.0, 0.1))
 @example(3.5, 0.0, 0.0, 0.0)
 @example(1.001, 0.1, 0.1, 0.1)
 @example(21.0, 1e-3, 0.0, 0.0)

@@ -45,9 +45,13 @@ def sine_law(motion: Motion) -> Floats:
     side=st.sampled_from([-1.0, 1.0]),
 )
 def test_eq8_as_the_engine_has_it(
-    quadratic: float, hysteretic: float, viscous: float, friction: float, start: float,
+    quadratic: float,
+    hysteretic: float,
+    viscous: float,
+    friction: float,
+    start: float,
     side: float,
-) -> None:  # fmt: skip
+) -> None:
     """The readings' error is 3e-4 of what a radian of phase loses (2e-7 at Q = 700)."""
     # c such that Coulomb friction alone would take half of that part in the record.
     duration = 8.0
@@ -78,9 +82,16 @@ def test_turning_points_of_eq8_over_a_long_record() -> None:
 
 @pytest.mark.parametrize(
     ("amplitude", "order", "within"),
-    [(0.1, 14, 1e-11), (0.5, 14, 1e-8), (1.0, 14, 3e-8), (1.5, 20, 1e-8), (2.0, 28, 1e-9),
-     (2.5, 48, 1e-9), (2.8, 80, 1e-9)],
-)  # fmt: skip
+    [
+        (0.1, 14, 1e-11),
+        (0.5, 14, 1e-8),
+        (1.0, 14, 3e-8),
+        (1.5, 20, 1e-8),
+        (2.0, 28, 1e-9),
+        (2.5, 48, 1e-9),
+        (2.8, 80, 1e-9),
+    ],
+)
 def test_the_period_of_sin_x_is_the_elliptic_integral(
     amplitude: float, order: int, within: float
 ) -> None:
@@ -126,8 +137,11 @@ def test_about_a_rest_at_which_it_turns_short_of_nought_there_is_no_phase() -> N
     with pytest.raises(NoMotionError):
         follow(
             lambda motion: np.full_like(motion.angle, OMEGA**2 * 0.55),
-            OMEGA, 1.0, 0.0, undamped(Clock(12, 40)),
-        )  # fmt: skip
+            OMEGA,
+            1.0,
+            0.0,
+            undamped(Clock(12, 40)),
+        )
 
 
 def test_beyond_the_stop_there_is_no_motion() -> None:

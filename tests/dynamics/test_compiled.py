@@ -45,9 +45,12 @@ def first_call(folder: Path, more: str = "") -> list[str]:
     """Call the engine in a new process that keeps its code in `folder`."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder), "OPENBLAS_NUM_THREADS": "1"}
     run = subprocess.run(
-        [sys.executable, "-c", FIRST_CALL + more], env=environment, capture_output=True, text=True,
+        [sys.executable, "-c", FIRST_CALL + more],
+        env=environment,
+        capture_output=True,
+        text=True,
         check=True,
-    )  # fmt: skip
+    )
     return run.stdout.split()
 
 
@@ -188,10 +191,20 @@ def test_the_engine_writes_only_where_it_may(
     readings = np.zeros(samples)
     turning, turning_at = guarded((2 + 2 * columns) * 50)
     request = (ctypes.c_int64 * len(REQUEST))(
-        buffer_at, directions, tabulate, 50 if samples == 0 else 2**60, time_s.ctypes.data,
-        samples, angle_at, jacobian_at, turning_at, 50, readings.ctypes.data,
-        samples if compared else 0, sums_at,
-    )  # fmt: skip
+        buffer_at,
+        directions,
+        tabulate,
+        50 if samples == 0 else 2**60,
+        time_s.ctypes.data,
+        samples,
+        angle_at,
+        jacobian_at,
+        turning_at,
+        50,
+        readings.ctypes.data,
+        samples if compared else 0,
+        sums_at,
+    )
     compiled.engine()(request)
     for array in (buffer, angle, jacobian, turning, sums):
         np.testing.assert_array_equal(array[:guard], np.pi)

@@ -91,9 +91,12 @@ def test_quadratic_friction_locks_large_amplitudes_only() -> None:
 
 
 @given(
-    st.floats(0.0, 0.3), st.floats(0.0, 0.3), st.floats(0.0, 0.3), st.floats(1e-4, 0.3),
+    st.floats(0.0, 0.3),
+    st.floats(0.0, 0.3),
+    st.floats(0.0, 0.3),
+    st.floats(1e-4, 0.3),
     st.floats(1e-3, 2.0),
-)  # fmt: skip
+)
 def test_friction_at_rest_decides_about_the_stop(
     a: float, b_h: float, b_v: float, c: float, y: float
 ) -> None:
@@ -107,9 +110,12 @@ def test_friction_at_rest_decides_about_the_stop(
 
 
 @given(
-    st.floats(0.0, 0.5), st.floats(0.0, 0.1), st.floats(0.0, 0.1), st.floats(0.0, 1e-3),
+    st.floats(0.0, 0.5),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 1e-3),
     st.floats(1e-3, 0.4),
-)  # fmt: skip
+)
 def test_the_motion_has_the_symmetries_of_equation_8(
     a: float, b_h: float, b_v: float, c: float, y: float
 ) -> None:

@@ -41,14 +41,19 @@ def test_gradient_and_residual_are_those_of_the_jacobian(name: str, count: int) 
     np.testing.assert_allclose(found.residual, residual, rtol=0, atol=1e-14)
     assert found.square == pytest.approx(residual @ residual, rel=1e-12)
     size = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(values - angle) + 1e-300
-    np.testing.assert_allclose(found.gradient / size, jacobian.T @ (values - angle) / size,
-                               rtol=0, atol=1e-12)  # fmt: skip
+    np.testing.assert_allclose(
+        found.gradient / size, jacobian.T @ (values - angle) / size, rtol=0, atol=1e-12
+    )
 
 
 @given(
-    st.floats(0.0, 1.0), st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 1e-3),
-    st.floats(12.0, 300.0), st.integers(20, 60),
-)  # fmt: skip
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 0.05),
+    st.floats(0.0, 0.05),
+    st.floats(0.0, 1e-3),
+    st.floats(12.0, 300.0),
+    st.integers(20, 60),
+)
 @settings(max_examples=40, deadline=None)
 def test_the_normal_matrix_gives_the_precision_of_even_readings(
     a: float, b_h: float, b_v: float, c: float, in_half_cycle: float, half_cycles: int
@@ -59,8 +64,9 @@ def test_the_normal_matrix_gives_the_precision_of_even_readings(
     normal = compare(model, RELEASE, time_s, np.zeros(len(time_s))).normal
     exact = jacobian.T @ jacobian
     size = np.sqrt(np.diag(exact))
-    np.testing.assert_allclose(normal / np.outer(size, size), exact / np.outer(size, size),
-                               rtol=0, atol=2e-3)  # fmt: skip
+    np.testing.assert_allclose(
+        normal / np.outer(size, size), exact / np.outer(size, size), rtol=0, atol=2e-3
+    )
     np.testing.assert_array_equal(normal, normal.T)
     # In every direction, above all those that are hard to tell apart.
     values, vectors = np.linalg.eigh(exact / np.outer(size, size))

@@ -126,9 +126,13 @@ def test_the_columns_of_release_and_offset(method: Method) -> None:
 
 
 @given(
-    st.floats(0.0, 0.5), st.floats(0.0, 0.1), st.floats(0.0, 0.1), st.floats(0.0, 3e-4),
-    st.floats(0.01, 0.4), st.integers(10, 400),
-)  # fmt: skip
+    st.floats(0.0, 0.5),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 3e-4),
+    st.floats(0.01, 0.4),
+    st.integers(10, 400),
+)
 @example(0.0, 0.0, 1e-16, 0.0, 0.015625, 23)  # hardly any change: ln y at the mercy of rounding
 @settings(max_examples=60, deadline=None)
 def test_map_and_clock_agree_on_every_column(

@@ -153,12 +153,14 @@ def test_turning_points_change_as_differences_of_heyokas_do(y: float) -> None:
         for column, (name, value) in enumerate(values.items()):
             step = 2e-4 * value * (0.1 if name == "angle" else 1.0)
             moved = [
-                weight * np.array(
-                    heyoka_turning_points(model, y + s * step, count) if name == "angle"
+                weight
+                * np.array(
+                    heyoka_turning_points(model, y + s * step, count)
+                    if name == "angle"
                     else heyoka_turning_points(replace(model, **{name: value + s * step}), y, count)
                 )
                 for s, weight in STENCIL.items()
-            ]  # fmt: skip
+            ]
             by_time, by_angle = sum(moved) / (12.0 * step)
             for own, other in ((times[:, column], by_time), (angles[:, column], by_angle)):
                 np.testing.assert_allclose(own, other, rtol=0, atol=2e-6 * np.abs(other).max())
@@ -180,14 +182,16 @@ def test_samples_change_as_their_differences_do(y: float) -> None:
             step *= 0.01
         where = {"angle": "angle_rad", "time": "time_s"}.get(name, name)
         moved = [
-            weight * (
+            weight
+            * (
                 sample(replace(model, **{name: getattr(model, name) + s * step}), release, time)
                 if rate
-                else sample(model, replace(release, **{where: getattr(release, where) + s * step}),
-                            time)
+                else sample(
+                    model, replace(release, **{where: getattr(release, where) + s * step}), time
+                )
             )
             for s, weight in STENCIL.items()
-        ]  # fmt: skip
+        ]
         error = np.abs(sum(moved) / (12.0 * step) - jacobian[:, column]) / scale[column]
         # Where a turning point lies between the differences, these are off by its kink.
         assert np.quantile(error, 0.9) < 1e-6

@@ -56,9 +56,16 @@ def integrate(
         reversal.direction = -1.0  # type: ignore[attr-defined]
         end = pending[0][0] if pending else float(time_s[-1]) + 1.0
         piece = solve_ivp(
-            rate, (now, end), state, "DOP853", events=reversal, dense_output=True,
-            rtol=1e-11, atol=1e-14, max_step=0.2,
-        )  # fmt: skip
+            rate,
+            (now, end),
+            state,
+            "DOP853",
+            events=reversal,
+            dense_output=True,
+            rtol=1e-11,
+            atol=1e-14,
+            max_step=0.2,
+        )
         inside = (time_s >= now) & (time_s <= piece.t[-1])
         if np.any(inside):
             found[inside] = piece.sol(time_s[inside])[0]

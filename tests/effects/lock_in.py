@@ -49,8 +49,12 @@ def lock_in(
         columns = [np.ones_like(time), time]
         for order in range(1, HARMONICS + 1):
             columns += [np.cos(order * omega * time), np.sin(order * omega * time)]
-        columns += [time * columns[2], time * columns[3], time**2 * columns[2],
-                    time**2 * columns[3]]  # fmt: skip
+        columns += [
+            time * columns[2],
+            time * columns[3],
+            time**2 * columns[2],
+            time**2 * columns[3],
+        ]
         found = np.linalg.lstsq(np.stack(columns, axis=1), values, rcond=None)[0]
         first = found[2] - 1j * found[3]
         slope = (found[-4] - 1j * found[-3]) / first

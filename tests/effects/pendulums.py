@@ -21,9 +21,15 @@ VALUES: dict[str, tuple[float, ...]] = {
 
 
 def baseline(
-    *, a: float = 0.0, b: float = 0.0, c: float = 0.0, share: float = 0.0, start: float = 0.15,
-    offset: float = 0.0, omega: float = OMEGA,
-) -> Floats:  # fmt: skip
+    *,
+    a: float = 0.0,
+    b: float = 0.0,
+    c: float = 0.0,
+    share: float = 0.0,
+    start: float = 0.15,
+    offset: float = 0.0,
+    omega: float = OMEGA,
+) -> Floats:
     """Values of the baseline; released at t = 0."""
     return np.array([a, b, c, share, omega, start, 0.0, offset])
 

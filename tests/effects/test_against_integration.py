@@ -54,16 +54,25 @@ CASES: dict[str, tuple[tuple[float, ...], Any, dict[str, Any]]] = {
         {},
     ),
     "power-law-damping": (
-        (5e-3, 1.5, 0.0), lambda t, x, v, s, turn: -5e-3 * s * abs(v / 0.1) ** 1.5, {},
+        (5e-3, 1.5, 0.0),
+        lambda t, x, v, s, turn: -5e-3 * s * abs(v / 0.1) ** 1.5,
+        {},
     ),
     "cubic-damping": ((2.0, 1.0), lambda t, x, v, s, turn: -2.0 * x * x * v, {}),
     "stribeck-friction": (
-        (2e-3, 0.1), lambda t, x, v, s, turn: -2e-3 * s * math.exp(-((v / 0.1) ** 2)), {},
+        (2e-3, 0.1),
+        lambda t, x, v, s, turn: -2e-3 * s * math.exp(-((v / 0.1) ** 2)),
+        {},
     ),
     "vortex-shedding": (
         (0.05, 0.11, 1.0),
         lambda t, x, v, s, turn: (
-            -0.05 * OMEGA * math.pi * 2.0 / (1.0 + math.exp(-math.pi)) * s
+            -0.05
+            * OMEGA
+            * math.pi
+            * 2.0
+            / (1.0 + math.exp(-math.pi))
+            * s
             * max(0.0, abs(turn) - 0.11)
             * math.exp(-math.atan2(abs(v) / OMEGA, math.copysign(x, x * turn)))
         ),
@@ -82,14 +91,18 @@ CASES: dict[str, tuple[tuple[float, ...], Any, dict[str, Any]]] = {
         {},
     ),
     "equilibrium-creep": (
-        (3e-3, 4.0, 0.0), lambda t, x, v, s, turn: 3e-3 * OMEGA**2 * math.log1p(t / 4.0), {},
+        (3e-3, 4.0, 0.0),
+        lambda t, x, v, s, turn: 3e-3 * OMEGA**2 * math.log1p(t / 4.0),
+        {},
     ),
     "release-transient": (
-        (0.03, 3.0), lambda t, x, v, s, turn: -0.06 * math.exp(-t / 3.0) * v, {},
+        (0.03, 3.0),
+        lambda t, x, v, s, turn: -0.06 * math.exp(-t / 3.0) * v,
+        {},
     ),
     "impulse": ((-0.4, 9.81), without_sudden, {"kicks": ((9.81, 0.0, -0.4),)}),
     "equilibrium-step": ((0.03, 9.81), without_sudden, {"kicks": ((9.81, -0.03, 0.0),)}),
-}  # fmt: skip
+}
 """Effect: its values, the extra acceleration, kicks (instant, of the angle, of the velocity)."""
 
 
@@ -126,7 +139,11 @@ def test_presliding_friction_is_dahls() -> None:
         return eq8(state, direction) - OMEGA**2 * k_d * state[2]
 
     expected = integrate(
-        law, START, 0.0, TIME, more=(contact,),
+        law,
+        START,
+        0.0,
+        TIME,
+        more=(contact,),
         more_rates=lambda t, state: [state[1] - abs(state[1]) * state[2] / z_c],
-    )  # fmt: skip
+    )
     assert np.max(np.abs(found.sampled.angle - expected)) < 1e-5 * START

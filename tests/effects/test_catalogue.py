@@ -106,9 +106,7 @@ def test_the_page_is_the_catalogues() -> None:
 
 
 def test_units_follow_the_displacements() -> None:
-    units = {
-        parameter.unit_in("m") for effect in CATALOGUE for parameter in effect.parameters
-    }  # fmt: skip
+    units = {parameter.unit_in("m") for effect in CATALOGUE for parameter in effect.parameters}
     assert "m/s^2" in units
     assert "1/m^2" in units
     assert not any("rad" in unit for unit in units)
@@ -120,10 +118,18 @@ def test_frictions_have_one_sign() -> None:
         effect.identifier for effect in CATALOGUE if effect.has_signature and effect.one_sided
     }
     assert one_sided == {
-        "circular-error", "coulomb-friction", "quadratic-drag", "drag-form", "power-law-damping",
-        "stribeck-friction", "presliding-friction", "backlash", "history-force",
-        "vortex-shedding", "sensor-backlash",
-    }  # fmt: skip
+        "circular-error",
+        "coulomb-friction",
+        "quadratic-drag",
+        "drag-form",
+        "power-law-damping",
+        "stribeck-friction",
+        "presliding-friction",
+        "backlash",
+        "history-force",
+        "vortex-shedding",
+        "sensor-backlash",
+    }
 
 
 def test_what_eq8_holds_is_left_out_of_its_catalogue() -> None:

@@ -228,20 +228,23 @@ def test_a_drift_is_the_less_likely_the_larger_beyond_a_thousandth(name: str) ->
 
 @pytest.mark.parametrize(
     ("identifier", "values"),
-    [("ac-coupling", (-4.0, 1e6)), ("equilibrium-creep", (10.0, 2.5e6, 0.0)),
-     ("equilibrium-creep", (1e-3, 60.0, 1.0))],
-)  # fmt: skip
+    [
+        ("ac-coupling", (-4.0, 1e6)),
+        ("equilibrium-creep", (10.0, 2.5e6, 0.0)),
+        ("equilibrium-creep", (1e-3, 60.0, 1.0)),
+    ],
+)
 def test_a_slow_creep_has_hardly_begun(identifier: str, values: tuple[float, ...]) -> None:
     """However far it would go in the end, what counts is how far it went within the record."""
     moved = reading(identifier, values, baseline(), TIME) - plain(baseline(), TIME)
     went = abs(float(np.mean(moved[-28:]) - np.mean(moved[:28])))
-    told = by_identifier(identifier).displacement(np.array(values), float(TIME[-1]))
-    assert told == pytest.approx(went, rel=0.05)
+    displaced = by_identifier(identifier).displacement(np.array(values), float(TIME[-1]))
+    assert displaced == pytest.approx(went, rel=0.05)
 
 
 @pytest.mark.parametrize("samples", [1.0, -1.0, 3.0])
 def test_samples_are_lost_whole(samples: float) -> None:
-    """A tenth of one is lost where ten are read for each that is told, as rarely as that."""
+    """A tenth of one is lost where ten are read for each that is reported, as rarely as that."""
     effect = by_identifier("dropped-samples")
     span = evaluated("dropped-samples", (0.0, 30.0), baseline(b=0.01), TIME).span
 

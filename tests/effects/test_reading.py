@@ -54,7 +54,7 @@ def test_play_in_the_sensor_is_the_play_operator() -> None:
 
 
 def test_drifts_of_offset_and_gain() -> None:
-    """They relax; where nothing is said of that, they are straight."""
+    """They relax; without a time constant, they are straight."""
     tau = 12.0
     relaxed = tau * (1.0 - np.exp(-TIME / tau))
     np.testing.assert_allclose(

@@ -75,12 +75,17 @@ def test_branches_join_where_r_vanishes(
         ((0.5, 0.0, 0.0), lambda t, y: y / (1.0 + 0.5 * y * t)),
         ((0.0, 0.3, 0.006), lambda t, y: (y + 0.02) * np.exp(-0.3 * t) - 0.02),
         ((0.5, 0.3, 0.0), lambda t, y: y / (np.exp(0.3 * t) + 0.5 * y * np.expm1(0.3 * t) / 0.3)),
-        ((0.5, 0.0, 2e-3), lambda t, y: 0.0632455532033675866 * np.tan(
-            np.arctan(y / 0.0632455532033675866) - 0.0316227766016837933 * t)),
+        (
+            (0.5, 0.0, 2e-3),
+            lambda t, y: (
+                0.0632455532033675866
+                * np.tan(np.arctan(y / 0.0632455532033675866) - 0.0316227766016837933 * t)
+            ),
+        ),
         ((0.5, 0.2, 0.02), lambda t, y: 1.0 / (0.5 * t + 1.0 / (y + 0.2)) - 0.2),
     ],
     ids=["none", "c", "b", "a", "b c", "a b", "a c", "r = 0"],
-)  # fmt: skip
+)
 def test_each_loss_alone_has_its_textbook_decay(abc: tuple[float, float, float], closed) -> None:  # type: ignore[no-untyped-def]
     t = np.linspace(0.0, 2.0, 7)
     np.testing.assert_allclose(amplitude(t, 0.1, *abc), closed(t, 0.1), rtol=2e-14)

@@ -113,10 +113,14 @@ def test_no_oscillation_below_the_critical_quality_factor() -> None:
 def test_driven_pendulum_is_the_linear_oscillator_at_small_angle() -> None:
     inertia, quality, angle, velocity = 0.1, 7.0, 1e-5, 3e-5
     driven = driven_pendulum_acceleration(
-        angle, velocity, 0.0, moment_of_inertia_kg_m2=inertia,
-        restoring_moment_n_m=inertia * OMEGA**2, quality_factor=quality,
+        angle,
+        velocity,
+        0.0,
+        moment_of_inertia_kg_m2=inertia,
+        restoring_moment_n_m=inertia * OMEGA**2,
+        quality_factor=quality,
         angular_frequency_per_s=OMEGA,
-    )  # fmt: skip
+    )
     linear = viscous_acceleration(angle, velocity, OMEGA, quality)
     assert float(driven) == pytest.approx(float(linear), rel=1e-10)
 
@@ -126,17 +130,28 @@ def test_undriven_pendulum_keeps_its_energy_and_the_drive_adds_its_torque() -> N
 
     def motion(t: float, state: np.ndarray) -> list[float]:
         acceleration = driven_pendulum_acceleration(
-            state[0], state[1], t, moment_of_inertia_kg_m2=inertia,
-            restoring_moment_n_m=moment, quality_factor=np.inf, angular_frequency_per_s=1.0,
-        )  # fmt: skip
+            state[0],
+            state[1],
+            t,
+            moment_of_inertia_kg_m2=inertia,
+            restoring_moment_n_m=moment,
+            quality_factor=np.inf,
+            angular_frequency_per_s=1.0,
+        )
         return [state[1], float(acceleration)]
 
     run = solve_ivp(motion, (0.0, 10.0), [2.5, 0.0], "DOP853", rtol=1e-12, atol=1e-12)
     energy = 0.5 * inertia * run.y[1] ** 2 - moment * np.cos(run.y[0])
     np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
     pushed = driven_pendulum_acceleration(
-        0.0, 0.0, 0.25, moment_of_inertia_kg_m2=inertia, restoring_moment_n_m=moment,
-        quality_factor=3.0, angular_frequency_per_s=1.0,
-        drive_torque_n_m=0.2, drive_angular_frequency_per_s=2.0 * np.pi,
-    )  # fmt: skip
+        0.0,
+        0.0,
+        0.25,
+        moment_of_inertia_kg_m2=inertia,
+        restoring_moment_n_m=moment,
+        quality_factor=3.0,
+        angular_frequency_per_s=1.0,
+        drive_torque_n_m=0.2,
+        drive_angular_frequency_per_s=2.0 * np.pi,
+    )
     assert float(pushed) == pytest.approx(2.0, rel=1e-14)

@@ -80,9 +80,13 @@ def test_the_high_branch_reaches_1_06_hz_and_its_exponent_is_near_the_papers() -
     motion = swing(apparatus(np.linspace(0.11, 0.29, 8)), WATER)
     assert motion.frequency_hz[0] == pytest.approx(1.06, abs=0.005)
     quality = viscous_quality_factor(
-        motion.moment_of_inertia_kg_m2, motion.angular_frequency_per_s, 0.01895, 0.452,
-        WATER.viscosity_pa_s, WATER.density_kg_per_m3,
-    )  # fmt: skip
+        motion.moment_of_inertia_kg_m2,
+        motion.angular_frequency_per_s,
+        0.01895,
+        0.452,
+        WATER.viscosity_pa_s,
+        WATER.density_kg_per_m3,
+    )
     slope = np.polyfit(np.log(motion.frequency_hz), np.log(quality), 1)[0]
     assert -5.8 <= slope <= -5.5
 

@@ -1,4 +1,4 @@
-"""Simulated recordings with effects: each can be switched on, and what is wrong is said."""
+"""Simulated recordings with effects: each can be switched on, and what is wrong is refused."""
 
 from __future__ import annotations
 
@@ -83,10 +83,14 @@ def test_without_effects_it_is_eq8(tmp_path: Path) -> None:
 
 def test_effects_add_up(tmp_path: Path) -> None:
     """A sensor's curvature on top of a jump of the pendulum's frequency."""
-    both = model(tmp_path, table("frequency-step", change=1e-3, time=20.0) +
-                 table("sensor-quadratic", s2=0.3), TOML.replace("1e-5", "0.0"))  # fmt: skip
-    one = model(tmp_path, table("frequency-step", change=1e-3, time=20.0),
-                TOML.replace("1e-5", "0.0"))  # fmt: skip
+    both = model(
+        tmp_path,
+        table("frequency-step", change=1e-3, time=20.0) + table("sensor-quadratic", s2=0.3),
+        TOML.replace("1e-5", "0.0"),
+    )
+    one = model(
+        tmp_path, table("frequency-step", change=1e-3, time=20.0), TOML.replace("1e-5", "0.0")
+    )
     plain = simulate(one).values
     np.testing.assert_allclose(simulate(both).values, plain + 0.3 * plain**2, 0.0, 1e-9)
 

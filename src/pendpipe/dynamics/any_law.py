@@ -140,9 +140,13 @@ def _rates(g: FloatArray, motion: Motion) -> Rates:
 
 
 def follow(
-    law: Law, angular_frequency: float, start_rad: float, start_s: float, guess: Motion,
+    law: Law,
+    angular_frequency: float,
+    start_rad: float,
+    start_s: float,
+    guess: Motion,
     reset: tuple[FloatArray, FloatArray] | None = None,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """Solve the motion from a turning point.
 
     Parameters
@@ -178,9 +182,12 @@ def follow(
 
 
 def _solved(
-    law: Law, motion: Motion, log_start: FloatArray | float, start_s: FloatArray | float,
+    law: Law,
+    motion: Motion,
+    log_start: FloatArray | float,
+    start_s: FloatArray | float,
     largest: float,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """Iterate a motion until it is that of the law with bounded g."""
     clock, omega = motion.clock, motion.angular_frequency
     steepness: FloatArray | None = None
@@ -212,9 +219,12 @@ def _solved(
 def _larger(motion: Motion) -> Motion:
     """The motion with a little more of ln r, for differences."""
     return Motion(
-        motion.clock, motion.angular_frequency, motion.log_amplitude + _STEP, motion.time_s,
+        motion.clock,
+        motion.angular_frequency,
+        motion.log_amplitude + _STEP,
+        motion.time_s,
         motion.upwards,
-    )  # fmt: skip
+    )
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:

@@ -70,7 +70,7 @@ def product(first: FloatArray, second: FloatArray) -> float:
 
 @kernel
 def compare(work: Work, residual: FloatArray, start: float, duration: float) -> None:
-    """Add what a block of one panel says to `work.sums`.
+    """Add a block of one panel's residuals to `work.sums`.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _take_places(work: Work, theta: FloatArray, middle: float, half: float) -> N
 
 @kernel
 def compare_rest(work: Work, level: float, first: int) -> None:
-    """Add what the readings after the stop say; the columns there are in `work.some[:, 0]`."""
+    """Add the residuals after the stop; the columns there are in `work.some[:, 0]`."""
     columns, count = work.parameters, float(work.compared - first)
     total, square = 0.0, 0.0
     for i in range(first, work.compared):

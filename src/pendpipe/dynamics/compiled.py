@@ -15,9 +15,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
 SOURCES = (
-    "chebyshev.py", "comparison.py", "emission.py", "entry.py", "half_cycle.py", "layout.py",
-    "march.py", "panel.py", "sensitivities.py", "table.py", "views.py",
-)  # fmt: skip
+    "chebyshev.py",
+    "comparison.py",
+    "emission.py",
+    "entry.py",
+    "half_cycle.py",
+    "layout.py",
+    "march.py",
+    "panel.py",
+    "sensitivities.py",
+    "table.py",
+    "views.py",
+)
 SHIPPED = Path(__file__).parent / "shipped"
 """Machine code for many machines, which a wheel may bring along."""
 SHIP = "PENDPIPE_SHIP"

@@ -66,9 +66,14 @@ def combine(
 
 @kernel
 def emit(
-    work: Work, polynomials: FloatArray, start: float, duration: float, y: float, first: int,
+    work: Work,
+    polynomials: FloatArray,
+    start: float,
+    duration: float,
+    y: float,
+    first: int,
     guess: int,
-) -> int:  # fmt: skip
+) -> int:
     """Write the samples of one panel; return the index of the first sample after it.
 
     Parameters

@@ -28,10 +28,18 @@ def _entry(request: Any) -> int:
     parameters = rates + 4 if rates > 0 else 0
     polynomials = sensitivities + 1 if samples > 0 else 0
     counts = (
-        rates, sensitivities, parameters, samples, samples - compared, 2 + 2 * parameters,
-        asked[_ROOM], compared, _sums_size(parameters) if compared > 0 else 0, polynomials,
+        rates,
+        sensitivities,
+        parameters,
+        samples,
+        samples - compared,
+        2 + 2 * parameters,
+        asked[_ROOM],
+        compared,
+        _sums_size(parameters) if compared > 0 else 0,
+        polynomials,
         row_width(sensitivities, polynomials, MOST_PANELS),
-    )  # fmt: skip
+    )
     work = gather(request, counts)
     count, state = march(work, asked[_TABULATE] != 0, asked[_MOST])
     return _STATES * count + state

@@ -226,9 +226,16 @@ def sample_with_jacobian(
     jacobian = np.empty((rates.size + 4, times.size))
     if times.size:
         _run(
-            model, release, tabulate=method == "map", directions=directions, rates=rates,
-            until_s=float(times[-1]), time_s=times, angle_rad=angle_rad, jacobian=jacobian,
-        )  # fmt: skip
+            model,
+            release,
+            tabulate=method == "map",
+            directions=directions,
+            rates=rates,
+            until_s=float(times[-1]),
+            time_s=times,
+            angle_rad=angle_rad,
+            jacobian=jacobian,
+        )
         jacobian[-1] = 1.0
     return angle_rad, jacobian.T
 
@@ -271,9 +278,15 @@ def residuals(
     residual = np.empty(times.size)
     if times.size:
         _run(
-            model, release, tabulate=True, until_s=float(times[-1]), time_s=times,
-            angle_rad=residual, readings=readings, sums=np.zeros(sums_size(0)),
-        )  # fmt: skip
+            model,
+            release,
+            tabulate=True,
+            until_s=float(times[-1]),
+            time_s=times,
+            angle_rad=residual,
+            readings=readings,
+            sums=np.zeros(sums_size(0)),
+        )
     return residual
 
 
@@ -298,10 +311,17 @@ def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatAr
     sums, residual = np.zeros(sums_size(columns)), np.empty(times.size)
     if times.size:
         _run(
-            model, release, tabulate=True, directions=directions, rates=rates,
-            until_s=float(times[-1]), time_s=times, angle_rad=residual, readings=readings,
+            model,
+            release,
+            tabulate=True,
+            directions=directions,
+            rates=rates,
+            until_s=float(times[-1]),
+            time_s=times,
+            angle_rad=residual,
+            readings=readings,
             sums=sums,
-        )  # fmt: skip
+        )
     lower = sums[1 + columns :].reshape(columns, columns)
     normal = lower + lower.T
     normal.flat[:: columns + 1] *= 0.5
@@ -332,16 +352,32 @@ def _run(
     side = -1.0 if release.angle_rad < 0.0 else 1.0
     workspace = np.empty(work_size(count, time_s.size))
     workspace[:_LOSSES] = (
-        *model.shape(), model.angular_frequency, release.time_s, release.offset_rad, side, side,
-        abs(release.angle_rad), until_s,
-    )  # fmt: skip
+        *model.shape(),
+        model.angular_frequency,
+        release.time_s,
+        release.offset_rad,
+        side,
+        side,
+        abs(release.angle_rad),
+        until_s,
+    )
     workspace[_LOSSES : _LOSSES + count] = rates
     workspace[_DIRECTIONS : _DIRECTIONS + directions.size] = directions.ravel()
     request = _REQUEST(
-        _address(workspace), count, tabulate, most, _address(time_s), time_s.size,
-        _address(angle_rad), _address(jacobian), _address(turning), turning.shape[1],
-        _address(readings), readings.size, _address(sums),
-    )  # fmt: skip
+        _address(workspace),
+        count,
+        tabulate,
+        most,
+        _address(time_s),
+        time_s.size,
+        _address(angle_rad),
+        _address(jacobian),
+        _address(turning),
+        turning.shape[1],
+        _address(readings),
+        readings.size,
+        _address(sums),
+    )
     found, state = divmod(engine()(request), OVERDAMPED + 1)
     if state == OVERDAMPED:
         message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"

@@ -74,10 +74,17 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
 
 @kernel
 def _solve_panel(
-    work: Work, node: FloatArray, radius: float, p: int, panels: int, y: float, complement: float,
-    finest: bool, polynomials: FloatArray,
-) -> bool:  # fmt: skip
-    """Solve panel p of `panels` with all that is asked of it; say whether it is resolved."""
+    work: Work,
+    node: FloatArray,
+    radius: float,
+    p: int,
+    panels: int,
+    y: float,
+    complement: float,
+    finest: bool,
+    polynomials: FloatArray,
+) -> bool:
+    """Solve panel p of `panels` with all that is asked of it; return whether it is resolved."""
     half_width = 0.5 * math.pi / panels
     place(node, 2.0 * p * half_width, half_width, complement)
     tolerance = math.inf if finest else LOSS_TOLERANCE
@@ -85,9 +92,15 @@ def _solve_panel(
         return False
     if work.sensitivities > 0:
         sensitivities(
-            node, work.shape, work.directions, radius, half_width,
-            work.sigma, work.shift, work.columns,
-        )  # fmt: skip
+            node,
+            work.shape,
+            work.directions,
+            radius,
+            half_width,
+            work.sigma,
+            work.shift,
+            work.columns,
+        )
     if polynomials.size == 0:
         return True
     return _in_time(work, node, radius, half_width, y, polynomials) or finest
@@ -95,10 +108,14 @@ def _solve_panel(
 
 @kernel
 def _in_time(
-    work: Work, node: FloatArray, radius: float, half_width: float, y: float,
+    work: Work,
+    node: FloatArray,
+    radius: float,
+    half_width: float,
+    y: float,
     polynomials: FloatArray,
-) -> bool:  # fmt: skip
-    """Write a solved panel's polynomials in time; say whether they resolve the waveform."""
+) -> bool:
+    """Write a solved panel's polynomials in time; return whether they resolve the waveform."""
     n, count = NODE_COUNT, work.sensitivities
     time_nodes(node, half_width, work.chebyshev)
     waveform = work.columns[count]
@@ -119,7 +136,7 @@ def _in_time(
 
 @kernel
 def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: FloatArray) -> bool:
-    """Solve a half cycle on `panels` equal panels into `row`; say whether these resolve it."""
+    """Solve a half cycle on `panels` equal panels into `row`; return whether these resolve it."""
     m = work.shape[0]
     radius = y - m
     _start(work, radius)
@@ -129,9 +146,16 @@ def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: F
     for p in range(panels):
         node = work.nodes[(panels + p) % SLOTS]
         if not _solve_panel(
-            work, node, radius * (1.0 + change), p, panels, y, complement, False,
+            work,
+            node,
+            radius * (1.0 + change),
+            p,
+            panels,
+            y,
+            complement,
+            False,
             row[at + 1 : at + width],
-        ):  # fmt: skip
+        ):
             return False
         excess += node[EXCESS + DEGREE]
         if width > 0:
@@ -171,9 +195,16 @@ def direct_half_cycle(
         for c in range(work.sensitivities):
             work.kept[0, c], work.kept[1, c] = work.sigma[c], work.shift[c]
         if not _solve_panel(
-            work, node, radius * (1.0 + change), k, panels, y, complement, level >= FINEST,
+            work,
+            node,
+            radius * (1.0 + change),
+            k,
+            panels,
+            y,
+            complement,
+            level >= FINEST,
             row[at : at + width],
-        ):  # fmt: skip
+        ):
             if level >= FINEST:
                 return y, 0.0, first, -1
             for c in range(work.sensitivities):

@@ -1,7 +1,7 @@
 """What the engine and its callers must agree on, free of Numba: sizes, and where what lies.
 
 A call hands over one array of integers (`REQUEST`) and one of numbers, the workspace: the engine
-allocates nothing. `FIELDS` says where in the workspace each array of the engine lies.
+allocates nothing. `FIELDS` declares where in the workspace each array of the engine lies.
 """
 
 from __future__ import annotations
@@ -32,14 +32,34 @@ RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
 """How a march ends."""
 
 REQUEST: Final = (
-    "workspace", "rates", "tabulate", "most", "time_s", "samples", "angle_rad", "jacobian",
-    "turning", "room", "readings", "compared", "sums",
-)  # fmt: skip
+    "workspace",
+    "rates",
+    "tabulate",
+    "most",
+    "time_s",
+    "samples",
+    "angle_rad",
+    "jacobian",
+    "turning",
+    "room",
+    "readings",
+    "compared",
+    "sums",
+)
 """A call's integers: addresses of arrays; numbers of rates, samples, turning points, readings."""
 COUNTS: Final = (
-    "rates", "sensitivities", "parameters", "samples", "written", "recorded", "room", "compared",
-    "summed", "polynomials", "width",
-)  # fmt: skip
+    "rates",
+    "sensitivities",
+    "parameters",
+    "samples",
+    "written",
+    "recorded",
+    "room",
+    "compared",
+    "summed",
+    "polynomials",
+    "width",
+)
 """Numbers of rates; of sensitivities (to the amplitude and those); of columns of the Jacobian; of
 samples, and of those of which the Jacobian is written; of what is recorded of a turning point, and
 of how many; of readings to compare with, and of the sums that this gives; of the polynomials of a

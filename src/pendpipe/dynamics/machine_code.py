@@ -37,13 +37,13 @@ PORTABLE = {"x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcn
 
 
 def can_be_portable() -> bool:
-    """Say whether code made here runs on other machines: only where PORTABLE names processors."""
+    """Return whether code made here runs on other machines: on processors that PORTABLE names."""
     return llvm.get_default_triple().partition("-")[0] in PORTABLE
 
 
 def _target_machine(portable: bool = False) -> Any:
     """Return LLVM's idea of this machine, or of all those that `PORTABLE` names."""
-    with contextlib.suppress(RuntimeError):  # newer versions have done it already, and say so
+    with contextlib.suppress(RuntimeError):  # newer versions have done it already, and warn
         llvm.initialize()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -119,7 +119,7 @@ def load(path: Path) -> tuple[list[int], Any] | None:
 
 
 def _provide(name: str) -> None:
-    """Tell LLVM where a function is; AttributeError if the C library lacks it."""
+    """Give LLVM the address of a function; AttributeError if the C library lacks it."""
     if llvm.address_of_symbol(name) is not None:
         return
     library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)

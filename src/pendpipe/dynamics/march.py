@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 @kernel
 def sticks(shape: FloatArray, y: float) -> bool:
-    """Say whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y C(y).
+    """Return whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y C(y).
 
     So it does, for all that could ever matter, below 1e-120 rad, where squares soon underflow.
     """

@@ -12,13 +12,26 @@ if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
 
 JACOBIAN_COLUMNS = (
-    "quadratic", "hysteretic", "viscous", "coulomb", "angular_frequency", "angle", "time", "offset",
-)  # fmt: skip
+    "quadratic",
+    "hysteretic",
+    "viscous",
+    "coulomb",
+    "angular_frequency",
+    "angle",
+    "time",
+    "offset",
+)
 """The columns of every Jacobian, in this order, with b in its two parts."""
 
 JOINT_JACOBIAN_COLUMNS = (
-    "quadratic", "linear", "coulomb", "angular_frequency", "angle", "time", "offset",
-)  # fmt: skip
+    "quadratic",
+    "linear",
+    "coulomb",
+    "angular_frequency",
+    "angle",
+    "time",
+    "offset",
+)
 """The columns with b as one, its hysteretic share given."""
 
 
@@ -175,7 +188,7 @@ class Release:
     time_s
         When.
     angle_rad
-        Where, about the equilibrium; the sign says on which side.
+        Where, about the equilibrium; its sign is the side.
     offset_rad
         What is added to every reading: the reading of the equilibrium.
     """

@@ -226,7 +226,7 @@ def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
 def solve(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
-    """Solve the phase clock on a panel by Picard's iteration, and say whether it is resolved.
+    """Solve the phase clock on a panel by Picard's iteration, and return whether it is resolved.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def solve(
 def _finish(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
-    """Integrate tau - w, and say whether the panel is resolved to `tolerance`."""
+    """Integrate tau - w, and return whether the panel is resolved to `tolerance`."""
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
     _bend(node, shape, radius)
     turned_back = 0

@@ -117,9 +117,15 @@ def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) ->
 
     first = np.rint(joined("_first")).astype(np.intp)
     return Sampled(
-        pieces[-1][1], time_s, joined("phase"), joined("amplitude"), joined("cosine"),
-        joined("sine"), first, joined("_weights"),
-    )  # fmt: skip
+        pieces[-1][1],
+        time_s,
+        joined("phase"),
+        joined("amplitude"),
+        joined("cosine"),
+        joined("sine"),
+        first,
+        joined("_weights"),
+    )
 
 
 def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:

@@ -72,7 +72,7 @@ def points_for(shape: FloatArray, log_y: float, span: float) -> int:
 def half_cycles_and_span(
     shape: FloatArray, log_y: float, half_cycles: float, room: float
 ) -> tuple[float, float]:
-    """Foresee how far ln y falls in `half_cycles`, at most by `room`: half cycles, span.
+    """Estimate how far ln y falls in `half_cycles`, at most by `room`: half cycles, span.
 
     By the slow equation 13, ln(y/y') = 2 (delta/y + h + q y) + pi g, good to a few per cent and
     only used to lay out tables: nothing is lost but time if it is wrong.
@@ -130,7 +130,7 @@ def _interpolate(
     excess: float,
     table: FloatArray,
 ) -> bool:
-    """Turn the solved rows into polynomials in z; say whether their coefficients have died out."""
+    """Turn the solved rows into polynomials in z; return whether their coefficients die out."""
     for k in range(points):
         for j in range(width):
             table[k, j] = 0.0

@@ -27,9 +27,12 @@ HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, 
 def pendulum_of(value: FloatArray) -> Pendulum:
     """The baseline's constants from its values."""
     return Pendulum(
-        float(value[OMEGA]), float(value[A]), float(value[SHARE] * value[B]),
-        float((1.0 - value[SHARE]) * value[B]), float(value[C]),
-    )  # fmt: skip
+        float(value[OMEGA]),
+        float(value[A]),
+        float(value[SHARE] * value[B]),
+        float((1.0 - value[SHARE]) * value[B]),
+        float(value[C]),
+    )
 
 
 def closed_form(value: FloatArray, clock: Clock) -> Motion:

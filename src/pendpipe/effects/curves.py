@@ -311,9 +311,14 @@ def usual_loss_rate(pendulum: Pendulum, span: Span) -> float:
 
 
 CURVES: Sequence[type[Curve]] = (
-    RestoringCurve, DampingCurve, FrictionCurve, ProfileCurve, DriveCurve, ReadingCurve,
+    RestoringCurve,
+    DampingCurve,
+    FrictionCurve,
+    ProfileCurve,
+    DriveCurve,
+    ReadingCurve,
     OffsetCurve,
-)  # fmt: skip
+)
 
 
 class MemoryCurve(FrictionCurve):

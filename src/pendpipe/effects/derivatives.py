@@ -25,9 +25,11 @@ def response(
 
 
 def responses(
-    effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]], at: Evaluated,
+    effect: Effect,
+    changes: Sequence[tuple[FloatArray, FloatArray]],
+    at: Evaluated,
     pendulum: Pendulum,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Change of the readings for each pair of values, shape (changes, n)."""
     sampled, tangent = at.sampled, at.tangent
     total = np.zeros((len(changes), len(sampled.time_s)))

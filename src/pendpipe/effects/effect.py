@@ -84,9 +84,15 @@ class Pendulum:
         """Return x'' + omega^2 x of Eq. 8 at the nodes, rad/s^2."""
         omega = self.angular_frequency
         speed = omega * motion.amplitude
-        friction = 0.5 * math.pi * (
-            omega * self.coulomb + self.hysteretic * speed + self.quadratic / omega * speed * speed
-        )  # fmt: skip
+        friction = (
+            0.5
+            * math.pi
+            * (
+                omega * self.coulomb
+                + self.hysteretic * speed
+                + self.quadratic / omega * speed * speed
+            )
+        )
         return -motion.direction * friction - 2.0 * self.viscous * motion.velocity
 
 
@@ -117,7 +123,7 @@ class Span(NamedTuple):
     def times(self, count: int) -> FloatArray:
         """Instants for a scan: inside the record, one and a half periods from its ends.
 
-        They lie closer towards the ends, where there is less from which to tell them.
+        They lie closer towards the ends, where less of the record determines them.
         """
         edge = min(1.5 * self.period_s, 0.25 * self.duration_s)
         share = np.linspace(0.0, 1.0, count)
@@ -177,7 +183,7 @@ class Effect:
 
     @property
     def key(self) -> str:
-        """What tells it from other entries."""
+        """What distinguishes it from other entries."""
         return self.identifier
 
     @property

@@ -44,10 +44,17 @@ def _entry(effect: Effect) -> str:
     test = effect.discriminating_test
     text = inspect.cleandoc(type(effect).__doc__ or "")
     lines = [
-        f"### {effect.identifier}", "", f"*{effect.name[0].upper()}{effect.name[1:]}.* {text}", "",
-        f"$${effect.equation}$$", "", *_table(effect), *_remarks(effect), "",
+        f"### {effect.identifier}",
+        "",
+        f"*{effect.name[0].upper()}{effect.name[1:]}.* {text}",
+        "",
+        f"$${effect.equation}$$",
+        "",
+        *_table(effect),
+        *_remarks(effect),
+        "",
         f"What decides: {test}{'' if test.endswith('?') else '.'}",
-    ]  # fmt: skip
+    ]
     return "\n".join(lines)
 
 

@@ -205,10 +205,15 @@ class Model:
     def span(self, value: FloatArray, sampled: Sampled) -> Span:
         """What the scans of effects must know."""
         return Span(
-            float(self.time_s[0]), float(self.time_s[-1]), self.interval_s, self.pendulum(value),
-            float(sampled.amplitude[0]), float(sampled.amplitude[-1]), float(value[OFFSET]),
+            float(self.time_s[0]),
+            float(self.time_s[-1]),
+            self.interval_s,
+            self.pendulum(value),
+            float(sampled.amplitude[0]),
+            float(sampled.amplitude[-1]),
+            float(value[OFFSET]),
             self.fold,
-        )  # fmt: skip
+        )
 
     def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
         """Return x'' + omega^2 x of the baseline and of all effects."""

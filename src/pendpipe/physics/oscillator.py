@@ -62,7 +62,7 @@ def viscous_frequency_ratio(quality_factor: Numbers) -> FloatArray:
 def hysteretic_frequency_shift(quality_factor: Numbers) -> FloatArray:
     """Relative frequency shift of Eq. 8's hysteretic term to leading order: ``-pi^2/(32 Q_h^2)``.
 
-    The paper says that there is none; Eq. 8 itself has one, 2.5 times that of Eq. 6.
+    According to the paper there is none; Eq. 8 itself has one, 2.5 times that of Eq. 6.
     """
     (quality,) = floats(quality_factor)
     return plain(-(np.pi**2) / (32.0 * quality**2))

@@ -64,7 +64,7 @@ def swing(
     plain_added_mass
         Use 1/2 of the displaced fluid for a sphere, whatever the frequency.
     buoyancy, added_mass
-        Whether each of the two is counted; both are, except to tell them apart.
+        Whether each of the two is counted; both are, except to compare them.
 
     Returns
     -------

@@ -36,8 +36,10 @@ def read_effects(place: str | Path, tables: Sequence[Mapping[str, Any]]) -> list
     InputError
         Where an identifier or a parameter is unknown, missing, or out of its bounds.
     """
-    return [_read(f"{place}, effects {number}", dict(table)) for number, table in
-            enumerate(tables, start=1)]  # fmt: skip
+    return [
+        _read(f"{place}, effects {number}", dict(table))
+        for number, table in enumerate(tables, start=1)
+    ]
 
 
 def _read(place: str, table: dict[str, Any]) -> Given:
@@ -63,7 +65,8 @@ def _value(place: str, parameter: Parameter, table: Mapping[str, Any]) -> float:
         raise InputError(place, f"'{parameter.name}' is no number", f"give a number{unit}")
     if not parameter.low <= given <= parameter.high:
         raise InputError(
-            place, f"'{parameter.name}' is {given:g}",
+            place,
+            f"'{parameter.name}' is {given:g}",
             f"give a number from {parameter.low:g} to {parameter.high:g}{unit}",
-        )  # fmt: skip
+        )
     return float(given)

@@ -170,7 +170,7 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
     Parameters
     ----------
     model, source
-        What is simulated, and what the recording says of itself.
+        What is simulated, and what the recording gives as its source.
     place
         For messages about its effects.
 

@@ -38,9 +38,14 @@ def angles(
     linear = equation.hysteretic + equation.viscous
     share = equation.hysteretic / linear if linear else 0.0
     value[:7] = (
-        equation.quadratic, linear, equation.coulomb, share, equation.angular_frequency,
-        release.angle_rad, release.time_s,
-    )  # fmt: skip
+        equation.quadratic,
+        linear,
+        equation.coulomb,
+        share,
+        equation.angular_frequency,
+        release.angle_rad,
+        release.time_s,
+    )
     value = np.concatenate([value, *(one.values for one in given)])
     order = 24 if abs(release.angle_rad) < 1.5 else 64
     interval = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0

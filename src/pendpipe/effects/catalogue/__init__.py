@@ -17,9 +17,16 @@ from pendpipe.effects.effect import Effect
 from pendpipe.errors import InputError
 
 _FIRST: Final = (
-    "restoring", "damping", "contact", "fluid", "oscillations", "changes", "sensor", "time_base",
+    "restoring",
+    "damping",
+    "contact",
+    "fluid",
+    "oscillations",
+    "changes",
+    "sensor",
+    "time_base",
     "noise",
-)  # fmt: skip
+)
 """The order of the manual: dynamics, then measurement. Other modules follow by name."""
 
 
@@ -60,7 +67,7 @@ def by_identifier(name: str, place: str | Path = "effect") -> Effect:
     Raises
     ------
     InputError
-        If there is none; the nearest name is said.
+        If there is none; the message gives the nearest name.
     """
     found = _BY_IDENTIFIER.get(name)
     if found is None:

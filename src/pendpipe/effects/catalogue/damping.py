@@ -107,7 +107,7 @@ class PowerLawDamping(Effect):
 
     The amplitude falls as its n-th power. `energy_form` 0 is the velocity's law, whose third
     harmonic is (n - 1)/(n + 3) of the friction's first; 1 is Eq. 9a's with lambda = n/2,
-    whose third harmonic is -1/3 whatever n; the envelope does not tell them apart.
+    whose third harmonic is -1/3 whatever n; the envelope does not distinguish them.
     """
 
     identifier = "power-law-damping"
@@ -162,7 +162,7 @@ class CubicDamping(Effect):
     example = (0.5, 0.4)
     discriminating_test = (
         "release it with twice the amplitude: the sign of the third harmonic in quadrature "
-        "tells v^3 from x^2 v"
+        "distinguishes v^3 from x^2 v"
     )
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:

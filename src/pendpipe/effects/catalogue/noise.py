@@ -29,7 +29,7 @@ class Glitches(Effect):
 class ColouredNoise(Effect):
     """Noise that grows to low frequencies.
 
-    The diagnosis tells how steeply it falls about the pendulum's own frequency: the slope
+    The diagnosis reports how steeply it falls about the pendulum's own frequency: the slope
     -d ln S/d ln f, which is alpha far below the corner and less about it.
     """
 

@@ -181,7 +181,7 @@ class Clipping(Effect):
     """Readings beyond the range are cut off: sharply, or over a width w about the level.
 
     With a width the upper end reads y = L - w ln(1 + e^((L - x)/w)). What is sharp is found
-    by the largest reading, what is soft by its shape. The diagnosis tells a sharp level as it
+    by the largest reading, what is soft by its shape. The diagnosis reports a sharp level as it
     stands in the readings, and of a soft end what the largest angle loses by it.
     """
 
@@ -243,9 +243,10 @@ class SoftClipping(Effect):
     kind = "measurement"
     equation = r"y = x - w \ln\left[1 + (e^{d/w} - 1)\, e^{(x - x_\mathrm{top})/w}\right]"
     parameters = (
-        Parameter("upper_loss", "rad", 0.0, 10.0), Parameter("lower_loss", "rad", 0.0, 10.0),
+        Parameter("upper_loss", "rad", 0.0, 10.0),
+        Parameter("lower_loss", "rad", 0.0, 10.0),
         Parameter("width", "rad", 1e-7, 10.0),
-    )  # fmt: skip
+    )
     sizes = 2
     discriminating_test = "widen the range, or release it with less amplitude"
 

@@ -81,7 +81,7 @@ class DroppedSamples(Sudden):
         """Return what a part of a sample costs.
 
         Samples are lost whole. Less than one is lost where the instrument itself reads n times
-        as fast as it tells, which is the less likely the larger n: by 1/n.
+        as fast as it reports, which is the less likely the larger n: by 1/n.
         """
         part = abs(float(values[0])) * span.fold / span.interval_s
         return -2.0 * math.log(min(max(part, 1e-6), 1.0))
