@@ -83,8 +83,15 @@ def motion(random: Random) -> tuple[Floats, Floats, float]:
     size = amplitude * np.exp(-decay * time)
     slower = size**2 / 16 + 11 * size**4 / 3072 if gravity else 0.0 * size
     phase = np.cumsum(2 * np.pi / period / (1 + slower)) / rate
+    swing = size * np.cos(phase)
+    # At rest, then pulled aside by hand before the release; at rest again in the end.
+    before = random.choice((0, 0, int(0.1 * len(time)), int(0.4 * len(time))))
+    after = random.choice((0, 0, int(0.3 * len(time))))
+    pull = np.linspace(0.0, amplitude, before // 4)
+    swing = np.concatenate((np.zeros(before - len(pull)), pull, swing, np.zeros(after)))
+    time = np.arange(len(swing)) / rate
     noise = np.random.default_rng(random.randrange(1 << 30)).standard_normal(len(time))
-    return time, size * np.cos(phase) + 3e-4 * amplitude * noise, period
+    return time, swing + 3e-4 * amplitude * noise, period
 
 
 def written(value: float, digits: int, decimal: str) -> str:

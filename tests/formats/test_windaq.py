@@ -101,7 +101,7 @@ def test_a_damaged_data_size_is_mended_from_the_trailers(tmp_path: Path, size: i
     found = inspect(write(tmp_path / "a.WDQ", content))
     assert found.samples == 2000
     assert [mark.sample for mark in found.markers] == [0, 500, 1200]
-    assert any("mended to 2000 scans" in warning for warning in found.warnings)
+    assert any("repaired to 2000 scans" in warning for warning in found.warnings)
 
 
 def test_a_file_that_is_cut_short_gives_its_whole_scans(tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_a_di149_capture_is_scaled_and_timed(tmp_path: Path) -> None:
     recording = read(path, ReadOptions(channel="1"))
     np.testing.assert_allclose(recording.values[:2], [0.05859375, 5.0])
     assert recording.time_s[1] == pytest.approx(65535 / 750_000)
-    assert any("does not say its srate" in note for note in recording.notes)
+    assert any("does not give its srate" in note for note in recording.notes)
     assert read(path, ReadOptions(channel="2")).values[0] == -10.0
     path.write_text("srate 300\nstart\n" + "sc 1\nsc 2\n" * 20 + "stop\n")
     assert read(path).time_s[1] == pytest.approx(300 / 750_000)

@@ -39,7 +39,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         raise InputError(place, "this is an old Excel file (.xls)", "save it as .xlsx or CSV")
     if not data.startswith(b"PK"):
         raise NotThisFormatError("the file is no zip archive")
-    with _said_in_one_line(place), zipfile.ZipFile(io.BytesIO(data)) as archive:
+    with _one_line_errors(place), zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = archive.infolist()
         whole = sum(part.file_size for part in parts)
         if whole > most_unpacked(len(data)):
@@ -53,7 +53,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 
 @contextmanager
-def _said_in_one_line(place: Path) -> Iterator[None]:
+def _one_line_errors(place: Path) -> Iterator[None]:
     """Whatever a damaged archive makes its readers raise becomes one clear line."""
     try:
         yield
@@ -113,7 +113,7 @@ def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
 
     from openpyxl import load_workbook
 
-    with _said_in_one_line(place):
+    with _one_line_errors(place):
         _refuse_too_many_cells(data)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -156,7 +156,7 @@ def _refuse_too_many_cells(data: bytes) -> None:
 
 
 def _rows(sheet: Any) -> list[tuple[Any, ...]]:
-    """Read the filled rows; what the file says of their number and width is not believed."""
+    """Read the filled rows; their number and width in the file are not trusted."""
     sheet.reset_dimensions()
     rows = islice(sheet.values, _MOST_ROWS + 1)
     filled = []

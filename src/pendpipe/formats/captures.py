@@ -41,7 +41,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     NotThisFormatError
         When there is no ``sc`` line.
     InputError
-        When a scan is spoilt.
+        When a scan is damaged.
     """
     if not re.search(rb"(^|[\r\n])sc\s+[+-]?\d", data[:65536]):
         raise NotThisFormatError("there is no line 'sc' with counts")
@@ -56,7 +56,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     notes = [*scans.notes]
     if not srate and options.sample_rate is None:
         srate = _SLOWEST
-        notes.append("the capture does not say its srate: 65535 (11.44 Hz) is taken")
+        notes.append("the capture does not give its srate: 65535 (11.44 Hz) is taken")
     columns = tuple(
         Column(
             name=f"channel {channel + 1}",
@@ -112,7 +112,7 @@ def _unbroken(text: str, first: int, end: int) -> _Scans | None:
 
 
 def _line_by_line(place: Path, lines: Sequence[str]) -> _Scans:
-    """Read the scans one by one, and name the line of a spoilt one."""
+    """Read the scans one by one, and name the line of a damaged one."""
     scans: list[list[int]] = []
     numbers: list[int] = []
     notes: list[str] = []
@@ -143,8 +143,8 @@ def _told(lines: Sequence[str]) -> tuple[dict[str, str], int | None]:
     srate = None
     for line in lines:
         text = line.strip()
-        if told := re.search(r"srate\s+(x[0-9a-f]{1,8}|\d{1,9})", text):
-            srate = int(told[1][1:], 16) if told[1][0] == "x" else int(told[1])
+        if match := re.search(r"srate\s+(x[0-9a-f]{1,8}|\d{1,9})", text):
+            srate = int(match[1][1:], 16) if match[1][0] == "x" else int(match[1])
         if re.fullmatch(r"1\d{9}(\.\d+)?", text):
             metadata["recorded_at"] = f"{text} s since 1970"
     return metadata, srate

@@ -196,8 +196,8 @@ def _time(
     Times may fall (the newest row first) and repeat (printed with few digits).
     """
     if options.time_column is not None:
-        told = find(table, table.columns, options.time_column)
-        return told, roles[told.number] == "index"
+        given = find(table, table.columns, options.time_column)
+        return given, roles[given.number] == "index"
     runs = [column for column in table.columns if roles[column.number] == "time"]
     wanted = options.reading_column or options.channel
     if wanted is not None and len(runs) > 1:
@@ -318,7 +318,7 @@ def _readings(
     nameless = len(alive) > 1 and roles[chosen[0].number] == "unknown" and len(chosen) == 1
     unclear = any_clear and not swings[chosen[0].number].clear
     if (nameless and not why) or unclear:
-        what = "its name does not say what it is" if not unclear else "it hardly oscillates"
+        what = "its name does not tell what it holds" if not unclear else "it hardly oscillates"
         return chosen, (), (f"{note}: {what} (--column)",)
     return chosen, (note,), ()
 
@@ -418,6 +418,8 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     angle = np.arctan2(x, np.abs(y))
     if np.std(radius) > 0.3 * np.std(x) or abs(np.median(angle)) > 0.4 or not swing_of(x).clear:
         return False
+    if named or not np.ptp(x**2) > 0.0 or not np.ptp(np.abs(y)) > 0.0:
+        return named
     # On a circle y follows x squared; two columns without names must show it.
     follows = np.corrcoef(x**2, np.abs(y))[0, 1] < -0.5 and np.std(radius) < 0.5 * np.std(y)
-    return named or (bool(follows) and one_way(y) < 0.9)
+    return bool(follows) and one_way(y) < 0.9

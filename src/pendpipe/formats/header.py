@@ -46,11 +46,13 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     """
     filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     names_at, cells = _names(filled, layout)
-    _refuse_spoilt_rows(place, filled, names_at, layout)
+    _refuse_damaged_rows(place, filled, names_at, layout)
     interval = _interval([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
     if not cells:
-        return Header((), (), interval, metadata, ("no header: columns are told by their shape",))
+        return Header(
+            (), (), interval, metadata, ("no header: columns are recognised by their values",)
+        )
     notes: tuple[str, ...] = ()
     pairs = [split_header(cell) for cell in cells]
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
@@ -102,7 +104,7 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
         bare = line.strip().lstrip("".join(COMMENT)).strip()
         own = layout.split(line)
         if candidates and len(own) == layout.width and all(map(layout.is_number, own)):
-            break  # the block has begun: what follows is a fault in it
+            break  # the block has begun: what follows is damaged
         for cells in _splits(line, layout):
             while len(cells) > layout.width and not cells[-1]:
                 cells.pop()
@@ -135,12 +137,12 @@ def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     return None
 
 
-def _refuse_spoilt_rows(
+def _refuse_damaged_rows(
     place: Path, filled: Sequence[tuple[int, str]], names_at: int, layout: Layout
 ) -> None:
     """Refuse text where the numbers begin: a row of the block's width under the names.
 
-    Rows of numbers alone are no fault; but then the line after them is, for the block
+    Rows of numbers alone are no damage; but then the line after them is, for the block
     would else begin with them.
     """
     below = [(number, line) for number, line in filled if names_at and number > names_at]
@@ -174,13 +176,13 @@ def _interval(lines: Sequence[str]) -> float | None:
             if value is None:
                 continue
             number = float(value[1].replace(",", "."))
-            told = (value[2] or "").lower() or line[found.end() : found.end() + 8].lower()
+            unit = (value[2] or "").lower() or line[found.end() : found.end() + 8].lower()
             if not 1e-9 < number < 1e12:
                 continue
             if inverse:
-                return 1.0 / (number * (1e3 if "khz" in told else 1.0))
+                return 1.0 / (number * (1e3 if "khz" in unit else 1.0))
             return number * (
-                1e-3 if "ms" in told else 1e-6 if "us" in told or "µs" in told else 1.0
+                1e-3 if "ms" in unit else 1e-6 if "us" in unit or "µs" in unit else 1.0
             )
     return None
 

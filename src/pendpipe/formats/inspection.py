@@ -1,4 +1,4 @@
-"""What ``pendpipe inspect`` says of a file."""
+"""What ``pendpipe inspect`` reports of a file."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Inspection:
 
 
 def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
-    """Say what a file holds, even where none of its channels could be analysed.
+    """Report what a file holds, even where none of its channels could be analysed.
 
     Raises
     ------

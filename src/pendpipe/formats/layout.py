@@ -26,7 +26,7 @@ _NAMES: Final = {
     "whitespace": " ",
     "pipe": "|",
 }
-_SPOKEN: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
+_SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DELIMITERS: Final = ("\t", ";", "|", ",", " ")
 COMMENT: Final = ("#", "%", "//", "!")
 MOST_COLUMNS: Final = 1024
@@ -71,10 +71,10 @@ class Layout:
         return _NUMBER.fullmatch(cell) is not None
 
     @property
-    def spoken(self) -> str:
+    def description(self) -> str:
         """The layout in words, for the notes."""
-        between = _SPOKEN.get(self.delimiter, repr(self.delimiter))
-        cells = f"columns apart by {between}" if self.width > 1 else "one column"
+        between = _SIGN_WORDS.get(self.delimiter, repr(self.delimiter))
+        cells = f"columns separated by {between}" if self.width > 1 else "one column"
         return cells + (", decimal commas" if self.decimal == "," else "")
 
 
@@ -96,7 +96,7 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
     full = [line for line in some if line.strip() and not is_comment(line)]
     step = max(1, len(full) // 200)
     sample = full[len(full) // 20 :: step]
-    # "0,025","0,5": the same sign twice, told apart by the quotes alone.
+    # "0,025","0,5": the same sign twice, separated by the quotes alone.
     quoted = any('"' in line for line in sample)
     candidates = [
         Layout(delimiter, decimal, 0)

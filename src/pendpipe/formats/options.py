@@ -1,4 +1,4 @@
-"""What a user may say about a file where a reader's guess is wrong."""
+"""Overrides for a file where a reader's guess is wrong."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pendpipe.errors import InputError
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Overrides of a reader's guesses; ``None`` everywhere means: guess, and say so.
+    """Overrides of a reader's guesses; ``None`` everywhere means: guess, and report the guess.
 
     Parameters
     ----------

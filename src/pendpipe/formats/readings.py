@@ -42,7 +42,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class _Guess:
-    """A unit, what to say of it, and whether it stands on slender grounds."""
+    """A unit, its reason, and whether it is a weak guess."""
 
     unit: Unit
     why: str = ""
@@ -70,10 +70,10 @@ def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatAr
     )
     if not guess.why:
         return found
-    said = f"'{column.label}' {guess.why}"
+    stated = f"'{column.label}' {guess.why}"
     if guess.weak:
-        return replace(found, weak_guesses=(f"{said} (--unit)",))
-    return replace(found, notes=(said, *notes))
+        return replace(found, weak_guesses=(f"{stated} (--unit)",))
+    return replace(found, notes=(stated, *notes))
 
 
 def _unit(
@@ -81,14 +81,14 @@ def _unit(
 ) -> _Guess:
     """Find the unit: from the user, from the file, or from the numbers."""
     if options.reading_unit is not None:
-        told = unit_of(options.reading_unit)
-        if told is None or told.kind not in _QUANTITIES:
+        given = unit_of(options.reading_unit)
+        if given is None or given.kind not in _QUANTITIES:
             raise InputError(
                 "--unit",
                 f"'{options.reading_unit}' is not known",
                 "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
             )
-        return _Guess(told)
+        return _Guess(given)
     written = unit_of(column.unit) if column.unit else None
     role = choice.roles.get(column.number, "unknown")
     if written is not None and written.kind in _QUANTITIES:
@@ -162,10 +162,10 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
         return _Guess(_RADIAN)
     reach = _reach(finite)
     words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
-    said = re.search(
+    stated = re.search(
         r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
     )
-    if said and "rad" not in words.replace("grad", ""):
+    if stated and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     by_step = _by_step(finite)
     if by_step is not None:

@@ -205,6 +205,8 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     kernel = np.array([0.25, 0.5, 0.25])
     rate, other = np.convolve(rate, kernel, "valid"), np.convolve(other, kernel, "valid")
     rate, other = rate - rate.mean(), other - other.mean()
+    if not max(np.abs(rate).max(), np.abs(other).max()) < 1e70:
+        return None
     both = float(rate @ rate) * float(other @ other)
     if not 0.0 < both < _ABSURD:
         return None

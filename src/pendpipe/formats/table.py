@@ -41,7 +41,7 @@ class Column:
     time_s
         The channel's own time base, where the instrument gives one.
     resolution
-        Step of the converter in `unit`, where the file says it.
+        Step of the converter in `unit`, where the file gives it.
     limits
         The lowest and the highest value that the converter can give.
     """
@@ -78,9 +78,9 @@ class Table:
         The line (or row) of the file that each row came from, shape (n,); ``None`` where
         the format has no lines.
     interval_s
-        Time between samples, where the file says it apart from a time column.
+        Time between samples, where the file gives it apart from a time column.
     markers, metadata, notes
-        Events; what stood beside the numbers; what was guessed or mended.
+        Events; what stood beside the numbers; what was guessed or repaired.
     """
 
     place: Path

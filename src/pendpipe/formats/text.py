@@ -95,7 +95,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         lines=numbers,
         interval_s=header.interval_s,
         metadata=header.metadata,
-        notes=(layout.spoken, *header.notes, *notes, *cut),
+        notes=(layout.description, *header.notes, *notes, *cut),
     )
 
 
@@ -214,7 +214,7 @@ def _at_once(
 def _rows(
     lines: Sequence[str], first: int, layout: Layout
 ) -> tuple[list[str], IntArray, list[str]]:
-    """Pick the rows of the block, with their line numbers; say what is left out."""
+    """Pick the rows of the block, with their line numbers; report what is left out."""
     rows: list[str] = []
     numbers: list[int] = []
     remarks = 0
@@ -249,7 +249,7 @@ def _columns(
     if width > max(_WIDEST, 4 * layout.width):
         row = int(np.argmax([len(row) for row in cells]))
         raise InputError(
-            f"{place}, line {numbers[row]}", f"{width} cells in a row", "mend or drop the row"
+            f"{place}, line {numbers[row]}", f"{width} cells in a row", "correct or drop the row"
         )
     columns = []
     for column in range(width):

@@ -70,7 +70,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
         note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
         if column is None:
             return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
-        _refuse_holes(table, column, np.ones(len(every), dtype=bool))
+        _refuse_missing_times(table, column, np.ones(len(every), dtype=bool))
         time = (column.values - column.values[0]) * table.interval_s
         base = TimeBase(time, every, [f"{note} and '{column.label}'"])
         return _in_order(table, choice, base, table.interval_s)
@@ -91,7 +91,7 @@ def _from_column(
         # Of runs side by side one is shorter.
         empty = np.zeros(len(filled), dtype=bool) if reading.blank is None else reading.blank
         filled &= ~(column.blank & (empty | ~np.isfinite(reading.values)))
-    _refuse_holes(table, column, filled)
+    _refuse_missing_times(table, column, filled)
     factor, note, weak = _unit(column, reading, options)
     rows = np.flatnonzero(filled)
     base = TimeBase(column.values[rows] * factor, rows)
@@ -104,7 +104,7 @@ def _from_column(
     return _in_order(table, choice, base, factor)
 
 
-def _refuse_holes(table: Table, column: Column, rows: BoolArray) -> None:
+def _refuse_missing_times(table: Table, column: Column, rows: BoolArray) -> None:
     if column.fault is not None:
         row, text = column.fault
         raise InputError(table.where(row), f"'{text}' is no number", "correct or drop the row")
@@ -116,14 +116,14 @@ def _refuse_holes(table: Table, column: Column, rows: BoolArray) -> None:
 
 
 def _unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
-    """Find the seconds in one unit of the time column, what to say, and if it is weak."""
+    """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
     if options.time_unit is not None:
-        told = unit_of(options.time_unit)
-        if told is None or told.kind != "time":
+        given = unit_of(options.time_unit)
+        if given is None or given.kind != "time":
             raise InputError(
                 "--unit", f"'{options.time_unit}' is no unit of time", "give s, ms, us"
             )
-        return told.factor, "", False
+        return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
     for least, factor, name in _EPOCHS:
@@ -244,7 +244,7 @@ def _first_of_stacked(base: TimeBase) -> None:
 def _rounded(time: FloatArray) -> FloatArray | None:
     """Undo the rounding of evenly spaced time stamps; ``None`` if they are not that.
 
-    Each row is counted one interval after the row above, or, where a stamp says that frames
+    Each row is counted one interval after the row above, or, where a stamp shows that frames
     are missing, as many as bring it within the stamp's last digit. The interval with which
     fewest are missing is right.
     """

@@ -2,7 +2,7 @@
 
 Layout after the CODAS data-format description: little-endian throughout, no magic at the
 start; the only mark is 0x8001 in the header's last two bytes. Behind the samples stand events,
-annotations and comments, which also tell of pauses, and what a damaged header should say.
+annotations and comments, which also hold pauses, and what a damaged header lost.
 """
 
 from __future__ import annotations
@@ -145,24 +145,26 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     promised = place.suffix.lower() in (".wdh", ".whc")
     if ours and promised != header.hires:
         kind = "HiRes" if header.hires else "14-bit"
-        notes.append(f"the header says {kind}, the name {place.suffix} does not: the header counts")
+        notes.append(
+            f"the header is that of {kind}, the name {place.suffix} is not: the header is believed"
+        )
     return replace(header, notes=tuple(notes))
 
 
 def _size(data: bytes) -> tuple[int, list[str]]:
-    """Find the header's size: where it says so, or where the mark is."""
+    """Find the header's size: as stated, or by the mark."""
     if len(data) < 1156:
         return 0, []
 
     def marked(size: int) -> bool:
         return 110 < size <= len(data) and struct.unpack_from("<H", data, size - 2)[0] == _MARK
 
-    told = struct.unpack_from("<h", data, 6)[0]
-    if marked(told):
-        return told, []
+    stated = struct.unpack_from("<h", data, 6)[0]
+    if marked(stated):
+        return stated, []
     for size in _SIZES:
         if marked(size) and data[4] == 110 and data[5] == 36:
-            return size, [f"the header's own size ({told}) is damaged: {size} bytes by its mark"]
+            return size, [f"the header's own size ({stated}) is damaged: {size} bytes by its mark"]
     return 0, []
 
 
@@ -275,11 +277,11 @@ def _texts_from(data: bytes) -> int:
     return len(data) - len(tail) + (int(odd[-1]) + 1 if len(odd) else 0)
 
 
-def mended(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers] | None:
+def repaired(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers] | None:
     """Find sizes under which a file with damaged ones makes sense from end to end.
 
     The data size is sought among the header's with bits taken away (a bit that was set by
-    damage is the commonest fault), then among all. The trailers it implies must read as
+    damage is the commonest damage), then among all. The trailers it implies must read as
     events, then as texts to the end of the file.
     """
     unit = 2 * len(header.channels)
@@ -345,7 +347,7 @@ def scan_times(
     WinDaq strings the samples together over a pause; only the stamp of the event that
     follows tells of it. A stamp that is ahead of the samples by more than two seconds (and
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
-    known to a second. A comment of `gap_comment` says it exactly, where the stamp agrees.
+    known to a second. A comment of `gap_comment` gives it exactly, where the stamp agrees.
     """
     steps = np.zeros(scans)
     notes = []
@@ -355,9 +357,9 @@ def scan_times(
             continue
         expected = event.scan * header.interval_s + lag
         missing = event.stamp_s - expected
-        told = _GAP.match(event.comment)
-        if told and abs(missing - float(told[1])) <= _PAUSE:
-            missing = float(told[1])
+        match = _GAP.match(event.comment)
+        if match and abs(missing - float(match[1])) <= _PAUSE:
+            missing = float(match[1])
             notes.append(f"gap of {missing:.6g} s before scan {event.scan}, by its comment")
         elif missing > max(_PAUSE, 0.01 * (expected - since)):
             notes.append(f"pause of {missing:.0f} s before scan {event.scan}, by its time stamp")
@@ -430,18 +432,18 @@ def _checked(
     at = header.size + 2 * _words(header)
     if header.data_bytes and at <= len(data) and header.data_bytes % unit == 0:
         trailers = parse_trailers(data, at, header.event_bytes, header, header.scans)
-        said = [] if trailers else ["the list of events is damaged: no markers"]
+        notes = [] if trailers else ["the list of events is damaged: no markers"]
         if trailers and at + header.event_bytes + header.annotation_bytes > len(data):
-            said.append(
+            notes.append(
                 f"the header's size of the annotations ({header.annotation_bytes}) is wrong"
             )
-        return header, trailers, said
-    found = mended(data, header)
+        return header, trailers, notes
+    found = repaired(data, header)
     if found is not None:
         header_found, trailers = found
         note = (
             f"the header is damaged (data size {header.data_bytes} in a file of {len(data)} bytes):"
-            f" mended to {header_found.scans} scans, which agree with the trailers"
+            f" repaired to {header_found.scans} scans, which agree with the trailers"
         )
         return header_found, trailers, [note]
     if header.data_bytes > 64 * max(available, 1) or available < unit:

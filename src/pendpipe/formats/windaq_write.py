@@ -2,7 +2,7 @@
 
 Laid out after the CODAS data-format description. What WinDaq's screen needs (windows,
 keys, cursors) is set as in the files that WinDaq itself writes for one time window; nothing of
-it says anything of the samples.
+it concerns the samples.
 """
 
 from __future__ import annotations

@@ -230,7 +230,7 @@ _PATTERNS: Final = tuple(
 
 
 def role_of(name: str) -> Role:
-    """Say what a column's name (without its unit) promises.
+    """Tell what a column's name (without its unit) promises.
 
     Examples
     --------
@@ -246,7 +246,7 @@ def role_of(name: str) -> Role:
                 return role
     for role, pattern in _PATTERNS:
         found = pattern.search(whole)
-        # One letter inside a longer name ("pendulum a") says little.
+        # One letter inside a longer name ("pendulum a") means little.
         while found is not None and len(found[0]) == 1 and found[0].isascii():
             found = pattern.search(whole, found.end())
         if found is not None:

@@ -80,7 +80,7 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
     if pauses:
         notes.append(
             f"{len(pauses)} gap(s) of {sum(p.missing_s for p in pauses):.6g} s in all"
-            " are pauses, each with an event that says its length"
+            " are pauses, each with an event that gives its length"
         )
     if worst > _WORTH_SAYING:
         notes.append(f"times moved by up to {worst:.2g} of an interval, onto an even grid")
@@ -143,7 +143,7 @@ def write(path: str | Path, recording: Recording) -> tuple[str, ...]:
 
 
 def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[str, ...]]:
-    """Turn a recording into the bytes of a HiRes file, and say what was lost by it.
+    """Turn a recording into the bytes of a HiRes file, with notes of what was lost by it.
 
     Gaps are pauses: the samples are strung together, and an event before the first one
     behind a gap has its time stamp (whole seconds) and the gap's length as its comment.
@@ -229,22 +229,22 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
 def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> list[WrittenEvent]:
     """Gather pauses, markers and the starts of suspect stretches, in the order of scans."""
     time_s = recording.time_s[rows]
-    told: dict[int, list[str]] = {}
+    by_scan: dict[int, list[str]] = {}
     for pause in pauses:
-        told.setdefault(pause.before_scan, []).append(gap_comment(pause.missing_s))
+        by_scan.setdefault(pause.before_scan, []).append(gap_comment(pause.missing_s))
     for mark in markers_of(recording):
         scan = int(np.clip(np.searchsorted(time_s, mark.time_s - 1e-9), 0, len(rows) - 1))
-        comments = told.setdefault(scan, [])
+        comments = by_scan.setdefault(scan, [])
         if mark.comment not in comments:
             comments.append(mark.comment)
     if recording.quality is not None:
         suspect = recording.quality[rows] == SUSPECT
         starts = suspect & ~np.concatenate(([False], suspect[:-1]))
         for scan in np.flatnonzero(starts).tolist():
-            told.setdefault(scan, []).append("suspect")
+            by_scan.setdefault(scan, []).append("suspect")
     return [
         WrittenEvent(scan, round(float(time_s[scan] - time_s[0])), _joined(comments))
-        for scan, comments in sorted(told.items())
+        for scan, comments in sorted(by_scan.items())
     ]
 
 
@@ -254,8 +254,8 @@ def _joined(comments: list[str]) -> str:
 
 def _seconds_since_1970(text: str) -> float:
     """Read a date as this package's readers write it; 0 where there is none."""
-    if told := re.fullmatch(r"(\d+(?:\.\d+)?) s since 1970", text):
-        return float(told[1])
+    if match := re.fullmatch(r"(\d+(?:\.\d+)?) s since 1970", text):
+        return float(match[1])
     try:
         when = datetime.fromisoformat(text)
     except ValueError:

@@ -120,7 +120,7 @@ def _of_tracker(place: Path, root: ET.Element) -> Iterator[tuple[str, str, Float
     )
     if not step_ms > 0:
         raise InputError(
-            place, "the project does not say its frame rate", "export its data as text"
+            place, "the project does not give its frame rate", "export its data as text"
         )
     first = _number(next(iter(_properties(root, "startframe")), "0"))
     start_ms = _number(next(iter(_properties(root, "starttime")), "0"))
