@@ -32,13 +32,13 @@ from benchmarks.acquisition_speed import speed_table
 from benchmarks.faulty_device import Fault, FaultyPath, acquire_faulty
 from benchmarks.fuzz import fuzz_table
 from benchmarks.fuzz_seeds import windaq
-from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.raw import read_raw
-from pendpipe.acquire.simulated import acquire_simulated
-from pendpipe.acquire.slips import find_slips
-from pendpipe.acquire.timebase import find_clock_losses
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.slips import find_slips
+from pendpipe.acquisition.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
@@ -119,7 +119,7 @@ def kill_table(folder: Path) -> str:
 def disk_table(folder: Path) -> str:
     """A small file system where one may be mounted, a limit on the file's size, /dev/full."""
     lines = [
-        "| the disk | room | what is said | scans opened | worst error |",
+        "| the disk | room | message | scans opened | worst error |",
         "|---|---|---|---|---|",
     ]
     small = folder / "small"

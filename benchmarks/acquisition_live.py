@@ -18,10 +18,10 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.drivers import find_driver
-from pendpipe.acquire.raw import read_raw
-from pendpipe.acquire.simulated import acquire_simulated
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.recording import GOOD, read_plain
@@ -150,7 +150,7 @@ def changed_library(folder: Path) -> Path:
     """A copy of the library with a comment more in the decoder."""
     library = folder / "src"
     shutil.copytree(ROOT / "src", library, ignore=shutil.ignore_patterns("__pycache__"))
-    with (library / "pendpipe/acquire/decode.py").open("a") as source:
+    with (library / "pendpipe/acquisition/decode.py").open("a") as source:
         source.write("# changed\n")
     return library
 

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.drivers import DRIVERS, find_driver
-from pendpipe.acquire.simulated import acquire_simulated
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.drivers import DRIVERS, find_driver
+from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.formats import ReadOptions, captures, text
 
 SAMPLES = 1 << 19

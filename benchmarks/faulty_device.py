@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self
 
-from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.devices.links import Link, LoopbackSocket, PseudoTerminal
-from pendpipe.acquire.devices.simulated import Signal, SimulatedDevice
-from pendpipe.acquire.simulated import record_from
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.devices.links import Link, LoopbackSocket, PseudoTerminal
+from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
+from pendpipe.acquisition.simulated import record_from
 from pendpipe.recording import Recording
 
 FAULTS: Final[Mapping[str, str]] = {

@@ -40,13 +40,13 @@ import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks import journal
-from pendpipe.acquire.clock import ScaledClock
-from pendpipe.acquire.decode import decode_recording
-from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.devices.simulated import Dialect
-from pendpipe.acquire.drivers import DRIVERS, find_driver
-from pendpipe.acquire.drivers.decoders import SyncBitDecoder
-from pendpipe.acquire.line import Line
+from pendpipe.acquisition.clock import ScaledClock
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.devices.simulated import Dialect
+from pendpipe.acquisition.drivers import DRIVERS, find_driver
+from pendpipe.acquisition.drivers.decoders import SyncBitDecoder
+from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
 from pendpipe.formats.writing import windaq_hires

@@ -10,8 +10,8 @@ import zlib
 
 import numpy as np
 
-from pendpipe.acquire.devices import DEVICES
-from pendpipe.acquire.raw import Frame, RawWriter, description_line
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.raw import Frame, RawWriter, description_line
 from pendpipe.arrays import FloatArray
 
 ROWS = 30

@@ -18,7 +18,7 @@ KEPT = ROOT / ".evidence"
 def code() -> str:
     """Digest of the readers, the acquisition, and of what tries them."""
     digest = hashlib.sha256()
-    for module in ("pendpipe.acquire.simulated", "pendpipe.formats.writing"):
+    for module in ("pendpipe.acquisition.simulated", "pendpipe.formats.writing"):
         digest.update(code_version(module).encode())
     for folder, pattern in (
         ("src/pendpipe/formats", "*.py"),

@@ -19,6 +19,7 @@ from pendpipe.version import __version__
 if TYPE_CHECKING:
     from pendpipe import effects, physics
     from pendpipe.api import (
+        acquire,
         diagnose,
         find_free_decay,
         fit,
@@ -38,6 +39,7 @@ __all__ = [
     "InputError",
     "Recording",
     "__version__",
+    "acquire",
     "diagnose",
     "effects",
     "find_free_decay",

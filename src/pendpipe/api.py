@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
+    from pendpipe.acquisition.devices.simulated import Signal
     from pendpipe.analysis.fit.result import Baseline, FitResult, Method
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
@@ -87,6 +88,58 @@ def read(
             stop_s=stop,
         ),
     )
+
+
+def acquire(
+    port: str,
+    *,
+    duration_s: float,
+    rate_hz: float = 60.0,
+    channel: int = 1,
+    model: str | None = None,
+    signal: Signal | None = None,
+    **options: Any,
+) -> Recording:
+    """Record from a Dataq instrument, or from a simulated one.
+
+    Parameters
+    ----------
+    port
+        A device file, a COM port or a URL of pyserial; ``"simulated:di2108"`` needs none.
+    duration_s, rate_hz, channel
+        Length, scans a second, and the channel as printed on the box.
+    model
+        The instrument; it is asked when not given.
+    signal
+        What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
+    **options
+        Of `pendpipe.acquisition.recorder.record`: ``raw_path`` (a new file that keeps the bytes),
+        ``range_volts``, ``until_noise``, ``reconnect_s``, ``volts_per_radian``; and, where it is
+        simulated, ``clock_scale``.
+
+    Returns
+    -------
+    Recording
+        In volts.
+
+    Raises
+    ------
+    InputError
+        If the port can't be opened, the device does not answer, or the setting is impossible.
+
+    Examples
+    --------
+    >>> acquire("simulated:di2108", duration_s=20, clock_scale=100)
+    Recording(1200 samples of volts, 0 to 19.9833 s)
+    """
+    from pendpipe.acquisition.recorder import record
+    from pendpipe.acquisition.simulated import acquire_simulated, example_signal
+
+    request = {"rate_hz": rate_hz, "duration_s": duration_s, "channels": (channel,), **options}
+    where, _, kind = port.partition(":")
+    if where == "simulated":
+        return acquire_simulated(kind, signal or example_signal(), **request)
+    return record(port, model, **request)
 
 
 def inspect(path: str | Path, **options: Any) -> Inspection:

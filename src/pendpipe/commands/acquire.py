@@ -27,8 +27,7 @@ from pendpipe.commands._campaign import add_campaign, add_record
 from pendpipe.errors import InputError
 
 if TYPE_CHECKING:
-    from pendpipe.acquire.devices.simulated import Signal
-    from pendpipe.acquire.progress import ProgressLine
+    from pendpipe.acquisition.progress import ProgressLine
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,7 +131,7 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
 
 def _record(arguments: argparse.Namespace) -> int:
     """Record, or write what an earlier call has recorded and could not write."""
-    from pendpipe.acquire import attempts
+    from pendpipe.acquisition import attempts
     from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
@@ -238,7 +237,7 @@ def _stage(arguments: argparse.Namespace) -> int:
 
 def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
     """Record into a raw file."""
-    from pendpipe.acquire.progress import ProgressLine
+    from pendpipe.acquisition.progress import ProgressLine
 
     progress = ProgressLine(sys.stderr, arguments.duration)
     if arguments.device:
@@ -253,9 +252,10 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
 
 def _serve(arguments: argparse.Namespace) -> int:
     """Be a simulated instrument for other programs until the end."""
-    from pendpipe.acquire.devices.simulated import SimulatedDevice
+    from pendpipe.acquisition.devices.simulated import SimulatedDevice
+    from pendpipe.acquisition.simulated import example_signal
 
-    signal_volts = _default_signal(arguments.seed, arguments.volts_per_radian or 3.85)
+    signal_volts = example_signal(arguments.seed, arguments.volts_per_radian or 3.85)
     if arguments.signal:
         from pendpipe.simulation.model import read_model, simulated_volts
 
@@ -273,7 +273,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 def _real(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
     """Record from the instrument on a port."""
-    from pendpipe.acquire.recorder import record
+    from pendpipe.acquisition.recorder import record
 
     record(
         arguments.port,
@@ -292,7 +292,7 @@ def _real(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> N
 
 def _simulated(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
     """Record from a simulated instrument."""
-    from pendpipe.acquire.simulated import acquire_simulated
+    from pendpipe.acquisition.simulated import acquire_simulated, example_signal
 
     where, _, kind = arguments.device.partition(":")
     if where != "simulated" or not kind:
@@ -303,7 +303,7 @@ def _simulated(arguments: argparse.Namespace, raw: Path, progress: ProgressLine)
         )
     acquire_simulated(
         kind,
-        _default_signal(arguments.seed, arguments.volts_per_radian or 3.85),
+        example_signal(arguments.seed, arguments.volts_per_radian or 3.85),
         channels=(arguments.channel or 1,),
         rate_hz=arguments.rate,
         duration_s=arguments.duration,
@@ -324,32 +324,9 @@ def _clock_scale(arguments: argparse.Namespace) -> float:
     return scale
 
 
-def _default_signal(seed: int, volts_per_radian: float) -> Signal:
-    """A pendulum for somebody who has named none: viscous decay with a little noise.
-
-    theta = 0.3 rad exp(-beta t) cos(2 pi f t), f = 0.5 Hz, Q = pi f/beta = 150, read by a
-    sensor with 1 mV of white noise.
-    """
-    import numpy as np
-
-    from pendpipe.arrays import FloatArray
-
-    random = np.random.default_rng(seed)
-    frequency_hz, quality_factor, amplitude_rad, noise_volts = 0.5, 150.0, 0.3, 1e-3
-    beta = math.pi * frequency_hz / quality_factor
-
-    def signal(time_s: FloatArray) -> FloatArray:
-        angle_rad = amplitude_rad * np.exp(-beta * time_s)
-        angle_rad *= np.cos(2.0 * math.pi * frequency_hz * time_s)
-        volts = volts_per_radian * angle_rad
-        return np.asarray(volts + random.normal(0.0, noise_volts, len(time_s)))
-
-    return signal
-
-
 def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
-    from pendpipe.acquire.ports import identify, list_ports, no_ports, without_port
+    from pendpipe.acquisition.ports import identify, list_ports, no_ports, without_port
 
     if port:
         identity = identify(port)
@@ -358,14 +335,14 @@ def _list(port: str | None) -> int:
         return 0
     found = list_ports()
     for entry in found:
-        told = "Dataq" if entry.is_dataq else entry.description
+        shown = "Dataq" if entry.is_dataq else entry.description
         # Only a device with the vendor's number is asked: others may not bear it.
         if entry.is_dataq:
             try:
-                told = f"Dataq {identify(entry.port).model}"
+                shown = f"Dataq {identify(entry.port).model}"
             except InputError as fault:
-                told = f"Dataq, {fault.problem}"
-        print(f"{entry.port}: {told}")
+                shown = f"Dataq, {fault.problem}"
+        print(f"{entry.port}: {shown}")
     unbound = without_port()
     for device in unbound:
         print(device)

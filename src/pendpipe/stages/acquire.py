@@ -1,4 +1,4 @@
-"""A record's recording, from wherever its source says: simulated, instrument or file."""
+"""A record's recording from its source: simulated, instrument or file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def acquire_record(
     anew
         Record from an instrument even if a recording is kept.
     place
-        The campaign's configuration, for the message that says how to record anew.
+        The campaign's configuration, for the message on how to record anew.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def acquire_record(
 
 def _simulated(campaign: Campaign, record: Record) -> Recording:
     """Let the simulated instrument record the simulated pendulum over its serial line."""
-    from pendpipe.acquire.simulated import acquire_simulated
+    from pendpipe.acquisition.simulated import acquire_simulated
     from pendpipe.simulation.record import SensorVolts, generator, simulated_record
 
     truth = simulated_record(campaign, record)
@@ -78,8 +78,14 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     InputError
         If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
     """
-    from pendpipe.acquire.attempts import choose, decode_attempt, kept_in, new_path, read_attempts
-    from pendpipe.acquire.recorder import record as record_from
+    from pendpipe.acquisition.attempts import (
+        choose,
+        decode_attempt,
+        kept_in,
+        new_path,
+        read_attempts,
+    )
+    from pendpipe.acquisition.recorder import record as record_from
 
     if record.channel and not record.channel.isdecimal():
         raise InputError(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pendpipe.acquire.simulated import acquire_simulated
+from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.models import CaliperRun, Sensor

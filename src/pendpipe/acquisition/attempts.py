@@ -1,0 +1,173 @@
+"""Each attempt at a recording keeps its bytes in a raw file of its own, never overwritten.
+
+A campaign keeps the attempts at a record in ``results/<record>/raw/``, the command line beside
+``--out``. A recording is always decoded from such a file, so it can be made again at any time.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.raw import (
+    COMPLETE,
+    NothingRecordedError,
+    RawRecording,
+    append_event,
+    is_being_recorded,
+    read_raw,
+)
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+_STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A raw file with at least one scan.
+
+    Parameters
+    ----------
+    path, raw
+        The file and its content.
+    """
+
+    path: Path
+    raw: RawRecording
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it ended with all that was asked for."""
+        return self.raw.event("stopped").get("reason") in COMPLETE
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether a recording was made from it and written (see `mark_saved`)."""
+        return bool(self.raw.event("saved"))
+
+    @property
+    def recorded_at(self) -> str:
+        """When it began, UTC."""
+        return str(self.raw.header["recorded_at"])
+
+
+def new_path(start: str | Path) -> Path:
+    r"""Name a raw file that nobody else has: `start`, a UTC time stamp, and a random number.
+
+    Examples
+    --------
+    >>> re.sub(r"\d", "0", new_path("raw/").name[:23])
+    '00000000T000000.000000Z'
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    return Path(f"{start}{stamp}-{secrets.token_hex(4)}.raw")
+
+
+def new_path_beside(out: Path) -> Path:
+    """Name the raw file of a recording on the command line: ``OUT.raw`` if that is free."""
+    first = out.with_suffix(".raw")
+    return new_path(f"{out.with_suffix('')}.") if first.exists() else first
+
+
+def paths_beside(out: Path) -> list[Path]:
+    """List the raw files that `new_path_beside` has named for a recording."""
+    pattern = re.compile(re.escape(out.stem) + rf"(\.{_STAMP})?\.raw")
+    if not out.parent.is_dir():
+        return []
+    return [path for path in out.parent.iterdir() if pattern.fullmatch(path.name)]
+
+
+def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
+    """Read the attempts that hold at least one scan, the oldest first.
+
+    Raises
+    ------
+    InputError
+        If one of them is being recorded now, or none holds a scan and one is damaged.
+    """
+    found: list[Attempt] = []
+    damage: InputError | None = None
+    for path in sorted(paths):
+        if not path.is_file():
+            continue
+        if is_being_recorded(path):
+            raise InputError(path, "another process is recording into it", "wait for its end")
+        try:
+            raw = read_raw(path)
+            decode_recording(raw)
+        except NothingRecordedError:
+            continue
+        except InputError as fault:
+            damage = damage or fault
+        else:
+            found.append(Attempt(path, raw))
+    if damage and not found:
+        raise damage
+    return sorted(found, key=lambda attempt: (attempt.recorded_at, _stamp(attempt.path)))
+
+
+def _stamp(path: Path) -> str:
+    """The time stamp in a name, down to microseconds; OUT.raw, the first of all, has none."""
+    found = re.search(_STAMP, path.name)
+    return found[0] if found else ""
+
+
+def choose(attempts: Sequence[Attempt]) -> Attempt:
+    """Return the newest complete attempt; if none is complete, the longest."""
+    complete = [attempt for attempt in attempts if attempt.is_complete]
+    return complete[-1] if complete else max(attempts, key=lambda one: len(one.raw.data))
+
+
+def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Recording:
+    """Decode a raw file; the recording's metadata names it and holds the notes.
+
+    Parameters
+    ----------
+    path
+        The raw file.
+    folder
+        Where the recording goes: the file is named relative to it.
+    channel
+        As printed on the box; the first one recorded by default.
+    """
+    recording = decode_recording(path, channel)
+    inside = path.is_relative_to(folder)
+    metadata = {"raw_file": (path.relative_to(folder) if inside else Path(path.name)).as_posix()}
+    if recording.notes:
+        metadata["notes"] = "; ".join(recording.notes)
+    return replace(recording, metadata={**recording.metadata, **metadata})
+
+
+def mark_saved(path: Path, out: Path) -> None:
+    """Note in a raw file that its recording was written; without a right to it, do not."""
+    try:
+        append_event(path, event="saved", file=out.name)
+    except OSError:
+        return
+
+
+@contextmanager
+def kept_in(raw_path: Path, out: Path) -> Iterator[None]:
+    """While a recording is written: if that fails, name the raw file that still holds it.
+
+    Raises
+    ------
+    InputError
+        Where the recording can't be written, for a full disk for one.
+    """
+    kept = f"the recording is kept in {raw_path}: call again to write it"
+    try:
+        yield
+    except OSError as fault:
+        problem = f"it can't be written ({fault.strerror or fault})"
+        raise InputError(out, problem, f"make room; {kept}") from None
+    except InputError as fault:
+        raise InputError(fault.place, fault.problem, f"{fault.remedy}; {kept}") from None

@@ -1,0 +1,79 @@
+"""The clock of the recorder, which for a simulated device may run faster than wall-clock time."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """What the recorder and a simulated device need of a clock."""
+
+    @property
+    def scale(self) -> float:
+        """How many seconds of this clock pass in one second of wall-clock time."""
+
+    def now(self) -> float:
+        """Return the time in seconds of this clock since some fixed instant."""
+
+    def sleep(self, duration_s: float) -> None:
+        """Wait `duration_s` seconds of this clock."""
+
+
+class ScaledClock:
+    """The host's monotonic clock, `scale` times as fast.
+
+    Two clocks of one scale agree in rate and differ in their zero, as the clock of an
+    instrument and that of a computer do.
+
+    Parameters
+    ----------
+    scale
+        1 is real time, for real instruments; 1000 lets 1000 s pass in one.
+    """
+
+    def __init__(self, scale: float = 1.0) -> None:
+        if not scale > 0:
+            raise ValueError(f"a clock's scale is positive, not {scale}")
+        self.scale = scale
+        self._origin_s = time.perf_counter()
+
+    def now(self) -> float:
+        """Return the seconds of this clock since it was made."""
+        return (time.perf_counter() - self._origin_s) * self.scale
+
+    def sleep(self, duration_s: float) -> None:
+        """Wait `duration_s` seconds of this clock."""
+        if duration_s > 0:
+            time.sleep(duration_s / self.scale)
+
+
+class SimulatedClock(ScaledClock):
+    """The clock of a simulated world, which can stand still.
+
+    A simulated line that is full stops the world: else the data would come late, and the
+    recorder would see a device slower than it is. Real lines do not wait; there the
+    recorder's clock goes on.
+    """
+
+    def __init__(self, scale: float = 1.0) -> None:
+        super().__init__(scale)
+        self._held_at_s: float | None = None
+        self._held_s = 0.0
+
+    def now(self) -> float:
+        """Return the seconds of this clock since it was made, pauses left out."""
+        held_at_s = self._held_at_s
+        return super().now() - self._held_s if held_at_s is None else held_at_s
+
+    def hold(self) -> None:
+        """Stand still; once more changes nothing."""
+        if self._held_at_s is None:
+            self._held_at_s = self.now()
+
+    def release(self) -> None:
+        """Go on from where it stands; a running clock runs on."""
+        if self._held_at_s is not None:
+            # In this order a reader in another thread never sees time go back.
+            self._held_s = super().now() - self._held_at_s
+            self._held_at_s = None

@@ -1,0 +1,190 @@
+"""Simulated DI-154RS, DI-194RS (dataq-facts A1) and DI-245 (A7): commands are letters."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final
+
+import numpy as np
+
+from pendpipe.acquisition.devices.simulated import Dialect
+from pendpipe.arrays import IntArray
+
+
+class SimulatedDI154RS(Dialect):
+    """Four channels of 12 bits, +-10 V, behind a line of 4800 or 9600 baud.
+
+    A command is NUL, letter, argument; letter and argument are echoed as they come. Bytes
+    outside a command, and unknown letters, are ignored. A sample takes two bytes, 20 bit
+    times of the line, so that n channels are scanned at most baud/(20 n) times a second;
+    the rate counter adds that many bit times to a scan.
+    """
+
+    model: ClassVar[str] = "DI-154RS"
+    bits: ClassVar[int] = 12
+    range_volts = 10.0
+    answer_to_identify: ClassVar[bytes] = b"0000000001"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._state = "idle"  # or "letter" after NUL, or the letter that wants its argument
+        self._mask = 0b0001
+        self._counter = 0
+        self._baud = 4800
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels, from 1, in the order of the scan."""
+        return tuple(number + 1 for number in range(4) if self._mask >> number & 1)
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Scans a second: the bit times of a scan, plus the counter's."""
+        return self._baud / (20 * max(1, len(self.channels)) + self._counter)
+
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+        out = bytearray()
+        for value in data:
+            byte = bytes([value])
+            if self._state == "idle":
+                if value == 0:
+                    self._state = "letter"
+            elif self._state == "letter":
+                known = byte in (b"S", b"N", b"C", b"D", b"L", b"M", b"B", b"E", b"R")
+                self._state = byte.decode("latin-1") if known else "idle"
+                out += byte if known else b""
+            else:
+                letter, self._state = self._state, "idle"
+                out += byte + self._execute(letter, value)
+        return bytes(out)
+
+    def _execute(self, letter: str, argument: int) -> bytes:
+        """Execute a complete command; return what follows the echo."""
+        if letter == "S":
+            self.streaming = argument == ord("1")
+            self.starts += self.streaming
+        elif letter == "N":
+            return self.answer_to_identify
+        elif letter == "C":
+            self._mask = argument & 0x0F
+        elif letter == "L":
+            self._counter = self._counter & 0xFF00 | argument
+        elif letter == "M":
+            self._counter = self._counter & 0x00FF | argument << 8
+        elif letter == "B":
+            self._baud = {1: 4800, 4: 9600}.get(argument, self._baud)
+        elif letter == "R":
+            self.streaming = False
+        return b""
+
+    def encode(self, codes: IntArray) -> bytes:
+        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
+        offset = (np.asarray(codes) + 2048).astype(np.uint16)
+        out = np.empty((*offset.shape, 2), dtype=np.uint8)
+        out[..., 0] = (offset % 32) * 8 + 1
+        out[..., 1] = (offset // 32) * 2 + 1
+        out[:, 0, 0] -= 1
+        return out.tobytes()
+
+
+class SimulatedDI194RS(SimulatedDI154RS):
+    """The same box with 10 bits: three in the first byte, of which bit 4 means nothing."""
+
+    model: ClassVar[str] = "DI-194RS"
+    bits: ClassVar[int] = 10
+    answer_to_identify: ClassVar[bytes] = b"0000000000"
+
+    def encode(self, codes: IntArray) -> bytes:
+        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
+        offset = (np.asarray(codes) + 512).astype(np.uint16)
+        out = np.empty((*offset.shape, 2), dtype=np.uint8)
+        out[..., 0] = (offset % 8) * 32 + 1
+        out[..., 1] = (offset // 8) * 2 + 1
+        out[:, 0, 0] -= 1
+        return out.tobytes()
+
+
+_FULL_SCALES: Final = [0.5, 0.25, 0.1, 0.05, 0.025, 0.01, *[0.0] * 2, 50, 25, 10, 5, 2.5, 1]
+
+
+class SimulatedDI245(Dialect):
+    """Four channels of 14 bits, +-10 mV to +-50 V.
+
+    NUL begins a short command, whose two characters are echoed one by one; everything else
+    is text up to CR, echoed there. While data flow only the stop is obeyed.
+    """
+
+    model: ClassVar[str] = "DI-245"
+    bits: ClassVar[int] = 14
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._short: bytes | None = None  # what has come of a short command
+        self._text = b""
+        self._list = [0x0A00]
+        self._rate_word = 1871
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels, from 1, in the order of the scan."""
+        return tuple((word & 0x0F) + 1 for word in self._list)
+
+    @property
+    def range_volts(self) -> float:
+        """Full scale, by the range code of the first word of the list."""
+        return float(_FULL_SCALES[self._list[0] >> 8])
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Scans a second: the burst rate, shared by the channels."""
+        average, divisor = divmod(self._rate_word & 0x0FFF, 256)
+        return 8000.0 / (divisor + 1) / (average + 3) / len(self._list)
+
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+        out = b""
+        for value in data:
+            byte = bytes([value])
+            if value == 0:
+                self._short = b""
+            elif self._short is not None:
+                self._short += byte
+                out += byte
+                if len(self._short) == 2:
+                    out += self._obey(self._short.decode("latin-1"))
+                    self._short = None
+            elif byte == b"\r":
+                out += self._execute(self._text.decode("latin-1"))
+                self._text = b""
+            else:
+                self._text += byte
+        return out
+
+    def _obey(self, command: str) -> bytes:
+        """Execute a short command; return what follows the echo."""
+        if command in ("S0", "S1"):
+            self.streaming = command == "S1"
+            self.starts += self.streaming
+            return b""
+        answers = {"A1": " 2450\r", "A2": " 68\r", "A7": " 5A5A5A5A\r", "NZ": "0012345601\r"}
+        return b"" if self.streaming else answers.get(command, "").encode()
+
+    def _execute(self, text: str) -> bytes:
+        """Execute a long command and return its echo."""
+        words = text.split()
+        if self.streaming or len(words) != 3 or words[0] not in ("chn", "xrate"):
+            return b""
+        first, second = int(words[1]), int(words[2])
+        if words[0] == "chn":
+            self._list[first:] = [second]
+        else:
+            self._rate_word = first
+        return text.encode("latin-1") + b"\r"
+
+    def encode(self, codes: IntArray) -> bytes:
+        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
+        offset = (np.asarray(codes) + 0x2000).astype(np.uint16)
+        low, high = (offset & 0x7F) << 1, offset >> 7 << 1
+        out = (np.stack([low, high], axis=-1) | 1).astype(np.uint8)
+        out[:, 0, 0] ^= 1
+        return out.tobytes()

@@ -1,0 +1,310 @@
+"""A simulated instrument on a line, in a thread of its own."""
+
+from __future__ import annotations
+
+import math
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import ClassVar, Final, Self, TypeAlias
+
+import numpy as np
+
+from pendpipe.acquisition.clock import Clock, SimulatedClock
+from pendpipe.acquisition.devices.links import Link, open_link
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.errors import InputError
+
+DEVICES: Final[dict[str, type[Dialect]]] = {}
+"""The simulated instruments: what may follow ``simulated:``."""
+
+
+class Dialect(ABC):
+    """An instrument without its line and its clock: commands in, replies and data out.
+
+    Attributes
+    ----------
+    starts
+        How often the stream was started: a change means that it begins anew.
+    streaming
+        Whether data flow.
+    """
+
+    model: ClassVar[str]
+    bits: ClassVar[int]
+
+    def __init_subclass__(cls) -> None:
+        if "model" in cls.__dict__:
+            name = "".join(letter for letter in cls.model.lower() if letter.isalnum())
+            # The RS-232 boxes go by their number, too: di154.
+            DEVICES[name] = DEVICES[name.removesuffix("rs")] = cls
+
+    def __init__(self) -> None:
+        self.starts = 0
+        self.streaming = False
+
+    @property
+    @abstractmethod
+    def range_volts(self) -> float:
+        """Full scale, as the host has chosen it."""
+
+    @property
+    @abstractmethod
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels as printed on the box (from 1), in the order of the scan."""
+
+    @property
+    @abstractmethod
+    def scan_rate_hz(self) -> float:
+        """Scans a second by the device's own clock."""
+
+    @property
+    def packet_bytes(self) -> int:
+        """Data leave in pieces of so many bytes."""
+        return 1
+
+    @abstractmethod
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+
+    @abstractmethod
+    def encode(self, codes: IntArray) -> bytes:
+        """Put signed codes, shape (scans, channels), into the bytes of the stream."""
+
+
+def convert(volts: FloatArray, bits: int, range_volts: float) -> IntArray:
+    """Round volts at the terminals to the converter's codes.
+
+    Parameters
+    ----------
+    volts
+        The signal, any shape, in V.
+    bits
+        Resolution; the step is ``2 range_volts / 2**bits``.
+    range_volts
+        Full scale is plus and minus it.
+
+    Returns
+    -------
+    IntArray
+        Signed codes, ``-2**(bits-1)`` to ``2**(bits-1) - 1``, 0 at 0 V; a signal beyond
+        the range gives the end code.
+    """
+    half = 1 << (bits - 1)
+    codes = np.rint(np.asarray(volts, dtype=np.float64) * (half / range_volts))
+    return np.clip(codes, -half, half - 1).astype(np.int64)
+
+
+Signal: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Times in s since the device was switched on to volts at the terminals, noise included."""
+
+_BLOCKS: Final = (1 << 10, 1 << 14)
+"""Scans computed at a time, ahead of schedule: few at first, then more and more, so that
+neither a short nor a long recording pays for the signal twice."""
+_REST_S: Final = 0.002
+"""The shortest time between two pieces of data, in seconds of the host."""
+
+
+class Stream:
+    """The data between a start and a stop, computed in blocks and released by the clock."""
+
+    def __init__(
+        self,
+        dialect: Dialect,
+        signal: Signal | Mapping[int, Signal],
+        rate_error: float,
+        offset_s: float,
+    ) -> None:
+        self._offset_s = offset_s
+        self._dialect = dialect
+        channels = dialect.channels
+        self._signals = [
+            signal.get(number) if isinstance(signal, Mapping) else signal for number in channels
+        ]
+        self._rate_hz = dialect.scan_rate_hz * (1.0 + rate_error)
+        self.scan_bytes = len(dialect.encode(np.zeros((1, len(channels)), dtype=np.int64)))
+        self._computed = 0  # scans
+        self._ready = b""  # bytes of scans computed, not yet released
+        self._released = 0  # bytes since the start
+        self._origin_s = 0.0
+
+    def begin(self, clock: Clock) -> None:
+        """Let scan 0 be taken now; the first block is computed before, and not late."""
+        self._compute()
+        self._origin_s = clock.now()
+
+    def due(self, clock: Clock) -> bytes:
+        """Return the whole packets that are complete by now."""
+        elapsed = clock.now() - self._origin_s
+        taken = math.floor(elapsed * self._rate_hz) + 1
+        packet = self._dialect.packet_bytes
+        size = max(0, taken * self.scan_bytes // packet * packet - self._released)
+        while len(self._ready) < size:
+            self._compute()
+        piece, self._ready = self._ready[:size], self._ready[size:]
+        self._released += size
+        return piece
+
+    def rest_s(self, clock: Clock) -> float:
+        """How long, in seconds of the host, until the next packet is complete."""
+        following = math.ceil((self._released + self._dialect.packet_bytes) / self.scan_bytes)
+        complete_s = self._origin_s + (following - 1) / self._rate_hz
+        return max(_REST_S, (complete_s - clock.now()) / clock.scale)
+
+    def _compute(self) -> None:
+        """Sample, convert and encode the next block."""
+        block = min(_BLOCKS[1], max(_BLOCKS[0], self._computed))
+        time_s = np.arange(self._computed, self._computed + block) / self._rate_hz
+        time_s += self._offset_s
+        codes: IntArray = np.zeros((block, len(self._signals)), dtype=np.int64)
+        for column, signal in enumerate(self._signals):
+            if signal is not None:
+                volts = signal(time_s)
+                codes[:, column] = convert(volts, self._dialect.bits, self._dialect.range_volts)
+        self._ready += self._dialect.encode(codes)
+        self._computed += block
+
+
+class SimulatedDevice:
+    """An instrument behind a pseudo-terminal or socket: a context manager.
+
+    Within the context it lives in a thread of its own; who has its own link and clock may
+    call `step` instead.
+
+    Parameters
+    ----------
+    kind
+        A key of `DEVICES`.
+    signal
+        Times to volts, for every enabled channel, or a mapping from channel number; a
+        channel without one reads 0 V. It is called with rising times, block after block, so
+        noise drawn from one generator does not depend on the pace of the host.
+    clock_scale
+        How many seconds of the device pass in one of wall-clock time.
+    link
+        ``"pty"``, ``"socket"``, or ``None`` for what the system has; or a device's end itself.
+    rate_error
+        The device's clock is fast by this fraction: scans come ``1 + rate_error`` times as
+        often as it claims.
+    clock
+        The clock of its world; by default wall-clock time, `clock_scale` times as fast.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pendpipe.acquisition.recorder import record
+    >>> with SimulatedDevice("di2108", np.cos, clock_scale=1000) as device:
+    ...     recording = record(
+    ...         device.port, "di2108", rate_hz=100, duration_s=10, clock=device.clock
+    ...     )
+    >>> len(recording)
+    1000
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        signal: Signal | Mapping[int, Signal],
+        *,
+        clock_scale: float = 1.0,
+        link: str | Link | None = None,
+        rate_error: float = 0.0,
+        clock: SimulatedClock | None = None,
+    ) -> None:
+        if kind not in DEVICES:
+            raise InputError(
+                f"device simulated:{kind}",
+                "there is no such simulated device",
+                f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
+            )
+        self.kind = kind
+        self.dialect = DEVICES[kind]()
+        self.clock = clock or SimulatedClock(clock_scale)
+        self.failure: BaseException | None = None
+        self._signal = signal
+        self._rate_error = rate_error
+        self._link = open_link(link) if link is None or isinstance(link, str) else link
+        self._stream: Stream | None = None
+        self._starts = self.dialect.starts  # of streams, that were seen
+        self._ending = threading.Event()
+        self._outbox = bytearray()
+        self._thread = threading.Thread(target=self._live, name=f"simulated {kind}", daemon=True)
+
+    @property
+    def port(self) -> str:
+        """The port to give to a driver."""
+        return self._link.port
+
+    @property
+    def clock_scale(self) -> float:
+        """How many seconds of the device pass in one of wall-clock time."""
+        return self.clock.scale
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.unplug()
+        if self.failure is not None:
+            raise self.failure
+
+    def unplug(self) -> None:
+        """End the device and its line: the host's next read fails."""
+        if not self._ending.is_set():
+            self._ending.set()
+            self._link.wake()
+            self._thread.join()
+            self._link.close()
+
+    def _live(self) -> None:
+        """Serve the line until the end; an exception of the signal silences the device."""
+        try:
+            while not self._ending.is_set():
+                self._link.wait(self._rest_s(), sending=bool(self._outbox))
+                self.step()
+        except BaseException as fault:
+            self.failure = fault
+
+    def step(self) -> None:
+        """Read what the host has sent, and send what is due by now."""
+        if data := self._link.receive():
+            self._outbox += self.dialect.respond(data)
+        self._follow()
+        if self._stream and not self._outbox:
+            self._outbox += self._stream.due(self.clock)
+        self._send()
+
+    def _follow(self) -> None:
+        """Begin or end a stream as the host has commanded."""
+        if self.dialect.starts != self._starts:
+            self._starts = self.dialect.starts
+            self._begin()
+        if not self.dialect.streaming:
+            self._stream = None
+
+    def _begin(self, offset_s: float = 0.0) -> None:
+        """Begin a stream, whose first scan reads the signal at `offset_s`."""
+        self._stream = Stream(self.dialect, self._signal, self._rate_error, offset_s)
+        self._stream.begin(self.clock)
+
+    def _rest_s(self) -> float:
+        """How long there is nothing to do, in seconds of the host, if the host is silent."""
+        return self._stream.rest_s(self.clock) if self._stream else 60.0
+
+    def _send(self) -> None:
+        """Send what the line takes; while it is full, simulated time stands still."""
+        if self._outbox:
+            with memoryview(self._outbox) as view:
+                sent = self._link.send(view)
+            del self._outbox[:sent]
+        if self._outbox:
+            self.clock.hold()
+        else:
+            self.clock.release()

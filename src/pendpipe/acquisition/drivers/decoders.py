@@ -1,0 +1,264 @@
+"""From the bytes of a stream to scans: samples with a frame mark, and words without any.
+
+Families that mark a scan: every sample is two bytes. Bit 0 of the first byte of a scan is 0,
+bit 0 of every other byte is 1. The upper seven bits of the second byte are the upper seven bits
+of the sample, its lower bits stand at the top of the first byte (dataq-facts A1 for 8, 10
+and 12 bits, A7 for 14); the code is offset binary.
+
+The CDC family sends little-endian 16-bit words, and nothing between them (dataq-facts A8): a
+lost byte shifts all that follows, and only the rate, the range or a channel of known reading
+show it. A device whose buffer has overflowed sends ``stop 01`` among the words, and
+nothing after it.
+
+A *scan* is one reading of every enabled channel at one instant; a *count* is the converter's
+signed number, zero at 0 V.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final, Protocol
+
+import numpy as np
+
+from pendpipe.arrays import AnyArray
+
+_BLOCK: Final = 1 << 15
+"""Words decoded at a time: few enough to stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A place where the bytes did not make scans.
+
+    Parameters
+    ----------
+    after_scan
+        How many good scans were decoded before it (since the decoder was made).
+    discarded_bytes
+        The bytes that had to be thrown away to get into step again.
+    lost_scans
+        The scans they stand for: the least whole number that could have held them. Whole
+        scans missing besides leave no trace in the bytes, only in the clock.
+    suspect_before
+        Whether the scan before is suspect too: bytes without a frame mark followed it, so
+        that one of them may belong inside it.
+    reason
+        The device's message (``"stop 01"``), or ``"clock"`` where the bytes are whole
+        and the recorder's clock tells of the loss.
+    """
+
+    after_scan: int
+    discarded_bytes: int
+    lost_scans: int
+    suspect_before: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Scans:
+    """What a decoder made of some bytes.
+
+    Parameters
+    ----------
+    counts
+        Signed counts, shape (scans, channels), 16-bit integers.
+    losses
+        The losses met, in order.
+    """
+
+    counts: AnyArray
+    losses: tuple[Loss, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+
+class Decoder(Protocol):
+    """Bytes in, scans and losses out; how the bytes are cut into pieces changes nothing."""
+
+    @property
+    def bytes_per_scan(self) -> int:
+        """How many bytes an undamaged scan takes."""
+
+    def feed(self, data: bytes) -> Scans:
+        """Decode further bytes; an unfinished scan waits for the next call."""
+
+    def finish(self) -> Scans:
+        """Say what is left over at the end: scans held back till now, perhaps a loss."""
+
+
+class SyncBitDecoder:
+    """Two bytes a sample with a frame mark in bit 0.
+
+    Parameters
+    ----------
+    channels
+        Samples in a scan.
+    bits
+        Bits of a sample, 8 to 14.
+
+    Notes
+    -----
+    What breaks the pattern of the marks is noticed, and costs the scans it touches; bytes
+    are thrown away up to the next byte with bit 0 = 0 that begins a whole scan. What keeps
+    the pattern (flipped data bits, an even number of bytes lost at the wrong place, whole
+    scans) can't be seen here.
+    """
+
+    def __init__(self, channels: int, bits: int) -> None:
+        self.bytes_per_scan = 2 * channels
+        self._bits = bits
+        self._marks = np.full(channels, 0x0101, dtype="<u2")
+        self._marks[0] = 0x0100
+        self._pending = b""  # the beginning of a scan
+        self._scans = 0
+        self._discarded = 0  # since the last good scan
+        self._suspect = False  # the last good scan was followed by bytes without a start
+
+    def feed(self, data: bytes) -> Scans:
+        """Decode further bytes; an unfinished scan waits for the next call."""
+        data = self._pending + data
+        whole = len(data) - len(data) % self.bytes_per_scan
+        words = np.frombuffer(data, dtype="<u2", count=whole // 2).reshape(-1, len(self._marks))
+        rest = data[whole:]
+        if self._discarded or not self._begins_scan(rest) or not self._in_step(words):
+            return self._resynchronise(data)
+        self._pending = rest
+        self._scans += len(words)
+        return Scans(self._counts(words))
+
+    def finish(self) -> Scans:
+        """Say what is left over at the end: no counts, perhaps a loss."""
+        nothing = np.empty((0, len(self._marks)), dtype=np.int16)
+        left = self._discarded
+        self._discarded, self._pending = 0, b""
+        return Scans(nothing, (self._loss(self._scans, left, self._suspect),) if left else ())
+
+    @staticmethod
+    def _begins_scan(rest: bytes) -> bool:
+        """Whether these bytes can be the beginning of a scan (nothing at all can)."""
+        return all((byte & 1) == (place > 0) for place, byte in enumerate(rest))
+
+    def _in_step(self, words: AnyArray) -> bool:
+        """Whether every byte has the mark that its place asks for."""
+        rows = max(1, _BLOCK // words.shape[1])
+        return all(
+            bool(((words[first : first + rows] & 0x0101) == self._marks).all())
+            for first in range(0, len(words), rows)
+        )
+
+    def _counts(self, words: AnyArray) -> AnyArray:
+        """Take the samples out of words that are in step; shape (scans, channels)."""
+        counts = np.empty(words.shape, dtype=np.int16)
+        rows = max(1, _BLOCK // words.shape[1])
+        for first in range(0, len(words), rows):
+            part = words[first : first + rows]
+            code = part & 0x00FF
+            code >>= 15 - self._bits
+            code |= (part >> 9) << (self._bits - 7)
+            np.subtract(code.view("<i2"), 1 << (self._bits - 1), out=counts[first : first + rows])
+        return counts
+
+    def _resynchronise(self, data: bytes) -> Scans:
+        """Find the whole scans between broken ones, and count what is thrown away.
+
+        A byte with bit 0 = 0 starts a scan; it is whole if the next start is at least a
+        scan away. The bytes between the end of a whole scan and the next start, and the
+        scans cut short, are thrown away.
+        """
+        size = self.bytes_per_scan
+        octets = np.frombuffer(data, dtype=np.uint8)
+        starts = np.flatnonzero((octets & 1) == 0)
+        lead = int(starts[0]) if len(starts) else len(octets)
+        length = np.diff(starts, append=len(octets))
+        good = length >= size
+        discard = np.where(good, length - size, length)
+        self._pending = b""
+        if len(starts) and not good[-1]:
+            # The last scan is not broken but unfinished.
+            self._pending = data[starts[-1] :]
+            discard[-1] = 0
+        # Thrown away before each start, since the beginning of these bytes.
+        before = self._discarded + lead + np.concatenate(([0], np.cumsum(discard)))
+        followed = self._suspect if self._discarded else (lead > 0 and self._scans > 0)
+        losses: list[Loss] = []
+        index = np.flatnonzero(good)
+        spent = 0
+        thrown = before[index]
+        fresh = np.diff(thrown, prepend=0)
+        for number in np.flatnonzero(fresh):
+            direct = followed if number == 0 else bool(discard[index[number - 1]])
+            losses.append(self._loss(self._scans + int(number), int(fresh[number]), direct))
+        if len(index):
+            spent = int(thrown[-1])
+            followed = bool(discard[index[-1]])
+        self._discarded = int(before[-1]) - spent
+        self._suspect = followed
+        frames = octets[starts[index][:, None] + np.arange(size)]
+        words = np.ascontiguousarray(frames).view("<u2")
+        self._scans += len(index)
+        return Scans(self._counts(words.reshape(-1, len(self._marks))), tuple(losses))
+
+    def _loss(self, after_scan: int, discarded: int, suspect: bool) -> Loss:
+        lost = -(-discarded // self.bytes_per_scan)
+        return Loss(after_scan, discarded, lost, suspect_before=suspect and after_scan > 0)
+
+
+STOP_CODE: Final = re.compile(rb"stop 0[123]")
+"""In words of chance it stands once in 2e16 bytes."""
+STOP_CODE_BYTES: Final = 7
+_BEGINNINGS: Final = tuple(b"stop 0"[:size] for size in range(6, 0, -1))
+
+
+class WordDecoder:
+    """One signed little-endian 16-bit word a channel, scan after scan.
+
+    Parameters
+    ----------
+    channels
+        Words in a scan.
+    bits
+        Bits of a sample, at the top of its word; below may stand digital inputs.
+    """
+
+    def __init__(self, channels: int, bits: int = 16) -> None:
+        self.bytes_per_scan = 2 * channels
+        self._channels = channels
+        self._shift = 16 - bits
+        self._pending = b""  # an unfinished scan, or what may be the beginning of a stop code
+        self._scans = 0
+        self._ended = ""  # the stop code, once it was met
+        self._discarded = 0
+
+    def feed(self, data: bytes) -> Scans:
+        """Decode further bytes; an unfinished scan waits for the next call."""
+        if self._ended:
+            self._discarded += len(data)
+            return self._scans_of(b"")
+        data = self._pending + data
+        if found := STOP_CODE.search(data):
+            self._ended = found.group().decode("ascii")
+            whole = found.start() - found.start() % self.bytes_per_scan
+            self._discarded = len(data) - whole
+        else:
+            free = len(data) - next((len(b) for b in _BEGINNINGS if data.endswith(b)), 0)
+            whole = free - free % self.bytes_per_scan
+        self._pending = b"" if self._ended else data[whole:]
+        return self._scans_of(data[:whole])
+
+    def finish(self) -> Scans:
+        """Return what was held back, forget an unfinished scan, and tell of a stop code."""
+        held = self._pending
+        self._pending = b""
+        scans = self._scans_of(held[: len(held) - len(held) % self.bytes_per_scan])
+        if not self._ended:
+            return scans
+        return Scans(scans.counts, (Loss(self._scans, self._discarded, 0, reason=self._ended),))
+
+    def _scans_of(self, data: bytes) -> Scans:
+        """Turn whole scans into counts; shape (scans, channels)."""
+        words: AnyArray = np.frombuffer(data, dtype="<i2").reshape(-1, self._channels)
+        self._scans += len(words)
+        return Scans(words >> self._shift if self._shift else words)

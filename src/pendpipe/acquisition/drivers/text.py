@@ -1,0 +1,226 @@
+"""The families whose commands are lines of text: DI-149, DI-155, and the DI-1100 to DI-4718B.
+
+Commands end in CR and are echoed with it, perhaps with NULs behind; ``stop`` is echoed among
+the data (dataq-facts A5, A8). The DI-149 and DI-155 echo ``start`` too, and the data follow at
+once; their samples have a frame mark (A6). The others, in CDC mode, don't echo ``start`` and send
+binary words; one whose buffer overflows writes ``stop 01`` (02, 03) into its data and falls silent.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Final
+
+from pendpipe.acquisition.drivers.base import Driver, Identity
+from pendpipe.acquisition.drivers.decoders import STOP_CODE, STOP_CODE_BYTES, WordDecoder
+from pendpipe.errors import InputError
+
+_DI149_HZ: Final = 750_000
+_FASTEST_DIVISOR: Final = 75
+"""For each channel: the box takes 10 000 samples a second."""
+_SLOWEST_DIVISOR: Final = 65535
+_END_OF_LIST: Final = "xffff"
+_CDC_HZ: Final = 60_000_000
+_PACKETS: Final = (16, 32, 64, 128, 256, 512, 1024, 2048)
+"""Bytes in a packet for ``ps 0`` to ``ps 7``."""
+_PACKETS_PER_SECOND: Final = 20.0
+
+
+class TextDriver(Driver):
+    """Commands of text ended by CR; the speed of the line does not matter."""
+
+    stop_command: ClassVar[tuple[bytes, ...]] = (b"stop\r",)
+    checks: ClassVar[str] = "cable, power, CDC mode"
+
+    def hello(self) -> Identity:
+        """End a stream of an earlier run and ask the device who it is."""
+        self.stop()
+        maker = self._send_line("info 0")
+        number = self._send_line("info 1")
+        if maker != "DATAQ":
+            return Identity(f"{maker} {number}")
+        return Identity(f"DI-{number}", self._send_line("info 2"), self._send_line("info 6"))
+
+
+class DI149(TextDriver):
+    """The DI-149: 8 channels, 12 bits, +-10 V, 10 kHz in all; scans at 750 kHz/srate."""
+
+    model: ClassVar[str] = "DI-149"
+    bits: ClassVar[int] = 12
+
+    def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
+        slowest, fastest = (
+            _DI149_HZ / _SLOWEST_DIVISOR,
+            _DI149_HZ / _FASTEST_DIVISOR / len(channels),
+        )
+        if not slowest <= rate_hz <= fastest:
+            what = f"{len(channels)} channel(s) "
+            raise self._no_rate(what, rate_hz, f"{slowest:.4g}", fastest)
+        divisor = round(_DI149_HZ / rate_hz)
+        self._send_line("asc")  # the scan list is written in this mode
+        for position, channel in enumerate(channels):
+            word = self.ranges.index(range_volts) << 8 | channel - 1
+            self._send_line(f"slist {position} x{word:04x}")
+        self._send_line(f"slist {len(channels)} {_END_OF_LIST}")
+        self._send_line(f"srate {divisor}")
+        self._send_line("bin")
+        return _DI149_HZ / divisor
+
+    def _start_stream(self) -> None:
+        for attempt in range(self.attempts):
+            if attempt:
+                self._clear_the_line()
+            self.line.write(b"start\r")
+            # Byte by byte: the data behind the echo are not to be touched.
+            if self.line.read_until(b"start\r", self.patience_s).endswith(b"start\r"):
+                return
+            # It may have started although its echo was lost.
+            self.stop()
+        raise InputError(self.line.port, "the device does not start", "check cable and power")
+
+
+class DI155(DI149):
+    """The DI-155: 4 channels, frames of 14 bits, +-2.5 to +-50 V, 10 kHz in all.
+
+    How many of the 14 bits carry a signal is not settled: 13 or 14.
+    """
+
+    model: ClassVar[str] = "DI-155"
+    bits: ClassVar[int] = 14
+    ranges: ClassVar[tuple[float, ...]] = (50.0, 25.0, 12.5, 10.0, 6.25, 5.0, 3.125, 2.5)
+    channels: ClassVar[int] = 4
+
+
+class DI2108(TextDriver):
+    """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode.
+
+    The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources disagree
+    whether this is the rate of scans or of samples: it is measured as well.
+    """
+
+    model: ClassVar[str] = "DI-2108"
+    bits: ClassVar[int] = 16
+    divisors: ClassVar[tuple[int, int]] = (375, 65535)
+    decimations: ClassVar[int] = 512
+    further_decimations: ClassVar[int] = 40000
+    _tail = b""
+
+    def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
+        divisor, decimation, further = self._divisors(rate_hz)
+        self._send_line("encode 0", needed=False)  # binary; a DI-4108 was seen not to echo it
+        for position, channel in enumerate(channels):
+            word = self.ranges.index(range_volts) << 8 | channel - 1
+            self._send_line(f"slist {position} {word}")
+        self._send_line(f"srate {divisor}")
+        if self.decimations > 1:
+            self._send_line(f"dec {decimation}")
+        if self.further_decimations > 1:
+            self._send_line(f"deca {further}")
+        # The last reading, no mean: a mean would be a filter.
+        self._send_line("filter * 0", needed=False)
+        rate = _CDC_HZ / (divisor * decimation * further)
+        self._send_line(f"ps {_packet_code(2 * len(channels) * rate)}", needed=False)
+        return rate
+
+    def _start_stream(self) -> None:
+        self._tail = b""
+        self.line.write(b"start\r")
+
+    def ended(self, data: bytes) -> str:
+        """Return the stop code (``"stop 01"``: overflow) if it stands in these bytes."""
+        seen = self._tail + data
+        self._tail = seen[1 - STOP_CODE_BYTES :]
+        found = STOP_CODE.search(seen)
+        return found.group().decode("ascii") if found else ""
+
+    @classmethod
+    def decoder(cls, channels: int) -> WordDecoder:
+        """Return a fresh decoder for scans of so many channels."""
+        return WordDecoder(channels, cls.bits)
+
+    def _divisors(self, rate_hz: float) -> tuple[int, int, int]:
+        """Find srate, dec and deca whose rate is nearest to `rate_hz`."""
+        low, high = self.divisors
+        slowest = _CDC_HZ / (high * self.decimations * self.further_decimations)
+        if not slowest <= rate_hz <= _CDC_HZ / low:
+            raise self._no_rate("", rate_hz, f"{slowest:.3g}", _CDC_HZ / low)
+        product = _CDC_HZ / rate_hz
+        further = math.ceil(product / (high * self.decimations))
+        further = min(self.further_decimations, max(1, further))
+        first = max(1, math.ceil(product / (high * further)))
+        last = min(self.decimations, max(first, int(product / (low * further))))
+        first = min(first, self.decimations)
+        found = (
+            (min(high, max(low, round(product / (decimation * further)))), decimation)
+            for decimation in range(first, last + 1)
+        )
+        divisor, decimation = min(
+            found, key=lambda pair: abs(pair[0] * pair[1] * further - product)
+        )
+        return divisor, decimation, further
+
+
+class DI1100(DI2108):
+    """The DI-1100: 4 channels, 12 bits at the top of a word, +-10 V, 40 kHz."""
+
+    model: ClassVar[str] = "DI-1100"
+    bits: ClassVar[int] = 12
+    channels: ClassVar[int] = 4
+    divisors: ClassVar[tuple[int, int]] = (1500, 65535)
+    decimations: ClassVar[int] = 1
+
+
+class DI1110(DI2108):
+    """The DI-1110: 8 channels, 12 bits at the top of a word, +-10 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-1110"
+    bits: ClassVar[int] = 12
+    decimations: ClassVar[int] = 1
+
+
+class DI1120(DI2108):
+    """The DI-1120: 4 channels, 14 bits at the top of a word, +-2 to +-100 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-1120"
+    bits: ClassVar[int] = 14
+    channels: ClassVar[int] = 4
+    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class DI4108(DI2108):
+    """The DI-4108: 8 channels, 16 bits, +-0.2 to +-10 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4108"
+    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
+
+
+class DI2108P(DI2108):
+    """The DI-2108-P: as the DI-2108, +-10, +-5 or +-2.5 V, no ``deca``.
+
+    Its ranges from 0 V up are not used: a pendulum swings about its rest.
+    """
+
+    model: ClassVar[str] = "DI-2108-P"
+    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.5)
+    further_decimations: ClassVar[int] = 1
+
+
+class DI4208(DI2108):
+    """The DI-4208 over USB: 8 channels, 16 bits, +-2 to +-100 V, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4208"
+    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+
+
+class DI4718B(DI2108):
+    """The DI-4718B: 8 channels, 16 bits, +-5 V behind its amplifiers, 160 kHz."""
+
+    model: ClassVar[str] = "DI-4718B"
+    range_volts: ClassVar[float] = 5.0
+    ranges: ClassVar[tuple[float, ...]] = (5.0,)
+
+
+def _packet_code(bytes_per_second: float) -> int:
+    """Choose the largest packets of which about twenty come in a second, or 16 bytes."""
+    wanted = bytes_per_second / _PACKETS_PER_SECOND
+    return sum(size <= wanted for size in _PACKETS[1:])

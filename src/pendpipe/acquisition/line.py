@@ -1,0 +1,220 @@
+"""A serial line: pyserial's ports, with user errors in one line each.
+
+`serial.serial_for_url` opens device files, COM ports and ``socket://HOST:PORT`` alike.
+All limits here are seconds of the host's clock: how long a byte takes from one process to
+another does not depend on the scale of a simulated clock.
+"""
+
+from __future__ import annotations
+
+import errno
+import re
+import stat
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+import serial
+
+from pendpipe.errors import InputError
+
+try:
+    from termios import error as termios_error
+except ImportError:  # not on Windows
+    termios_error = OSError  # type: ignore[misc,assignment]
+
+
+class LineLostError(InputError):
+    """The line broke while it was in use: a cable pulled, a device switched off."""
+
+
+class Line:
+    """An open serial line.
+
+    Parameters
+    ----------
+    port
+        A device file, a COM port, or a URL of pyserial (``socket://127.0.0.1:4001``).
+    baudrate
+        Bits a second; 8 data bits, no parity, one stop bit, no flow control. USB devices
+        and sockets take any.
+
+    Raises
+    ------
+    InputError
+        If the port does not exist, is busy, may not be opened, or is no serial port.
+    """
+
+    def __init__(self, port: str, baudrate: int) -> None:
+        self.port = port
+        try:
+            self._serial = serial.serial_for_url(port, do_not_open=True)
+            self._serial.baudrate = baudrate
+            self._serial.timeout = 0
+            self._serial.write_timeout = 2.0
+            # DTR and RTS feed the RS-232 models, which have no other supply.
+            self._serial.dtr = self._serial.rts = True
+            if "://" not in port:
+                self._serial.exclusive = True
+            self._serial.open()
+        except (OSError, ValueError) as fault:
+            raise cannot_open(port, fault) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it was not closed; a broken line is open until then."""
+        return bool(self._serial.is_open)
+
+    def set_baudrate(self, baudrate: int) -> None:
+        """Change the speed of the open line."""
+        try:
+            self._serial.baudrate = baudrate
+        except (OSError, termios_error) as fault:
+            raise self._lost(fault) from None
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+        try:
+            self._serial.write(data)
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def receive(self, limit_s: float) -> bytes:
+        """Return what has arrived; if nothing has, wait for it at most `limit_s`."""
+        try:
+            self._serial.timeout = limit_s
+            first: bytes = self._serial.read(1)
+            if not first:
+                return b""
+            # With no time to wait, pyserial's read makes one system call and returns.
+            self._serial.timeout = 0
+            return first + bytes(self._serial.read(1 << 16))
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def read(self, size: int, limit_s: float) -> bytes:
+        """Return `size` bytes, or the fewer that came within `limit_s`."""
+        try:
+            self._serial.timeout = limit_s
+            return bytes(self._serial.read(size))
+        except OSError as fault:
+            raise self._lost(fault) from None
+
+    def read_until(self, end: bytes, limit_s: float) -> bytes:
+        """Return everything up to and with `end`, or what came within `limit_s`."""
+        stop = time.monotonic() + limit_s
+        got = bytearray()
+        while not got.endswith(end) and (left := stop - time.monotonic()) > 0:
+            got += self.read(1, left)
+        return bytes(got)
+
+    def discard(self, quiet_s: float, limit_s: float = 1.0) -> bytes:
+        """Throw away what arrives until nothing has come for `quiet_s`; return its end."""
+        stop = time.monotonic() + limit_s
+        tail = b""
+        while data := self.receive(quiet_s):
+            tail = (tail + data)[-64:]
+            if time.monotonic() > stop:
+                break
+        return tail
+
+    def close(self) -> None:
+        """Close the line."""
+        # pyserial forgets the socket of a broken connection without closing it.
+        connection = getattr(self._serial, "_socket", None)
+        self._serial.close()
+        if connection is not None:
+            connection.close()
+
+    def _lost(self, fault: Exception) -> LineLostError:
+        return LineLostError(
+            self.port,
+            f"the line was lost ({_text(fault)})",
+            "check cable and power, and that no other program uses the port",
+        )
+
+
+def _text(fault: BaseException) -> str:
+    """One short clause out of pyserial's messages, which wrap one another."""
+    return " ".join(str(fault).split())[:160]
+
+
+_LIST: Final = "pendpipe acquire --list shows the ports"
+_WINDOWS: Final = re.compile(r"Error\(\d+, .*, None, (\d+)\)")
+_BUSY: Final = {
+    "linux": "close the program that uses it (lsof {port} names it; ModemManager tries new ports"
+    " for some seconds)",
+    "darwin": "close the program that uses it (lsof {port} names it)",
+    "win32": "close the program that uses it (WinDaq, a terminal); only one may",
+}
+_NO_DRIVER: Final = {
+    "linux": "unplug the device and plug it in again; dmesg shows what became of it",
+    "darwin": "unplug the device and plug it in again, and give its /dev/cu.* name",
+    "win32": "unplug the device and plug it in again; if its entry in the Device Manager bears a"
+    " warning, install its driver",
+}
+
+
+def cannot_open(port: str, fault: Exception, platform: str = sys.platform) -> InputError:
+    """Turn pyserial's fault into where, what and what to do."""
+    text = " ".join(str(fault).split())[:160]
+    number = getattr(fault, "errno", None)
+    found = _WINDOWS.search(text)
+    windows = int(found[1]) if found else None
+    if number == errno.ENOENT or windows in (2, 3):
+        return InputError(port, "there is no such port", _LIST)
+    # Windows lets one program at a time have a port, and calls that a denied access.
+    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK) or windows in (5, 32):
+        remedy = _BUSY.get(platform, _BUSY["darwin"]).format(port=port)
+        return InputError(port, "the port is busy", remedy)
+    if number in (errno.EACCES, errno.EPERM):
+        return InputError(port, "you may not open the port", _permission(port, platform))
+    if number in (errno.ENXIO, errno.ENODEV, errno.EIO) or windows in (31, 121, 433, 995):
+        remedy = _NO_DRIVER.get(platform, _NO_DRIVER["darwin"])
+        return InputError(port, "no working device is behind the port", remedy)
+    if windows == 87:
+        return InputError(
+            port,
+            "the port's driver refuses the setting of the line",
+            "check that it is the instrument's port; if so, install its driver anew",
+        )
+    if "refused" in text:
+        return InputError(port, "nothing listens there", "start the device, or correct the address")
+    if "configure port" in text:
+        return InputError(port, "this is no serial port", _LIST)
+    return InputError(port, f"the port can't be opened ({text})", _LIST)
+
+
+def _permission(port: str, platform: str) -> str:
+    """Say how to be let in."""
+    if platform == "linux":
+        group = _group(port) or "dialout"
+        return f"join its group (sudo usermod -aG {group} $USER), log out and in again"
+    if platform == "darwin":
+        return "give the /dev/cu.* name of the port; its owner must be you (ls -l)"
+    return "ask the owner of the machine"
+
+
+def _group(port: str) -> str | None:
+    """The group that may use the port (dialout, uucp, ...), if it is a group of that kind."""
+    try:
+        import grp
+
+        found = Path(port).stat()
+        name = grp.getgrgid(found.st_gid).gr_name
+    except (ImportError, OSError, KeyError):
+        return None
+    return name if found.st_mode & stat.S_IWGRP and name != "root" else None

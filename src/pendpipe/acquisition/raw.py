@@ -1,0 +1,370 @@
+"""The bytes off the wire, kept as they came, with the time at which they came.
+
+A file (version 2) is one line of JSON that describes it, then frames::
+
+    mark (4 bytes)  kind (1 byte)  length (u32)  stream (u16)  at_byte (u64)  time_s (f64)
+    CRC-32 (u32)  content
+
+little-endian, the CRC over the rest of the frame but the mark. ``D`` frames hold data, at most
+a second of it; ``E`` frames an event as JSON; an ``H`` frame repeats the description, whose line
+ends with a CRC-32 of its own. `stream` counts the starts of the device before the frame, and
+`at_byte` the bytes of data. So a damaged frame costs no more than itself: the next one is found
+by its mark, and what is missing between them is known to the byte. The event that ends a
+recording is written twice.
+
+A file is only appended to; where it ends in the midst of a frame (power lost, process killed,
+disk full), what stands before is good. In version 1 frames have neither mark, stream nor
+at_byte and the description no check sum; it is read up to the first damage.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import time
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.errors import InputError
+
+_FORMAT: Final = "pendpipe-raw"
+_BEGINNING: Final = b'{"format": "pendpipe-raw"'
+_LONGEST_HEADER: Final = 1 << 16
+_LONGEST_FRAME: Final = 1 << 22
+"""What claims to be longer is damaged; no device sends as much in a second."""
+_LARGEST_HOLE: Final = 1 << 40
+"""No recording misses more bytes than that: a frame that claims so is not believed."""
+_MARK: Final = b"\xf5\x0aPp"
+_FRAME: Final = struct.Struct("<4scIHQdI")
+_CHECKED: Final = struct.Struct("<cIHQd")
+_FRAME_1: Final = struct.Struct("<cIdI")
+_CHECKED_1: Final = struct.Struct("<cId")
+COMPLETE: Final = ("scans", "time", "noise")
+"""Reasons for which a recording ends when it has what was asked for."""
+
+
+class NothingRecordedError(InputError):
+    """The raw file is sound so far, but holds no scan."""
+
+
+class Frame(NamedTuple):
+    """A piece of a raw file."""
+
+    kind: bytes
+    time_s: float
+    content: bytes
+    stream: int = 0
+    at_byte: int = 0
+
+    def packed(self) -> bytes:
+        """The frame with its mark and check sum."""
+        fields = (self.kind, len(self.content), self.stream, self.at_byte, self.time_s)
+        check = zlib.crc32(self.content, zlib.crc32(_CHECKED.pack(*fields)))
+        return _FRAME.pack(_MARK, *fields, check) + self.content
+
+
+def description_line(header: Mapping[str, Any]) -> bytes:
+    """The description as the first line of a file, without its line feed."""
+    text = json.dumps({"format": _FORMAT, "version": 2, **header}, ensure_ascii=True)[:-1]
+    return f'{text}, "crc32": "{zlib.crc32(text.encode()):08x}"}}'.encode()
+
+
+class RawWriter:
+    """Append a recording's bytes to an open binary file.
+
+    Parameters
+    ----------
+    stream
+        The file, unbuffered; `BytesIO` for a recording kept in memory.
+    header
+        The description: JSON's types only.
+    bytes_per_s
+        Of the data; a frame holds no more.
+    sync_s
+        The bytes are handed to the system at every frame, so that a killed process loses
+        nothing, and to the disk at least every `sync_s` seconds, so that a lost supply
+        loses no more than that.
+    """
+
+    def __init__(
+        self,
+        stream: IO[bytes],
+        header: Mapping[str, Any],
+        *,
+        bytes_per_s: float = 1 << 16,
+        sync_s: float = 1.0,
+    ) -> None:
+        self._stream = stream
+        self._most_bytes = min(max(1, int(bytes_per_s)), _LONGEST_FRAME)
+        self._sync_s = sync_s
+        self._synced = time.monotonic()
+        self._on_disk = hasattr(stream, "fileno") and not hasattr(stream, "getbuffer")
+        self._starts = self._bytes = 0
+        line = description_line(header)
+        self._write(line + b"\n" + Frame(b"H", 0.0, line).packed())
+        self.sync()
+
+    def data(self, time_s: float, content: bytes) -> None:
+        """Keep bytes of the stream that had arrived by `time_s` of the recorder's clock."""
+        for begin in range(0, len(content), self._most_bytes):
+            piece = content[begin : begin + self._most_bytes]
+            self._frame(b"D", time_s, piece)
+            self._bytes += len(piece)
+
+    def event(self, time_s: float, **event: Any) -> None:
+        """Keep what happened, and bring it to the disk."""
+        content = json.dumps(event).encode("ascii")
+        for _ in range(2 if event.get("event") == "stopped" else 1):
+            self._frame(b"E", time_s, content)
+        self._starts += event.get("event") == "restarted"
+        self.sync()
+
+    def sync(self) -> None:
+        """Bring everything to the disk."""
+        self._stream.flush()
+        if self._on_disk:
+            os.fsync(self._stream.fileno())
+        self._synced = time.monotonic()
+
+    def _frame(self, kind: bytes, time_s: float, content: bytes) -> None:
+        self._write(Frame(kind, time_s, content, self._starts, self._bytes).packed())
+        if time.monotonic() - self._synced > self._sync_s:
+            self.sync()
+
+    def _write(self, content: bytes) -> None:
+        """Hand all of it to the system; a disk that takes a part only is full."""
+        left = memoryview(content)
+        while left:
+            left = left[self._stream.write(left) :]
+
+
+def append_event(path: Path, **event: Any) -> None:
+    """Note in a finished raw file what happened to it later: all of it, or nothing."""
+    frame = Frame(b"E", 0.0, json.dumps(event).encode("ascii")).packed()
+    with path.open("r+b", buffering=0) as stream:
+        end = stream.seek(0, os.SEEK_END)
+        if stream.write(frame) != len(frame):
+            stream.truncate(end)
+
+
+def lock(stream: IO[bytes]) -> bool:
+    """Hold a raw file for as long as it is open; return whether nobody else holds it.
+
+    The system lets go of it when the process ends, however it ends. Windows has no such lock.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def is_being_recorded(path: Path) -> bool:
+    """Whether a process is writing to a raw file at this moment."""
+    with path.open("rb") as stream:
+        return not lock(stream)
+
+
+class Hole(NamedTuple):
+    """Bytes of a stream that were recorded, and whose frames are damaged.
+
+    Parameters
+    ----------
+    stream
+        How many times the device was started anew before.
+    at_byte
+        Where in `RawRecording.data` they are missing.
+    bytes_missing
+        How many.
+    """
+
+    stream: int
+    at_byte: int
+    bytes_missing: int
+
+
+@dataclass(frozen=True)
+class RawRecording:
+    """What stands in a raw file.
+
+    Parameters
+    ----------
+    header
+        The description.
+    data
+        The bytes of the stream, joined.
+    arrival_s, arrived_bytes
+        By ``arrival_s[i]`` of the recorder's clock ``arrived_bytes[i]`` of `data` had
+        arrived, shape (n,).
+    events
+        What happened: each a mapping with ``time_s``, ``at_byte`` (of `data`) and whatever
+        was noted with it.
+    damaged_bytes
+        Bytes of the file that are part of no sound frame.
+    holes
+        What is missing in `data`, in order.
+    """
+
+    header: Mapping[str, Any]
+    data: bytes
+    arrival_s: FloatArray
+    arrived_bytes: IntArray
+    events: tuple[Mapping[str, Any], ...]
+    damaged_bytes: int
+    holes: tuple[Hole, ...] = ()
+
+    def event(self, kind: str) -> Mapping[str, Any]:
+        """Return the last event of a kind; empty when there was none."""
+        return next((e for e in reversed(self.events) if e.get("event") == kind), {})
+
+
+def read_raw(source: str | Path | bytes) -> RawRecording:
+    """Read a raw file, or what of it is whole.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no raw recording, or its description is damaged in both
+        places.
+    """
+    place = "raw recording" if isinstance(source, bytes) else str(source)
+    try:
+        content = source if isinstance(source, bytes) else Path(source).read_bytes()
+    except OSError as fault:
+        raise InputError(place, f"can't be read ({fault.strerror})", "check the path") from None
+    header, begin = _header(place, content)
+    frames = _frames_1(content, begin) if header["version"] == 1 else _frames(content, begin)
+    pieces: list[bytes] = []
+    stamps: list[tuple[float, int]] = []
+    events: list[Mapping[str, Any]] = []
+    holes: list[Hole] = []
+    arrival: tuple[int, float] | None = None
+    total = missing = starts = sound = 0
+    for size, frame in frames:
+        hole = frame.at_byte - total - missing
+        if hole > _LARGEST_HOLE:
+            continue
+        sound += size
+        if frame.kind == b"D" and frame.stream > starts:
+            # The event that recorded the restart is damaged.
+            starts = frame.stream
+            reason = "the raw file is damaged here"
+            events.append(
+                {"event": "restarted", "reason": reason, "time_s": frame.time_s, "at_byte": total}
+            )
+        if hole > 0:
+            holes.append(Hole(starts, total, hole))
+            missing += hole
+        if frame.kind == b"D":
+            total += len(frame.content)
+            pieces.append(frame.content)
+            if arrival == (arrival := (starts, frame.time_s)):
+                stamps.pop()  # what arrived at once may fill several frames
+            stamps.append((frame.time_s, total))
+        elif frame.kind == b"E":
+            event = _event(place, frame.content)
+            starts += event.get("event") == "restarted"
+            events.append({**event, "time_s": frame.time_s, "at_byte": total})
+    return RawRecording(
+        header,
+        b"".join(pieces),
+        np.array([time_s for time_s, _ in stamps], dtype=np.float64),
+        np.array([count for _, count in stamps], dtype=np.int64),
+        tuple(events),
+        len(content) - begin - sound,
+        tuple(holes),
+    )
+
+
+def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
+    """Return the description, from the first line or its copy, and where the frames begin."""
+    end = content.find(b"\n", 0, _LONGEST_HEADER)
+    if end < 0 and (content.startswith(_BEGINNING) or _BEGINNING.startswith(content)):
+        problem = "this is no raw recording of pendpipe, or only its beginning"
+        raise NothingRecordedError(place, problem, "give another file")
+    line = content[: max(end, 0)]
+    header = _description(line)
+    if header is None:
+        copies = (frame.content for _, frame in _frames(content, 0) if frame.kind == b"H")
+        header, end = _description(next(copies, b"")), -1
+    if header is None:
+        problem = "this is no raw recording of pendpipe"
+        if content.startswith(_BEGINNING):
+            problem = "the description of the recording is damaged"
+        raise InputError(place, problem, "give another copy")
+    if header.get("version") not in (1, 2):
+        raise InputError(place, "it was made by a newer version", "install a newer pendpipe")
+    return header, end + 1
+
+
+def _description(line: bytes) -> dict[str, Any] | None:
+    """Read a line that describes a recording; ``None`` if it is none, or damaged."""
+    try:
+        header = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(header, dict) or header.get("format") != _FORMAT:
+        return None
+    check = header.pop("crc32", None)
+    if check is None:
+        return header if header.get("version") == 1 else None
+    text, _, _ = line.rpartition(b', "crc32": "')
+    return header if check == f"{zlib.crc32(text):08x}" else None
+
+
+def _event(place: str, body: bytes) -> Mapping[str, Any]:
+    """Return an event's content."""
+    try:
+        event = json.loads(body)
+    except (ValueError, RecursionError):
+        event = None
+    if not isinstance(event, dict):
+        raise InputError(place, "an event in it is damaged", "give another copy")
+    return event
+
+
+def _frames(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
+    """Find the sound frames and how many bytes they take, whatever stands between them."""
+    while begin + _FRAME.size <= len(content):
+        mark, kind, length, stream, at_byte, time_s, check = _FRAME.unpack_from(content, begin)
+        start = begin + _FRAME.size
+        body = content[start : start + min(length, _LONGEST_FRAME)]
+        known = zlib.crc32(_CHECKED.pack(kind, length, stream, at_byte, time_s))
+        if len(body) == length and zlib.crc32(body, known) == check:
+            # A damaged mark does no harm, but is noticed.
+            size = _FRAME.size + length
+            yield (
+                size - (0 if mark == _MARK else len(mark)),
+                Frame(kind, time_s, body, stream, at_byte),
+            )
+            begin += size
+        else:
+            begin = content.find(_MARK, begin + 1)
+            if begin < 0:
+                return
+
+
+def _frames_1(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
+    """Find the frames of version 1 up to the first damaged one."""
+    while begin + _FRAME_1.size <= len(content):
+        kind, length, time_s, check = _FRAME_1.unpack_from(content, begin)
+        start = begin + _FRAME_1.size
+        body = content[start : start + length]
+        known = zlib.crc32(_CHECKED_1.pack(kind, length, time_s))
+        if len(body) < length or zlib.crc32(body, known) != check:
+            return
+        yield _FRAME_1.size + length, Frame(kind, time_s, body)
+        begin = start + length

@@ -1,0 +1,392 @@
+"""The recorder: bytes off the wire are kept first, over breaks of the line, and decoded later."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Final, Protocol, cast
+
+from pendpipe.acquisition.clock import Clock, ScaledClock
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
+from pendpipe.acquisition.drivers.decoders import Decoder
+from pendpipe.acquisition.line import Line, LineLostError
+from pendpipe.acquisition.noise import NoiseWatch
+from pendpipe.acquisition.ports import identify
+from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+_POLLS: Final = 256
+"""Time stamps of a recording, at least, so that its rate can be measured."""
+_SHORTEST_POLL_S, _LONGEST_POLL_S = 0.001, 0.02
+_BACKLOG: Final = 2048
+"""So many bytes at once say that more wait: a pseudo-terminal hands out 4 kB at a time."""
+_SILENCE_S: Final = 3.0
+"""Seconds of the host without a byte (beyond the time of a few scans) that are a break."""
+_PATIENCE_S: Final = 5.0
+"""Seconds of the host, beyond a tenth more than asked, that a slow device is waited for."""
+_RETRY_S: Final = 0.2
+"""Seconds of the host between two attempts to find the device again."""
+
+
+class Progress(Protocol):
+    """A display of how a recording goes on."""
+
+    def begin(self, driver: type[Driver], setup: Setup) -> None:
+        """Show what is recorded; again after a break."""
+
+    def update(self, elapsed_s: float, data: bytes) -> None:
+        """Show further bytes, by `elapsed_s` of the recorder's clock."""
+
+    def end(self) -> None:
+        """Close the display."""
+
+
+@dataclass(frozen=True)
+class AcquisitionRequest:
+    """What is to be recorded.
+
+    Parameters
+    ----------
+    channels
+        Channels as printed on the box, from 1.
+    rate_hz
+        Scans a second; the nearest that the device can do is taken.
+    duration_s
+        Seconds of the recorder's clock.
+    range_volts
+        The signal stays within plus and minus it; the box's usual range when not given.
+    until_noise
+        End also when the amplitude (of the first channel) has reached the noise.
+    reconnect_s
+        Seconds of the host for which a lost or silent device is waited for.
+    """
+
+    channels: tuple[int, ...]
+    rate_hz: float
+    duration_s: float
+    range_volts: float | None = None
+    until_noise: bool = False
+    reconnect_s: float = 30.0
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "duration_s", "range_volts"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InputError(name, f"{value:g} is no positive number", "give one above 0")
+
+
+class Session:
+    """One recording with one instrument, kept as it comes.
+
+    Parameters
+    ----------
+    line
+        The open line; the session closes it, and opens it again after a break.
+    driver
+        The model.
+    request
+        What is to be recorded.
+    clock
+        The recorder's clock.
+    progress
+        A display to keep up to date.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        driver: type[Driver],
+        request: AcquisitionRequest,
+        clock: Clock,
+        progress: Progress | None = None,
+    ) -> None:
+        self._line = line
+        self._driver = driver
+        self._request = request
+        self._clock = clock
+        self._progress = progress
+        self._received = 0
+        self._by_clock = False  # the clock ends it, not the count of scans
+        self._watch: NoiseWatch | None = None
+        self._decoder: Decoder | None = None
+        self.identity, self.setup = self._introduce()
+
+    def close(self) -> None:
+        """Close the line."""
+        self._line.close()
+
+    def run(self, writer: RawWriter) -> None:
+        """Keep everything from start to end, with its time; a break ends or resumes it."""
+        # Taken before the start, so that a device can only seem late, never early.
+        self._origin_s = self._clock.now()
+        reason = ""
+        try:
+            self._instrument.start()
+            reason = self._listen(writer)
+            while reason not in COMPLETE and self._resume(reason, writer):
+                reason = self._listen(writer)
+            self._instrument.stop()
+        except LineLostError as fault:
+            reason = reason or fault.problem
+        except KeyboardInterrupt:
+            reason = "interrupted by the user"
+            self._stop()
+        except OSError:
+            # The disk, not the line: the device need not fill its buffer meanwhile.
+            self._stop()
+            raise
+        finally:
+            if self._progress:
+                self._progress.end()
+        keep = {"keep_scans": self._scans} if reason == "scans" else {}
+        writer.event(self._elapsed_s(), event="stopped", reason=reason, **keep)
+
+    @property
+    def _scans(self) -> int:
+        """How many scans were requested, at the device's own rate."""
+        return max(1, round(self._request.duration_s * self.setup.rate_hz))
+
+    def _elapsed_s(self) -> float:
+        return self._clock.now() - self._origin_s
+
+    def _stop(self) -> None:
+        try:
+            self._instrument.stop()
+        except InputError:
+            self._line.close()
+
+    def _introduce(self) -> tuple[Identity, Setup]:
+        """Ask the device who it is, and set it."""
+        self._instrument = self._driver(self._line, self._clock)
+        request = self._request
+        identity = self._instrument.identify()
+        setup = self._instrument.configure(request.channels, request.rate_hz, request.range_volts)
+        if request.until_noise:
+            self._watch = self._watch or NoiseWatch(setup.rate_hz)
+            self._decoder = self._driver.decoder(len(setup.channels))
+        if self._progress:
+            self._progress.begin(self._driver, setup)
+        return identity, setup
+
+    def _listen(self, writer: RawWriter) -> str:
+        """Keep what comes until it is enough or breaks off; return which."""
+        scans, request, scale = self._scans, self._request, self._clock.scale
+        wanted = scans * self._driver.decoder(len(self.setup.channels)).bytes_per_scan
+        poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, request.duration_s / scale / _POLLS))
+        latest_s = 1.1 * request.duration_s + _PATIENCE_S * scale
+        # A packet may gather many scans before it is sent.
+        silence_s = _SILENCE_S + 64 / self.setup.rate_hz / scale
+        while True:
+            try:
+                data = self._instrument.receive(silence_s)
+            except LineLostError as fault:
+                return fault.problem
+            elapsed_s = self._elapsed_s()
+            if data:
+                writer.data(elapsed_s, data)
+                self._received += len(data)
+            if self._progress:
+                self._progress.update(elapsed_s, data)
+            enough = self._received >= wanted
+            if enough and elapsed_s < 0.9 * (scans - 1) / self.setup.rate_hz:
+                self._by_clock = True
+            if elapsed_s >= (request.duration_s if self._by_clock else latest_s):
+                return "time"
+            if not data:
+                return f"the device fell silent after {elapsed_s:.6g} s"
+            if message := self._instrument.ended(data):
+                return f"the device ended its stream with '{message}'"
+            if enough and not self._by_clock:
+                return "scans"
+            if self._watch and self._decoder:
+                counts = self._decoder.feed(data).counts
+                if self._watch.feed(counts[:, 0]):
+                    return "noise"
+            if len(data) < _BACKLOG:
+                time.sleep(poll_s)
+
+    def _resume(self, reason: str, writer: RawWriter) -> bool:
+        """Find the device again and start it; return whether that was possible in time."""
+        writer.event(self._elapsed_s(), event="broken", reason=reason)
+        self._by_clock = True
+        until_s = time.monotonic() + self._request.reconnect_s
+        while time.monotonic() < until_s and self._elapsed_s() < self._request.duration_s:
+            try:
+                if not self._line.is_open:
+                    self._line = Line(self._line.port, self._driver.baudrate)
+                self._line.set_baudrate(self._driver.baudrate)
+                identity, setup = self._introduce()
+                if (identity, setup) != (self.identity, self.setup):
+                    # Another device, or an answer that was damaged: it is asked again.
+                    self._line.close()
+                    time.sleep(_RETRY_S)
+                    continue
+                writer.event(self._elapsed_s(), event="restarted", reason=reason)
+                self._instrument.start()
+            except InputError:
+                self._line.close()
+                time.sleep(_RETRY_S)
+            else:
+                return True
+        return False
+
+
+def record(
+    port: str,
+    driver: str | None = None,
+    *,
+    channels: Sequence[int] = (1,),
+    rate_hz: float,
+    duration_s: float,
+    clock: Clock | None = None,
+    raw_path: str | Path | None = None,
+    volts_per_radian: float | None = None,
+    source: str | None = None,
+    progress: Progress | None = None,
+    range_volts: float | None = None,
+    until_noise: bool = False,
+    reconnect_s: float = 30.0,
+) -> Recording:
+    """Record from the device on a port, and decode.
+
+    Parameters
+    ----------
+    port
+        A device file, a COM port, or a URL of pyserial.
+    driver
+        The model, a key of `drivers.DRIVERS`; the device is asked when not given.
+    channels
+        Channels as printed on the box, from 1; the first of them is returned (the others
+        by `decode_recording` from the raw file).
+    rate_hz
+        Scans a second; the nearest that the device can do is taken.
+    duration_s
+        Length in s: as many scans as it holds at the device's nominal rate. A device that is
+        faster than it claims is recorded for the whole time.
+    clock
+        The recorder's clock; real time by default, a simulated device's ``clock`` for one.
+    raw_path
+        The file, a new one, in which the bytes off the wire are kept; in memory only when
+        not given.
+    volts_per_radian
+        The sensor's constant, for the metadata.
+    source
+        What to call the source in the metadata; model and port by default.
+    progress
+        A display to keep up to date.
+    range_volts
+        The signal stays within plus and minus it: the smallest range that holds it is taken.
+    until_noise
+        End also when the amplitude of the first channel has reached the noise, see
+        `noise.NoiseWatch`.
+    reconnect_s
+        For so many seconds of the host a device that was unplugged, fell silent or
+        overflowed is looked for again; what was missed is a gap.
+
+    Returns
+    -------
+    Recording
+        In volts. Read its `notes`: losses, an early end, a rate that is not the nominal one.
+
+    Raises
+    ------
+    InputError
+        If the port can't be opened, the device is silent or another one, the setting is
+        impossible, nothing was received, the raw file exists, or it can't be written: what it
+        holds by then is good.
+    """
+    request = AcquisitionRequest(
+        tuple(channels), rate_hz, duration_s, range_volts, until_noise, max(0.0, reconnect_s)
+    )
+    clock = clock or ScaledClock()
+    kind = find_driver(driver or identify(port).model)
+    line = Line(port, kind.baudrate)
+    try:
+        session = Session(line, kind, request, clock, progress)
+    except BaseException:
+        line.close()
+        raise
+    with closing(session), _opened(raw_path) as stream:
+        header = _header(port, session.identity, session.setup, request, clock)
+        header |= {"volts_per_radian": volts_per_radian, "source": source}
+        kept = {key: value for key, value in header.items() if value is not None}
+        try:
+            size = kind.decoder(len(session.setup.channels)).bytes_per_scan
+            bytes_per_s = session.setup.rate_hz * size
+            session.run(RawWriter(stream, kept, bytes_per_s=bytes_per_s))
+        except OSError as fault:
+            raise _cannot_write(raw_path or "memory", fault) from None
+        content = stream.getvalue() if isinstance(stream, BytesIO) else None
+    return decode_recording(content if content is not None else Path(raw_path or ""))
+
+
+def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
+    """Open a new raw file, which is appended to in its place so that a crash leaves it."""
+    if raw_path is None:
+        return nullcontext(BytesIO())
+    path = Path(raw_path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Unbuffered: what was written is the system's at once. What exists stays as it is,
+        # but for devices (a null device may be written to) and attempts without data.
+        free = (path.exists() and not path.is_file()) or _is_without_data(path)
+        stream = cast("IO[bytes]", path.open("wb" if free else "xb", buffering=0))
+    except FileExistsError:
+        raise InputError(
+            path,
+            "there is such a file already, and no raw recording is overwritten",
+            f"name another one (pendpipe acquire --recover {path} --out FILE.csv decodes it)",
+        ) from None
+    except OSError as fault:
+        raise _cannot_write(raw_path, fault) from None
+    lock(stream)
+    return stream
+
+
+def _is_without_data(path: Path) -> bool:
+    """Whether a file is an attempt that ended before the first byte of the stream."""
+    if not path.is_file() or is_being_recorded(path):
+        return False
+    try:
+        return not read_raw(path).data
+    except InputError:
+        return False
+
+
+def _cannot_write(place: str | Path, fault: OSError) -> InputError:
+    return InputError(
+        place,
+        f"can't be written ({fault.strerror})",
+        "make room, or give another file; what was kept till then is opened with "
+        "pendpipe acquire --recover",
+    )
+
+
+def _header(
+    port: str, identity: Identity, setup: Setup, request: AcquisitionRequest, clock: Clock
+) -> dict[str, object]:
+    """Describe a recording for whoever finds the file."""
+    kind = find_driver(identity.model)
+    return {
+        "model": identity.model,
+        "firmware": identity.firmware or None,
+        "serial_number": identity.serial_number or None,
+        "port": port,
+        "channels": list(setup.channels),
+        "bits": kind.bits,
+        "range_volts": setup.range_volts,
+        "rate_hz": setup.rate_hz,
+        "requested_rate_hz": request.rate_hz,
+        "duration_s": request.duration_s,
+        "clock_scale": clock.scale,
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

@@ -1,0 +1,77 @@
+"""Which of the kept attempts is used, and what is never taken for one."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from pendpipe.acquisition.attempts import choose, new_path, read_attempts
+from pendpipe.acquisition.raw import RawWriter, lock
+from pendpipe.errors import InputError
+
+
+def kept(folder: Path, minute: int, scans: int, reason: str | None) -> Path:
+    """A raw file with so many scans, which ended for a reason or not at all."""
+    header = {
+        "model": "DI-2108",
+        "port": "COM3",
+        "channels": [1],
+        "rate_hz": 100.0,
+        "duration_s": 1.0,
+        "recorded_at": f"2026-01-01T00:{minute:02}:00+00:00",
+    }
+    stream = BytesIO()
+    writer = RawWriter(stream, header)
+    for number in range(scans):
+        writer.data(0.01 * number, b"\0\1")
+    if reason:
+        writer.event(1.0, event="stopped", reason=reason)
+    path = new_path(f"{folder}/")
+    path.write_bytes(stream.getvalue())
+    return path
+
+
+def test_the_newest_complete_attempt_is_used(tmp_path: Path) -> None:
+    kept(tmp_path, 1, 100, "scans")
+    newest = kept(tmp_path, 2, 100, "time")
+    kept(tmp_path, 3, 300, None)
+    kept(tmp_path, 4, 300, "interrupted by the user")
+    assert choose(read_attempts(tmp_path.iterdir())).path == newest
+
+
+def test_without_a_complete_attempt_the_longest_is_used(tmp_path: Path) -> None:
+    kept(tmp_path, 1, 20, None)
+    longest = kept(tmp_path, 2, 90, "the line was lost")
+    kept(tmp_path, 3, 50, None)
+    assert choose(read_attempts(tmp_path.iterdir())).path == longest
+
+
+def test_attempts_without_a_scan_do_not_count(tmp_path: Path) -> None:
+    """A header alone, a part of one, an empty file; a damaged file beside a sound one."""
+    kept(tmp_path, 1, 0, None)
+    whole = kept(tmp_path, 2, 0, None).read_bytes()
+    (tmp_path / "part.raw").write_bytes(whole[:20])
+    (tmp_path / "empty.raw").touch()
+    assert read_attempts(tmp_path.iterdir()) == []
+    (tmp_path / "damaged.raw").write_bytes(b"x" * 500)
+    with pytest.raises(InputError, match=r"damaged\.raw: this is no raw recording"):
+        read_attempts(tmp_path.iterdir())
+    sound = kept(tmp_path, 3, 10, None)
+    assert [one.path for one in read_attempts(tmp_path.iterdir())] == [sound]
+
+
+def test_what_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
+    """A recorder may outlive a Snakemake that was killed."""
+    pytest.importorskip("fcntl", reason="this system has no such lock")
+    path = kept(tmp_path, 1, 50, None)
+    with path.open("ab") as recorder:
+        assert lock(recorder)
+        with pytest.raises(InputError, match="another process is recording into it"):
+            read_attempts([path])
+    assert len(read_attempts([path])) == 1
+
+
+def test_no_two_attempts_share_a_name(tmp_path: Path) -> None:
+    assert len({new_path(f"{tmp_path}/") for _ in range(100)}) == 100

@@ -1,0 +1,194 @@
+"""``pendpipe acquire`` as a user calls it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.cli import main
+from pendpipe.recording import read_plain
+
+
+@pytest.mark.parametrize(("kind", "bits"), [("di154", 12), ("di2108", 16)])
+def test_all_a_newcomer_needs(
+    kind: str, bits: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, raw = tmp_path / "decay.csv", tmp_path / "decay.raw"
+    call = f"acquire --device simulated:{kind} --rate 100 --duration 120 --clock-scale 1000"
+    assert main([*call.split(), "--out", str(out), "--raw", str(raw)]) == 0
+    recording = read_plain(out)
+    assert recording.quantity == "volts"
+    assert recording.number("bits") == bits
+    assert recording.number("range_volts") == 10.0
+    assert recording.metadata["source"].startswith("simulated DI-")
+    assert recording.resolution == 20.0 / 2**bits
+    # 0.3 rad at 3.85 V/rad, and at 120 s down by exp(-pi 60/150).
+    values = recording.as_motion().values
+    half_s = round(0.5 / recording.interval_s)
+    assert np.abs(values[: 2 * half_s]).max() == pytest.approx(0.3, rel=0.02)
+    assert np.abs(values[-2 * half_s :]).max() == pytest.approx(
+        0.3 * np.exp(-np.pi * 60 / 150), rel=0.03
+    )
+    assert np.array_equal(decode_recording(raw).values, recording.values)
+    assert f"{len(recording)} samples" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--port /dev/no-such-port --model di2108 --out {}", "there is no such port"),
+        ("--port /dev/no-such-port --out {}", "there is no such port"),
+        ("--device simulated:di700 --out {}", "there is no such simulated device"),
+        ("--device di2108 --out {}", "give simulated:di2108"),
+        ("--device simulated:di2108 --rate 1e9 --out {}", "can't scan at 1e+09 Hz"),
+        ("--device simulated:di2108 --clock-scale 0 --out {}", "must be positive"),
+        ("--device simulated:di2108 --duration nan --out {}", "duration_s: nan"),
+        ("--device simulated:di2108", "give --out"),
+        ("--device simulated:di2108 --samples 0 --out {}", "--samples: it must be positive"),
+        ("--device simulated:di2108 --range-volts 11 --out {}", "no range of +-11 V"),
+        ("--recover nowhere.raw --out {}", "can't be read"),
+        ("--out {}", "no instrument is named"),
+    ],
+)
+def test_a_users_fault_is_one_line_and_status_two(
+    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "never.csv"
+    assert main(["acquire", *words.format(out).split()]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+def test_listing_never_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["acquire", "--list"]) == 0
+    assert capsys.readouterr().out
+
+
+def test_a_length_in_samples_and_a_range(tmp_path: Path) -> None:
+    out = tmp_path / "short.csv"
+    call = "acquire --device simulated:di4108 --rate 100 --samples 250 --range-volts 1.5"
+    assert main([*call.split(), "--clock-scale", "20", "--out", str(out)]) == 0
+    recording = read_plain(out)
+    assert len(recording) == 250
+    assert recording.number("range_volts") == 2.0
+    # The bytes off the wire are kept beside, whether asked for or not.
+    assert np.array_equal(decode_recording(tmp_path / "short.raw").values, recording.values)
+
+
+QUICK = "acquire --device simulated:di2108 --rate 100 --duration 20 --clock-scale 100 --out"
+
+
+def raw_files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.raw")}
+
+
+def test_a_second_call_records_beside_the_first(tmp_path: Path) -> None:
+    out = tmp_path / "decay.csv"
+    assert main([*QUICK.split(), str(out)]) == 0
+    first = raw_files(tmp_path)
+    assert list(first) == ["decay.raw"]
+    assert main([*QUICK.split(), str(out)]) == 0
+    both = raw_files(tmp_path)
+    assert first.items() < both.items()
+    assert len(both) == 2
+    newer = next(name for name in both if name != "decay.raw")
+    assert read_plain(out).metadata["raw_file"] == newer
+
+
+def test_a_raw_file_named_by_the_user_is_never_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    raw = tmp_path / "mine.raw"
+    assert main([*QUICK.split(), str(tmp_path / "a.csv"), "--raw", str(raw)]) == 0
+    kept = raw.read_bytes()
+    assert main([*QUICK.split(), str(tmp_path / "b.csv"), "--raw", str(raw)]) == 2
+    (tmp_path / "notes.txt").write_text("not a recording")
+    assert (
+        main([*QUICK.split(), str(tmp_path / "b.csv"), "--raw", str(tmp_path / "notes.txt")]) == 2
+    )
+    assert capsys.readouterr().err.count("\n") == 2
+    assert raw.read_bytes() == kept
+
+
+def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "decay.csv"
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pendpipe.formats.writing.write", full)
+        assert main([*QUICK.split(), str(out)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "No space left on device" in error
+    kept = read_raw(tmp_path / "decay.raw").data
+    # Nothing is recorded now, although another length is asked for.
+    assert main([*QUICK.split(), str(out), "--duration", "1"]) == 0
+    assert "nothing was recorded now" in capsys.readouterr().err
+    assert len(read_plain(out)) == 2000
+    assert list(raw_files(tmp_path)) == ["decay.raw"]
+    assert read_raw(tmp_path / "decay.raw").data == kept
+    # That call has written it: the next one records again, even where the CSV has gone.
+    out.unlink()
+    assert main([*QUICK.split(), str(out), "--duration", "1"]) == 0
+    assert len(read_plain(out)) == 100
+
+
+def test_a_place_where_nothing_can_be_written_is_refused_before_the_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for out in (tmp_path, tmp_path / "a-file/decay.csv", Path("/dev/null/decay.csv")):
+        (tmp_path / "a-file").touch()
+        assert main([*QUICK.split(), str(out)]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert not raw_files(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_ends_a_recording_and_what_was_recorded_is_written(
+    name: str, tmp_path: Path
+) -> None:
+    number = getattr(signal, name, None)
+    if number is None or sys.platform == "win32":
+        pytest.skip("this system has no such signal")
+    out, raw = tmp_path / "decay.csv", tmp_path / "decay.raw"
+    command = "acquire --device simulated:di2108 --rate 100 --duration 600 --out"
+    process = subprocess.Popen([sys.executable, "-m", "pendpipe.cli", *command.split(), str(out)])
+    while not raw.exists() or raw.stat().st_size < 2000:
+        time.sleep(0.01)
+    os.kill(process.pid, number)
+    os.kill(process.pid, number if name != "SIGINT" else 0)
+    assert process.wait() == 0
+    assert read_raw(raw).event("stopped")["reason"] == "interrupted by the user"
+    recording = read_plain(out)
+    assert len(recording) > 10
+    assert "interrupted by the user" in recording.metadata["notes"]
+
+
+def test_make_clean_spares_what_an_instrument_has_recorded(tmp_path: Path) -> None:
+    make = shutil.which("make")
+    if make is None or sys.platform == "win32":
+        pytest.skip("there is no make")
+    shutil.copy(Path(__file__).parents[2] / "Makefile", tmp_path)
+    raw = tmp_path / "results/live/raw/1.raw"
+    raw.parent.mkdir(parents=True)
+    for path in (raw, raw.parents[1] / "recording.csv", tmp_path / "results/README.md"):
+        path.touch()
+    subprocess.run([make, "-s", "clean"], cwd=tmp_path, check=True)
+    left = [path.name for path in (tmp_path / "results").rglob("*") if path.is_file()]
+    assert sorted(left) == ["1.raw", "README.md"]

@@ -1,0 +1,293 @@
+"""Every fault that a simulated device can have: what the recording then says."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks.faulty_device import FAULTS, Fault, FaultyPath, acquire_faulty
+
+import pendpipe.acquisition.recorder
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.raw import RawWriter
+from pendpipe.arrays import FloatArray
+from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
+
+from .stepped import STEP_S, recorded_in_steps
+
+FAMILIES = ["di154", "di149", "di245", "di2108"]
+SYNC_BIT = FAMILIES[:3]
+SCALE, RATE_HZ = 100.0, 100.0
+STAMP_S = 0.05 * SCALE
+"""A twentieth of a second of a host that is busy with other tests."""
+POLL_S = pendpipe.acquisition.recorder._LONGEST_POLL_S
+"""The recorder's pause between two looks at the line."""
+
+
+def slow(time_s: FloatArray) -> FloatArray:
+    """Rises by less than 0.1 V a second, so that a reading tells its time."""
+    return np.asarray(5.0 * np.sin(0.02 * time_s))
+
+
+def recorded(kind: str, fault: Fault, duration_s: float = 60.0, **wish: Any) -> Recording:
+    options = {"reconnect_s": 5.0, **wish}
+    return acquire_faulty(
+        kind, slow, [fault], rate_hz=RATE_HZ, duration_s=duration_s, clock_scale=SCALE, **options
+    )
+
+
+def missing(recording: Recording) -> int:
+    return 0 if recording.quality is None else int(np.sum(recording.quality == MISSING))
+
+
+def error_steps(recording: Recording, late_s: float = 0.0) -> float:
+    """The worst error of the good samples, in steps, if times may be wrong by `late_s`."""
+    good = np.ones(len(recording), dtype=bool)
+    if recording.quality is not None:
+        good = recording.quality == GOOD
+    error = np.abs(recording.values - slow(recording.time_s))[good]
+    assert recording.resolution is not None
+    return float((error.max() - 0.1 * late_s) / recording.resolution)
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device is silent after a quarter of a second of the host."""
+    monkeypatch.setattr(pendpipe.acquisition.recorder, "_SILENCE_S", 0.25)
+
+
+@pytest.mark.parametrize("kind", ["di245", "di2108"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault("junk"),
+        Fault("no echo"),
+        Fault("wrong echo"),
+        Fault("late echo", duration_s=0.05 * SCALE),
+    ],
+    ids=lambda fault: fault.kind,
+)
+def test_a_spoilt_answer_costs_no_sample(
+    kind: str, fault: Fault, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # After an answer was missed, the start waits as long as one may be late.
+    for driver in ("text.TextDriver", "letters.DI154RS", "letters.DI245"):
+        monkeypatch.setattr(f"pendpipe.acquisition.drivers.{driver}.patience_s", 0.25)
+    recording = recorded(kind, fault, duration_s=20.0)
+    assert missing(recording) == 0
+    assert not recording.notes
+    assert error_steps(recording) <= 0.51
+
+
+@pytest.mark.parametrize("kind", ["di149", "di2108"])
+def test_padding_behind_every_answer_does_not_shift_the_data(kind: str) -> None:
+    """NULs behind the last answer would be the first byte of the first word."""
+    recording = recorded(kind, Fault("padded echo", count=3, times=99), duration_s=20.0)
+    assert error_steps(recording) <= 0.51
+
+
+def test_a_device_that_never_echoes_encode_is_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seen on a DI-4108."""
+    monkeypatch.setattr("pendpipe.acquisition.drivers.text.TextDriver.patience_s", 0.2)
+    recording = recorded("di4108", Fault("no echo", command=b"encode", times=99), duration_s=20.0)
+    assert error_steps(recording) <= 0.51
+
+
+@pytest.mark.parametrize("kind", FAMILIES)
+def test_a_stale_stream_is_ended_before_the_recording(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for driver in ("text.TextDriver", "letters.DI154RS", "letters.DI245"):
+        monkeypatch.setattr(f"pendpipe.acquisition.drivers.{driver}.patience_s", 0.1)
+    recording = recorded(kind, Fault("stale stream"), duration_s=10.0)
+    assert not recording.notes
+    # The signal's zero is that of the stale stream: its own time is read off the first sample.
+    began_s = np.arcsin(recording.values[0] / 5.0) / 0.02
+    assert began_s > 0.0
+    later = slow(began_s + recording.time_s)
+    assert np.abs(recording.values - later).max() < 3 * (recording.resolution or 0.0)
+
+
+@pytest.mark.parametrize("kind", SYNC_BIT)
+@pytest.mark.parametrize("place", [1000, 1001])
+@pytest.mark.parametrize("name", ["drop", "duplicate", "flip"])
+def test_what_breaks_the_frame_mark_costs_one_scan(
+    kind: str, name: str, place: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = recorded_in_steps(
+        kind, slow, Fault(name, at=place), monkeypatch, rate_hz=RATE_HZ, duration_s=15.0
+    )
+    assert missing(recording) == 1
+    assert any("1 scans lost at 1 places" in note for note in recording.notes)
+    assert recording.quality is not None
+    assert np.sum(recording.quality == SUSPECT) <= 1
+    bad = np.flatnonzero(recording.quality)
+    assert abs(bad - 500).max() <= 1
+    # A byte too many costs a row that was never lost: a hundredth of a second.
+    assert error_steps(recording, late_s=1 / RATE_HZ) <= 0.51
+
+
+def test_a_lost_byte_of_the_unmarked_family_is_told_by_the_signal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No mark tells it; the words are cut across from there on, and are put into step again."""
+    recording = recorded_in_steps(
+        "di2108", slow, Fault("drop", at=1001), monkeypatch, rate_hz=RATE_HZ, duration_s=15.0
+    )
+    assert any("bytes slipped at 1 places" in note for note in recording.notes)
+    assert recording.quality is not None
+    gap = np.flatnonzero(recording.quality == MISSING)
+    assert 1 <= len(gap) <= 7
+    assert abs(gap - 500).max() <= 7
+    assert error_steps(recording) <= 0.51
+
+
+def arrivals(kind: str, lost: int) -> bytes:
+    """A raw recording of 150 s in which scans are lost after 40 s; delays of 2 ms and more."""
+    device, random = DEVICES[kind](), np.random.default_rng(6)
+    driver = find_driver(kind)
+    step_volts = driver.range_volts / 2 ** (driver.bits - 1)
+    numbers = np.arange(15_000)
+    numbers = numbers[(numbers < 4000) | (numbers >= 4000 + lost)]
+    codes = np.rint(slow(numbers / RATE_HZ) / step_volts).astype(np.int64)[:, None]
+    stream = BytesIO()
+    header = {
+        "model": driver.model,
+        "port": "COM3",
+        "channels": [1],
+        "rate_hz": RATE_HZ,
+        "recorded_at": "2026-01-01T00:00:00+00:00",
+    }
+    writer, arrived_s = RawWriter(stream, header), 0.0
+    for part in np.array_split(np.arange(len(numbers)), len(numbers) // 2):
+        delay_s = 0.002 + random.exponential(0.003)
+        arrived_s = max(arrived_s, numbers[part[-1]] / RATE_HZ + delay_s)
+        writer.data(arrived_s, device.encode(codes[part]))
+    writer.event(arrived_s, event="stopped", reason="time")
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["di154", "di2108"])
+@pytest.mark.parametrize("lost", [5, 1500])
+def test_whole_scans_lost_are_told_by_the_clock(kind: str, lost: int) -> None:
+    """Without a trace in the bytes."""
+    recording = decode_recording(arrivals(kind, lost))
+    said = f"{lost} scans lost at 1 places, by the recorder's clock"
+    assert any(said in note for note in recording.notes)
+    assert recording.quality is not None
+    gap = np.flatnonzero(recording.quality == MISSING)
+    assert len(gap) == lost
+    assert gap[0] == pytest.approx(4000, abs=4)
+    # An arrival's delay may put the gap a scan or two from its place.
+    assert error_steps(recording, late_s=4 / RATE_HZ) <= 0.51
+
+
+def test_whole_scans_lost_on_a_line_are_told_by_the_clock() -> None:
+    """60 s of 100, on a line: however busy this machine is, that is longer than it sleeps."""
+    recording = recorded("di2108", Fault("lost scans", at=4000, count=6000), duration_s=120.0)
+    assert any("by the recorder's clock" in note for note in recording.notes)
+    assert missing(recording) > 3000
+
+
+@pytest.mark.parametrize("code", [1, 2, 3])
+def test_a_stop_code_is_no_data_and_the_stream_resumes(
+    code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fault = Fault("overflow", at=4000, code=code)
+    recording = recorded_in_steps(
+        "di2108", slow, fault, monkeypatch, rate_hz=RATE_HZ, duration_s=60.0
+    )
+    assert f"the device's buffer overflowed ('stop 0{code}')" in recording.notes
+    assert any("broken off and resumed" in note for note in recording.notes)
+    assert missing(recording) > 0
+    # The next stream is placed by its arrivals: to a scan, and to the recorder's own pause.
+    assert error_steps(recording, late_s=1 / RATE_HZ + POLL_S) <= 0.51
+    assert recording.time_s[-1] == pytest.approx(60.0, abs=1 / RATE_HZ + POLL_S + STEP_S)
+
+
+@pytest.mark.parametrize("kind", ["di154", "di2108"])
+def test_a_stall_loses_nothing(kind: str) -> None:
+    """The device had kept what it could not send."""
+    recording = recorded(kind, Fault("stall", at=4000, duration_s=0.05 * SCALE))
+    assert missing(recording) == 0
+    assert error_steps(recording) <= 0.51
+
+
+@pytest.mark.parametrize(
+    ("kind", "link"), [("di154", "pty"), ("di149", "pty"), ("di2108", "socket")]
+)
+def test_unplugged_and_plugged_in_again_is_a_gap_of_its_true_extent(
+    kind: str, link: str, impatient: None
+) -> None:
+    recording = recorded(kind, Fault("unplug", at=4000, duration_s=15.0), 80.0, link=link)
+    assert any("broken off and resumed: the line was lost" in note for note in recording.notes)
+    assert recording.quality is not None
+    gap = np.flatnonzero(recording.quality == MISSING)
+    assert np.all(np.diff(gap) == 1)
+    assert len(gap) >= 14.0 * RATE_HZ
+    # What the host had not yet read goes with the plug, and on a busy machine that is some.
+    assert gap[0] <= 2000 + STAMP_S * RATE_HZ
+    # What was read behind the gap stands at the time at which it was so.
+    assert error_steps(recording, late_s=STAMP_S) <= 0.51
+
+
+def test_a_device_that_stays_away_ends_the_recording(impatient: None) -> None:
+    recording = recorded("di2108", Fault("unplug", at=4000), reconnect_s=0.3)
+    assert any(note.startswith("ended early: the line was lost") for note in recording.notes)
+    assert len(recording) <= 2000
+    assert error_steps(recording) <= 0.51
+
+
+def test_a_silent_spell_is_a_gap(impatient: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    for driver in ("text.TextDriver", "letters.DI154RS"):
+        monkeypatch.setattr(f"pendpipe.acquisition.drivers.{driver}.patience_s", 0.1)
+    for kind in ("di2108",):
+        recording = recorded(kind, Fault("silence", at=4000, duration_s=0.5 * SCALE), 250.0)
+        assert any("resumed: the device fell silent" in note for note in recording.notes)
+        assert missing(recording) >= 0.4 * SCALE * RATE_HZ
+        assert error_steps(recording, late_s=STAMP_S) <= 0.51
+
+
+@pytest.mark.parametrize("kind", ["di154", "di2108"])
+def test_a_wrong_rate_is_measured(kind: str) -> None:
+    recording = recorded(kind, Fault("wrong rate", factor=1.25))
+    assert recording.metadata["time_base"] == "measured"
+    sd = recording.number("sample_rate_measured_sd_hz") or 0.0
+    assert recording.number("sample_rate_hz") == pytest.approx(125.0, abs=6 * sd)
+    assert recording.number("sample_rate_nominal_hz") == pytest.approx(100.0, rel=1e-3)
+
+
+def test_an_unknown_fault_is_refused() -> None:
+    assert len(FAULTS) == 15
+    with pytest.raises(ValueError, match="no fault is called 'gremlin'"):
+        Fault("gremlin")
+
+
+@pytest.mark.parametrize(
+    ("fault", "arrived"),
+    [
+        (Fault("drop", at=3, count=4), b"abchij"),
+        (Fault("duplicate", at=3, count=2), b"abcdedefghij"),
+        (Fault("flip", at=3, bit=5), b"abcDefghij"),
+        (Fault("lost scans", at=2, count=2), b"abghij"),
+        (Fault("overflow", at=4, code=2), b"abcdstop 02\r"),
+    ],
+    ids=lambda value: value.kind if isinstance(value, Fault) else "",
+)
+@pytest.mark.parametrize("size", [1, 3, 10])
+def test_a_fault_does_what_its_name_says(fault: Fault, arrived: bytes, size: int) -> None:
+    path = FaultyPath([fault])
+    got = b""
+    for begin in range(0, 10, size):
+        if path.condition:
+            break
+        got += path.stream(b"abcdefghij"[begin : begin + size], scan_bytes=2)
+    if fault.kind == "duplicate" and size < 10:
+        # Only what is in one piece can come twice.
+        assert got.startswith(b"abcd")
+    else:
+        assert got == arrived

@@ -1,0 +1,195 @@
+"""The recorder against the noise, a full disk, a killed process and a busy terminal."""
+
+from __future__ import annotations
+
+import errno
+import io
+import math
+import os
+import random
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.drivers.base import Setup
+from pendpipe.acquisition.drivers.text import DI2108
+from pendpipe.acquisition.noise import NoiseWatch
+from pendpipe.acquisition.progress import ProgressLine
+from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
+from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.timebase import find_clock_losses
+from pendpipe.arrays import FloatArray
+from pendpipe.cli import main
+from pendpipe.errors import InputError
+from pendpipe.recording import read_plain
+
+resource = pytest.importorskip("resource", reason="this system has no limit on a file's size")
+
+
+def slow(time_s: FloatArray) -> FloatArray:
+    return np.asarray(5.0 * np.sin(0.02 * time_s))
+
+
+@pytest.mark.parametrize("noise_counts", [0.0, 1.0, 20.0])
+def test_the_noise_is_reached_when_the_decay_has_come_down_to_it(noise_counts: float) -> None:
+    """A exp(-t/tau) meets twice the noise at tau ln(A/2s), give or take a window or three."""
+    noise = np.random.default_rng(1)
+    rate_hz, tau_s, amplitude = 60.0, 200.0, 2e4
+    time_s = np.arange(0.0, 4000.0, 1 / rate_hz)
+    counts = amplitude * np.exp(-time_s / tau_s) * np.cos(2 * math.pi * 0.7 * time_s)
+    counts = np.rint(counts + noise.normal(0.0, noise_counts, len(counts))).astype(np.int16)
+    watch = NoiseWatch(rate_hz)
+    ended_s = next(
+        t for t in np.arange(10.0, 4000.0, 10.0)
+        if watch.feed(counts[round((t - 10) * rate_hz) : round(t * rate_hz)])
+    )  # fmt: skip
+    sd = math.hypot(noise_counts, 1 / math.sqrt(12.0))
+    assert ended_s == pytest.approx(tau_s * math.log(amplitude / (2 * sd)), abs=80.0)
+
+
+def test_a_pendulum_not_yet_released_has_not_decayed() -> None:
+    watch = NoiseWatch(60.0)
+    assert not any(watch.feed(np.zeros(600, dtype=np.int16)) for _ in range(50))
+
+
+def test_a_recording_ends_at_the_noise() -> None:
+    def decay(time_s: FloatArray) -> FloatArray:
+        return np.asarray(4.0 * np.exp(-time_s / 20.0) * np.cos(4.0 * time_s))
+
+    recording = acquire_simulated(
+        "di154", decay, rate_hz=60.0, duration_s=2000.0, clock_scale=200.0, until_noise=True
+    )
+    # 20 ln(4 V / (2 * 4.9 mV/sqrt 12)) = 145 s, and two windows of 20 s.
+    assert 120.0 < recording.time_s[-1] < 250.0
+    assert not recording.notes
+
+
+@pytest.mark.parametrize("lost", [30, 100])
+@pytest.mark.parametrize("drift", [0.0, 0.02])
+def test_lost_scans_are_counted_by_the_clock(lost: int, drift: float) -> None:
+    """Also of a device that runs at another rate than it says."""
+    noise = np.random.default_rng(3)
+    scans = np.arange(1.0, 12_001.0, 2.0)
+    made = scans + np.where(scans > 7000, lost, 0)
+    arrival_s = made / (100.0 * (1 + drift)) + noise.exponential(1e-3, len(scans))
+    found, limit_s = find_clock_losses(arrival_s, scans, 100.0)
+    assert [loss.scans for loss in found] == [pytest.approx(lost, abs=1)]
+    assert scans[found[0].first_arrival] == 7001.0
+    assert limit_s < 0.3
+
+
+def test_a_busy_host_is_no_loss() -> None:
+    """A second late, then everything at once: nothing stays late."""
+    noise = np.random.default_rng(4)
+    scans = np.arange(1.0, 6001.0)
+    arrival_s = scans / 100.0 + noise.exponential(2e-3, len(scans))
+    arrival_s[2000:2100] = arrival_s[2100]
+    assert find_clock_losses(arrival_s, scans, 100.0)[0] == []
+
+
+class FullDisk:
+    """Takes so many bytes and no more."""
+
+    def __init__(self, room: int) -> None:
+        self.content = b""
+        self._room = room
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def write(self, data: bytes) -> int:
+        piece = bytes(data[: self._room - len(self.content)])
+        if not piece:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self.content += piece
+        return len(piece)
+
+
+def test_a_full_disk_keeps_every_whole_frame() -> None:
+    disk = FullDisk(1200)
+    writer = RawWriter(disk, {"model": "DI-2108"})  # type: ignore[arg-type]
+    pieces = [bytes([number]) * 20 for number in range(40)]
+    with pytest.raises(OSError, match="No space left"):
+        for number, piece in enumerate(pieces):
+            writer.data(0.1 * number, piece)
+    raw = read_raw(disk.content)
+    assert b"".join(pieces).startswith(raw.data)
+    described = len(disk.content) - len(disk.content.partition(b"\n")[2])
+    frame = len(Frame(b"D", 0.0, b"").packed())
+    # The description stands twice, the second time as a frame.
+    assert len(raw.data) // 20 == (1200 - 2 * described + 1 - frame) // (frame + 20)
+
+
+def test_a_full_file_system_is_one_line_and_what_was_kept_opens(tmp_path: Path) -> None:
+    raw = tmp_path / "full.raw"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(InputError, match=r"can't be written .*--recover") as caught:
+            acquire_simulated("di2108", slow, rate_hz=1e3, duration_s=60.0, raw_path=raw)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
+    assert str(caught.value).startswith(str(raw))
+    recording = decode_recording(raw)
+    assert len(recording) > 8000
+    assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
+
+
+def kill_a_recorder(raw: Path, after_s: float) -> int:
+    """Record in a process of its own, kill it, and return the size the file had before."""
+    process = os.fork()
+    if not process:
+        try:
+            acquire_simulated(
+                "di2108", slow, rate_hz=1e3, duration_s=1e6, clock_scale=50.0, raw_path=raw
+            )
+        finally:
+            os._exit(1)
+    while not raw.exists() or raw.stat().st_size < 1000:
+        time.sleep(0.005)
+    time.sleep(after_s)
+    size = raw.stat().st_size
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    return size
+
+
+def test_a_killed_recorder_leaves_a_recording_that_opens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    instants = random.Random(5)
+    for number in range(3):
+        raw, out = tmp_path / f"{number}.raw", tmp_path / f"{number}.csv"
+        size = kill_a_recorder(raw, instants.uniform(0.0, 0.3))
+        assert main(["acquire", "--recover", str(raw), "--out", str(out)]) == 0
+        assert "cut short" in capsys.readouterr().err
+        kept = read_raw(raw)
+        # Whatever had been written before is there, but for a frame half written.
+        assert raw.stat().st_size - kept.damaged_bytes >= size - 5000
+        recording = read_plain(out)
+        assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
+    with pytest.raises(InputError, match="no raw recording is overwritten"):
+        acquire_simulated("di2108", slow, rate_hz=60.0, duration_s=1.0, raw_path=raw)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_the_progress_line_tells_amplitude_losses_and_breaks() -> None:
+    line = ProgressLine(Terminal(), 60.0)
+    line.begin(DI2108, Setup((1,), 100.0, 10.0))
+    line.update(1.0, np.array([16384, -16384], dtype="<i2").tobytes())
+    line.begin(DI2108, Setup((1,), 100.0, 10.0))
+    line.update(1.5, np.array([3277, -3277], dtype="<i2").tobytes())
+    text = line.text(2.0)
+    assert "2.0 of 60 s, 4 scans, 2.0 Hz" in text
+    assert "amplitude 1.000 V" in text
+    assert text.endswith("0 lost, 1 break(s)")

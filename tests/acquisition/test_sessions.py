@@ -1,0 +1,272 @@
+"""Device, line, driver, recorder and decoder together, over real terminals and sockets."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.devices.simulated import SimulatedDevice
+from pendpipe.acquisition.drivers.letters import DI154RS, DI245
+from pendpipe.acquisition.drivers.text import DI2108
+from pendpipe.acquisition.line import Line
+from pendpipe.acquisition.ports import identify
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.acquisition.recorder import record
+from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.recording import Recording
+
+LINKS = [
+    pytest.param(
+        "pty",
+        marks=pytest.mark.skipif(
+            not hasattr(os, "openpty"), reason="this system has no pseudo-terminals"
+        ),
+    ),
+    "socket",
+]
+KINDS = [("di154", 12, 4800 / 44), ("di2108", 16, 110.0)]
+
+
+def swing(time_s: FloatArray) -> FloatArray:
+    return np.asarray(4.0 * np.exp(-time_s / 200.0) * np.cos(math.pi * time_s))
+
+
+def step_volts(recording: Recording) -> float:
+    assert recording.resolution is not None
+    return recording.resolution
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize(("kind", "bits", "rate_hz"), KINDS)
+@pytest.mark.parametrize(("scale", "duration_s"), [(1.0, 0.2), (1000.0, 300.0)])
+def test_a_recording_is_the_signal_to_half_a_step(
+    link: str, kind: str, bits: int, rate_hz: float, scale: float, duration_s: float
+) -> None:
+    recording = acquire_simulated(
+        kind, swing, rate_hz=110.0, duration_s=duration_s, clock_scale=scale, link=link
+    )
+    assert len(recording) == round(duration_s * rate_hz)
+    assert step_volts(recording) == 20.0 / 2**bits
+    assert recording.metadata["time_base"] == "nominal"
+    assert not recording.notes
+    error = np.abs(recording.values - swing(recording.time_s))
+    # Half a step, and the slope times what the divisors miss of 110 Hz.
+    assert error.max() <= 0.5 * step_volts(recording) * (1 + 1e-9) + 4 * math.pi * 1e-9
+
+
+@pytest.mark.parametrize(
+    ("kind", "bits", "rate_hz", "scale", "duration_s"),
+    [(*KINDS[0], 500.0, 300.0), (*KINDS[1], 500.0, 300.0), (*KINDS[1], 1.0, 3.0)],
+)
+def test_the_measured_rate_is_true(
+    kind: str, bits: int, rate_hz: float, scale: float, duration_s: float
+) -> None:
+    """Also of a device whose clock is wrong: by a quarter, far beyond the error."""
+    for error in (0.0, 0.25, -0.25) if scale > 1 else (0.25,):
+        recording = acquire_simulated(
+            kind, swing, rate_hz=110.0, duration_s=duration_s, clock_scale=scale, rate_error=error
+        )
+        measured, sd, nominal, used = (
+            recording.number(f"sample_rate{name}_hz")
+            for name in ("_measured", "_measured_sd", "_nominal", "")
+        )
+        assert measured is not None
+        assert sd is not None
+        assert nominal == pytest.approx(rate_hz, rel=1e-6)
+        assert sd < 0.03 * rate_hz
+        assert measured == pytest.approx(rate_hz * (1 + error), abs=6 * sd)
+        assert used == (measured if error else nominal)
+        # As long as was asked by the recorder's clock, and with as many scans as that needs.
+        assert recording.time_s[-1] > 0.9 * duration_s
+        assert len(recording) >= 0.99 * duration_s * rate_hz
+
+
+def test_the_recorders_clock_may_be_one_of_its_own() -> None:
+    """Device and recorder need share nothing but the published scale."""
+    with SimulatedDevice("di2108", swing, clock_scale=200.0) as device:
+        recording = record(
+            device.port,
+            "di2108",
+            rate_hz=100.0,
+            duration_s=60.0,
+            clock=ScaledClock(device.clock_scale),
+        )
+    assert recording.number("sample_rate_measured_hz") == pytest.approx(100.0, rel=0.03)
+
+
+def test_every_channel_gets_its_own_signal(tmp_path: Path) -> None:
+    signals = {number: (lambda t, v=number: np.full(len(t), float(v))) for number in (1, 2, 4)}
+    for kind in ("di154", "di2108"):
+        raw = tmp_path / "run" / f"{kind}.raw"
+        acquire_simulated(
+            kind, signals, channels=(4, 1, 2), rate_hz=50.0, duration_s=20.0, raw_path=raw
+        )
+        for number in (1, 2, 4):
+            recording = decode_recording(raw, channel=number)
+            assert np.abs(recording.values - number).max() <= 0.5 * step_volts(recording)
+
+
+def test_decoding_again_gives_the_same(tmp_path: Path) -> None:
+    raw = tmp_path / "again.raw"
+    first = acquire_simulated("di154", swing, rate_hz=60.0, duration_s=30.0, raw_path=raw)
+    second = decode_recording(raw)
+    assert np.array_equal(first.values, second.values)
+    assert first.metadata == second.metadata
+    header = read_raw(raw).header
+    assert (header["model"], header["channels"], header["bits"]) == ("DI-154RS", [1], 12)
+
+
+def test_noise_does_not_depend_on_the_pace_of_the_host() -> None:
+    def noisy(seed: int) -> Recording:
+        random = np.random.default_rng(seed)
+        return acquire_simulated(
+            "di2108",
+            lambda t: random.normal(0.0, 1.0, len(t)),
+            rate_hz=100.0,
+            duration_s=100.0,
+        )
+
+    assert np.array_equal(noisy(5).values, noisy(5).values)
+    assert not np.array_equal(noisy(5).values, noisy(6).values)
+
+
+def test_a_clipped_signal_stays_at_the_ends_of_the_range() -> None:
+    recording = acquire_simulated("di154", lambda t: 30.0 * swing(t), rate_hz=60.0, duration_s=10.0)
+    assert recording.values.max() == 10.0 - 20.0 / 4096
+    assert recording.values.min() == -10.0
+
+
+@pytest.mark.parametrize("kind", ["di154", "di2108"])
+def test_a_stale_stream_of_a_crashed_run_is_ended_first(kind: str) -> None:
+    with SimulatedDevice(kind, swing, clock_scale=100.0) as device:
+        driver = {"di154": DI154RS, "di2108": DI2108}[kind]
+        with Line(device.port, 4800) as line:
+            crashed = driver(line, device.clock)
+            crashed.identify()
+            crashed.configure([1], 100.0)
+            crashed.start()
+            assert len(crashed.read(1.0)) + len(crashed.read(1.0)) > 0
+        recording = record(device.port, kind, rate_hz=60.0, duration_s=30.0, clock=device.clock)
+    assert np.abs(recording.values - swing(recording.time_s)).max() <= 0.6 * step_volts(recording)
+
+
+@pytest.mark.parametrize(
+    ("kind", "model"), [("di154", "DI-154RS"), ("di2108", "DI-2108")], ids=["di154", "di2108"]
+)
+def test_a_port_tells_who_is_there(kind: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Each family is asked in its own language; the other does not answer.
+    for driver in (DI154RS, DI2108, DI245):
+        monkeypatch.setattr(driver, "patience_s", 0.2)
+        monkeypatch.setattr(driver, "attempts", 1)
+    with SimulatedDevice(kind, swing) as device:
+        assert identify(device.port).model == model
+
+
+def test_a_wrong_model_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DI2108, "patience_s", 0.1)
+    with (
+        SimulatedDevice("di154", swing, clock_scale=100.0) as device,
+        pytest.raises(InputError, match="does not answer") as caught,
+    ):
+        record(device.port, "di2108", rate_hz=60.0, duration_s=1.0, clock=device.clock)
+    assert str(caught.value).startswith(device.port)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_device_that_falls_silent_ends_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pendpipe.acquisition.recorder._SILENCE_S", 0.2)
+    with SimulatedDevice("di2108", swing, clock_scale=100.0) as device:
+        threading.Timer(0.4, device.dialect.respond, [b"stop\r"]).start()
+        recording = record(
+            device.port,
+            "di2108",
+            rate_hz=100.0,
+            duration_s=1e4,
+            clock=ScaledClock(100.0),
+            reconnect_s=0.0,
+        )
+    assert 0 < len(recording) < 1e6
+    assert any("fell silent" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_a_pulled_plug_keeps_what_had_arrived(link: str) -> None:
+    with SimulatedDevice("di2108", swing, clock_scale=100.0, link=link) as device:
+        threading.Timer(0.4, device.unplug).start()
+        recording = record(
+            device.port,
+            "di2108",
+            rate_hz=100.0,
+            duration_s=1e4,
+            clock=ScaledClock(100.0),
+            reconnect_s=0.0,
+        )
+    assert any("the line was lost" in note for note in recording.notes)
+
+
+def test_a_failing_signal_is_not_called_a_silent_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pendpipe.acquisition.recorder._SILENCE_S", 0.2)
+
+    def failing(time_s: FloatArray) -> FloatArray:
+        raise ZeroDivisionError("the signal's own fault")
+
+    with pytest.raises(ZeroDivisionError, match="own fault"):
+        acquire_simulated("di2108", failing, rate_hz=60.0, duration_s=1.0)
+
+
+def test_simulated_time_stands_still_while_held() -> None:
+    clock = SimulatedClock(1000.0)
+    clock.hold()
+    before = clock.now()
+    ScaledClock().sleep(0.01)
+    assert clock.now() == before
+    clock.release()
+    after = clock.now()
+    assert 0 <= after - before < 10.0 + before
+
+
+def test_faults_of_the_port_are_one_line_each(tmp_path: Path) -> None:
+    def refused(port: str) -> str:
+        with pytest.raises(InputError) as caught:
+            record(port, "di2108", rate_hz=60.0, duration_s=1.0)
+        assert caught.value.place == port
+        return str(caught.value)
+
+    plain = tmp_path / "file"
+    plain.touch()
+    assert "there is no such port" in refused(str(tmp_path / "ttyUSB9"))
+    assert "this is no serial port" in refused(str(plain))
+    assert "can't be opened" in refused("nonsense://x")
+    assert "nothing listens there" in refused("socket://127.0.0.1:1")
+    with SimulatedDevice("di2108", swing) as device, Line(device.port, 4800):
+        assert "the port is busy" in refused(device.port)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"rate_hz": 0.0}, "rate_hz: 0 is no positive number"),
+        ({"rate_hz": math.nan}, "rate_hz: nan is no positive number"),
+        ({"duration_s": -1.0}, "duration_s: -1 is no positive number"),
+        ({"channels": (9,)}, "has no channel 9"),
+        ({"channels": ()}, "has no channel none"),
+    ],
+)
+def test_impossible_wishes_are_one_line_each(asked: dict[str, object], message: str) -> None:
+    wish = {"rate_hz": 60.0, "duration_s": 1.0, **asked}
+    with pytest.raises(InputError, match=message):
+        acquire_simulated("di2108", swing, **wish)  # type: ignore[arg-type]
+
+
+def test_an_unknown_simulated_device_is_refused() -> None:
+    with pytest.raises(InputError, match="no such simulated device"):
+        acquire_simulated("di700", swing, rate_hz=60.0, duration_s=1.0)

@@ -1,0 +1,68 @@
+"""The measured scan rate: true whatever delays the arrivals, and honest about its error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe.acquisition.timebase import measure_rate
+
+
+@given(
+    rate_hz=st.floats(1.0, 1e4),
+    delay_s=st.floats(0.0, 10.0),
+    origin_s=st.floats(-100.0, 100.0),
+)
+def test_a_constant_delay_changes_nothing(rate_hz: float, delay_s: float, origin_s: float) -> None:
+    scans = np.arange(1.0, 401.0)
+    found = measure_rate(origin_s + scans / rate_hz + delay_s, scans, 50.0)
+    assert found.measured_hz == pytest.approx(rate_hz, rel=1e-9)
+
+
+@given(scale=st.sampled_from([1.0, 1000.0]), rate_hz=st.floats(10.0, 1000.0))
+def test_units_scale(scale: float, rate_hz: float) -> None:
+    """A clock that runs faster measures a slower device, in proportion."""
+    scans = np.arange(1.0, 401.0)
+    arrival_s = scans / rate_hz + 1e-3 * np.sin(scans) ** 2
+    slow = measure_rate(arrival_s, scans, rate_hz)
+    fast = measure_rate(arrival_s * scale, scans, rate_hz / scale, clock_scale=scale)
+    assert fast.measured_hz * scale == pytest.approx(slow.measured_hz, rel=1e-9)
+    assert fast.measured_sd_hz * scale == pytest.approx(slow.measured_sd_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize("late_s", [1e-3, 1e-2])
+def test_random_delays_leave_the_rate_within_its_error(late_s: float) -> None:
+    """Exponential delays, with one in twenty a hundred times as long."""
+    random = np.random.default_rng(20)
+    pulls = []
+    for _ in range(400):
+        scans = np.arange(8.0, 8.0 * 600, 8.0)
+        delay = random.exponential(late_s, len(scans))
+        delay *= np.where(random.random(len(scans)) < 0.05, 100.0, 1.0)
+        found = measure_rate(scans / 110.0 + delay, scans, 110.0)
+        pulls.append((found.measured_hz - 110.0) / found.measured_sd_hz)
+    assert abs(np.mean(pulls)) < 0.2
+    assert np.std(pulls) < 1.3
+
+
+def test_a_device_that_is_wrong_by_a_factor_is_believed_the_clock() -> None:
+    scans = np.arange(1.0, 501.0)
+    found = measure_rate(scans / 120.0, scans, 60.0)
+    assert found.chosen == "measured"
+    assert found.rate_hz == pytest.approx(120.0)
+
+
+def test_a_quartz_is_believed_before_the_time_stamps() -> None:
+    """10 parts in a million cannot be seen in five seconds."""
+    scans = np.arange(1.0, 501.0)
+    found = measure_rate(scans / (100.0 * (1 + 1e-5)), scans, 100.0)
+    assert found.rate_hz == 100.0
+
+
+def test_too_few_arrivals_measure_nothing() -> None:
+    scans = np.arange(1.0, 36.0)
+    found = measure_rate(scans / 100.0, scans, 90.0)
+    assert np.isnan(found.measured_hz)
+    assert found.rate_hz == 90.0
