@@ -155,6 +155,7 @@ def test_a_set_opens_once_and_every_hash_is_checked(solved: Places) -> None:
     opened = json.loads(open_set(solved).read_text())
     assert opened["seed"] == 7
     assert opened["answered_by"] == sets.code_of_the_solver()
+    assert opened["sets_before"] == "none"
     assert set(opened["items"]) == {"item-0001", "item-0002", "item-0003"}
     with pytest.raises(InputError, match="opened before"):
         open_set(solved)
@@ -168,6 +169,18 @@ def test_the_ledger_holds_every_item_and_no_line_can_go(solved: Places, tmp_path
     copy.write_text("".join([lines[0], lines[2]]))
     with pytest.raises(InputError, match="chain of hashes"):
         sets.check_ledger(copy)
+
+
+def test_the_page_can_tell_which_sets_were_made_before(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.jsonl"
+    assert sets.sets_before(ledger, "third") == "not recorded"
+    for name in ("first", "first", "second", "third"):
+        sets.enter(ledger, {"set": name, "item": "item-0001"})
+    assert sets.sets_before(ledger, "first") == "none"
+    assert sets.sets_before(ledger, "third") == "2 (first, second)"
+    lines = ledger.read_text().splitlines(keepends=True)
+    ledger.write_text("".join(lines[1:]))
+    assert "chain of hashes" in sets.sets_before(ledger, "third")
 
 
 def interrupted(*_: object) -> None:

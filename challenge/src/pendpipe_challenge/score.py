@@ -333,6 +333,7 @@ SEALS: Final = (
     "answered_at",
     "answered_by",
     "opened_at",
+    "sets_before",
     "seed",
     "truth_sha256",
     "answers_sha256",
@@ -361,7 +362,7 @@ def score(opened: dict[str, Any], interval_s: Mapping[str, float] | None = None)
     nulls, singles = family("null"), family("single")
     named = [item for item in family("single", "tie") if item.answer.detected]
     found = {
-        "set": {key: {"answered_by": UNRECORDED, **opened}[key] for key in SEALS},
+        "set": {key: opened.get(key, UNRECORDED) for key in SEALS},
         "items": len(items),
         "families": dict(Counter(item.truth["family"] for item in items)),
         "unsolved": [item.name for item in items if not item.answer.solved],

@@ -36,6 +36,11 @@ from pendpipe.version import __version__
 from pendpipe_challenge.items import make_item, plan
 from pendpipe_challenge.recordings import available, make_real, recording_text
 
+LEDGER: Final = "ledger.jsonl"
+"""Beside the sets' folders: every item ever made."""
+UNRECORDED: Final = "not recorded"
+"""What older sets did not keep."""
+
 
 @contextmanager
 def process_pool(number: int) -> Iterator[ProcessPoolExecutor]:
@@ -122,6 +127,20 @@ def check_ledger(ledger: Path) -> int:
     return len(lines)
 
 
+def sets_before(ledger: Path, of_set: str) -> str:
+    """The sets that were begun before one, in order; whether opened, scored or given up."""
+    if not ledger.exists():
+        return UNRECORDED
+    try:
+        check_ledger(ledger)
+    except InputError as fault:
+        return str(fault)
+    entries = map(json.loads, ledger.read_text(encoding="utf-8").splitlines())
+    begun = list(dict.fromkeys(entry["set"] for entry in entries))
+    earlier = begun[: begun.index(of_set)] if of_set in begun else begun
+    return f"{len(earlier)} ({', '.join(earlier)})" if earlier else "none"
+
+
 @dataclass(frozen=True)
 class Places:
     """Where a set lies: `folder` is what the solver may have, `sealed` what it may not."""
@@ -192,7 +211,7 @@ def make_set(
         print(f"{real}: no real recordings here: that family is left out", flush=True)
     root = np.random.default_rng([secret["seed"], 0])
     recipes = plan(secret["count"], root, real=1000 if there else 0)
-    ledger = ledger or places.folder.parent / "ledger.jsonl"
+    ledger = ledger or places.folder.parent / LEDGER
     there_already = entered(ledger, places.folder.name)
     names = [f"item-{number:04d}" for number in range(1, len(recipes) + 1)]
     todo = [
@@ -293,8 +312,6 @@ PASSED_ON: Final = (
     "VIRTUAL_ENV",
 )
 """Of the environment; nothing else of ours reaches the solver."""
-UNRECORDED: Final = "not recorded"
-"""The commit of answers that were given before it was kept."""
 
 
 def solve_set(
@@ -471,6 +488,7 @@ def open_set(places: Places) -> Path:
             "answered_at": seals["answered_at"],
             "answered_by": seals["answered_by"],
             "opened_at": now(),
+            "sets_before": sets_before(places.folder.parent / LEDGER, places.folder.name),
             "truth_sha256": manifest["truth_sha256"],
             "answers_sha256": seals["answers_sha256"],
             "items": items,
