@@ -14,7 +14,7 @@ from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
     from pendpipe.acquisition.devices.simulated import Signal
-    from pendpipe.analysis.fit.result import Baseline, FitResult, Method
+    from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis import Outcome
@@ -210,6 +210,7 @@ def fit(
     recording: Source,
     *,
     method: Method | None = None,
+    restoring: Restoring | None = None,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     volts_per_radian: float | None = None,
@@ -218,8 +219,9 @@ def fit(
 ) -> FitResult:
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
-    Eq. 8 is fitted to all readings of the decay. Where its law contradicts the decrement of the
-    turning points, Eq. 14 is fitted to these instead. ``fit.light`` is green, amber or red, and
+    Eq. 8, with sin x where the recording asks for it, is fitted to all readings of the decay. Where
+    its law contradicts the decrement of the turning points, these are fitted instead, or the larger
+    amplitudes alone. ``fit.light`` is green, amber or red, and
     ``fit.light_reason`` explains it (docs/fit.md).
 
     Parameters
@@ -228,6 +230,9 @@ def fit(
         A recording, or the path of its file.
     method
         ``"waveform"`` or ``"turning-points"`` to have only that one.
+    restoring
+        ``"linear"`` or ``"sine"``, the restoring torque; by default sin x where the recording
+        asks for it.
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3 (a = c = 0).
     fixed
@@ -277,9 +282,15 @@ def fit(
     else:
         decay = motion.between(points.start_s, points.stop_s)
     result = fit_recording(
-        decay, points=points, method=method, baseline=baseline, fixed=fixed, place=place
+        decay,
+        points=points,
+        method=method,
+        restoring=restoring,
+        baseline=baseline,
+        fixed=fixed,
+        place=place,
     )
-    cuts = tuple(cut._asdict() for cut in points.cuts)
+    cuts = (*(cut._asdict() for cut in points.cuts), *result.cuts)
     return replace(result, cuts=cuts, points=points, decay=decay)
 
 

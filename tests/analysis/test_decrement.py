@@ -168,14 +168,16 @@ def test_no_law_of_a_pendulum_that_swings_far_is_green_and_wrong(
 ) -> None:
     time = np.arange(0.0, 120.0, 0.02)
     values = pendulum(release, time, **STEADY_LOSSES)
-    result = fit_recording(recorded(values, time, rms))
-    assert result.decrement_check
-    for check in result.decrement_check:
-        truth = true_loss(check.amplitude_rad, **STEADY_LOSSES)
-        # What is seen is the truth, whatever was fitted.
-        assert abs(check.seen - truth) < 0.03 * truth + 3.0 * check.seen_sd
-        if result.light != "red":
-            assert check.fitted == pytest.approx(truth, rel=0.1)
+    for restoring in ("linear", "sine"):
+        result = fit_recording(recorded(values, time, rms), restoring=restoring)  # type: ignore[arg-type]
+        assert result.decrement_check
+        for check in result.decrement_check:
+            truth = true_loss(check.amplitude_rad, **STEADY_LOSSES)
+            # What is seen is the truth, whatever was fitted.
+            assert abs(check.seen - truth) < 0.03 * truth + 3.0 * check.seen_sd
+            if result.light != "red":
+                assert check.fitted == pytest.approx(truth, rel=0.1)
+    assert result.light != "red"
 
 
 def test_a_law_that_contradicts_the_decay_is_not_printed(

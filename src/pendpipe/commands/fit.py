@@ -2,7 +2,8 @@
 
 One FILE prints its fit; several print a table, a line a recording. --method waveform fits Eq. 8
 to all readings, --method turning-points fits Eq. 14 to the turning points (the paper's way), and
-auto, the default, takes the turning points only where the waveform's law contradicts the decay.
+auto, the default, takes the turning points, or the larger amplitudes alone, only where the
+waveform's law contradicts the decay. The restoring torque is sin x where the recording asks for it.
 
 The light compares the fitted law's loss with the decrement of the turning points at three
 amplitudes. green: they agree, and noise explains the rest. amber: they agree, but the readings
@@ -43,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gravity", type=float, metavar="G", help="g in m/s^2: prints the equivalent length"
     )
     parser.add_argument("--method", choices=("auto", "waveform", "turning-points"), default="auto")
+    parser.add_argument(
+        "--restoring",
+        choices=("auto", "linear", "sine"),
+        default="auto",
+        help="the restoring torque: omega^2 x, omega^2 sin x, or what the recording asks for",
+    )
     parser.add_argument(
         "--accept", action="store_true", help="print a law that contradicts the decay, status 0"
     )
@@ -124,6 +131,7 @@ def _fit(arguments: argparse.Namespace) -> FitResult:
         recording,
         points=points,
         method=None if arguments.method == "auto" else arguments.method,
+        restoring=None if arguments.restoring == "auto" else arguments.restoring,
         baseline=arguments.baseline,
         fixed=fixed,
         name=arguments.file,

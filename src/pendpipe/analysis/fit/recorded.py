@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.fixed import check_fixed
-from pendpipe.analysis.fit.result import Baseline, FitResult, Method
+from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Recording
+
+_STEP: Final = 1.5
+"""By which the least amplitude grows, where the smaller ones contradict every law tried."""
+_LEAST: Final = 0.3
+"""Of the first amplitude: so much of the decay is kept at least."""
+_FEWEST: Final = 15
+"""Turning points of such a part."""
 
 
 def fit_recording(
     recording: Recording,
     *,
     method: Method | None = None,
+    restoring: Restoring | None = None,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     points: TurningPoints | None = None,
@@ -32,6 +43,9 @@ def fit_recording(
     method
         ``"waveform"`` (Eq. 8 on all readings) or ``"turning-points"`` (Eq. 14). By default the
         waveform, and the turning points where the waveform's law contradicts the decay.
+    restoring
+        The restoring torque, ``"linear"`` or ``"sine"``. By default sin x where the turning
+        points of a recording in radians ask for it (`swings.SineCoefficient`).
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
@@ -44,8 +58,9 @@ def fit_recording(
     Returns
     -------
     FitResult
-        Without ``cuts`` and ``provenance``. Its ``light`` is red where nothing that was tried
-        loses what the decay loses.
+        Without ``provenance``, and with such ``cuts`` only as the fit makes itself: where the
+        law fails at small amplitude, the larger ones are fitted alone. Its ``light`` is red where
+        nothing that was tried loses what the decay loses.
 
     Raises
     ------
@@ -54,7 +69,11 @@ def fit_recording(
         or the search did not come to its end.
     """
     check_fixed(fixed or {}, baseline)
-    result = _fit(recording, method, baseline, fixed, points, place)
+    if restoring == "sine" and recording.quantity == "displacement_m":
+        raise InputError(
+            place, "a displacement in metres has no sine", "leave --restoring out, or give --unit"
+        )
+    result = _fit(recording, method, restoring, baseline, fixed, points, place)
     if result.settled:
         return result
     raise NotAnalysableError(
@@ -67,52 +86,83 @@ def fit_recording(
 def _fit(
     recording: Recording,
     method: Method | None,
+    restoring: Restoring | None,
     baseline: Baseline,
     fixed: Mapping[str, float] | None,
     points: TurningPoints | None,
     place: str | Path,
 ) -> FitResult:
-    if method == "turning-points":
-        if points is None:
-            from pendpipe.analysis.turning_points import find_turning_points
-
-            points = find_turning_points(recording, place)
-        return fit_points(points, baseline=baseline, fixed=fixed)
     from pendpipe.analysis.fit.by_waveform import fit_plain_waveform, fit_waveform
     from pendpipe.analysis.turning_points.samples import prepare
 
     samples = prepare(recording, place)
     if points is None:
-        plain = fit_plain_waveform(samples) if baseline == "eq8" and not fixed else None
+        quick = method is None and restoring is None and baseline == "eq8" and not fixed
+        plain = fit_plain_waveform(samples) if quick else None
         if plain is not None and plain.light != "red":
             return plain
         from pendpipe.analysis.turning_points.find import turning_points_of
 
         points = turning_points_of(samples, place)
-    result = fit_waveform(samples, points, baseline=baseline, fixed=fixed)
-    if method is None and (result.light == "red" or not result.settled):
-        return _from_turning_points(result, points, baseline, fixed)
-    return result
+    if restoring is None:
+        restoring = restoring_of(points)
+    if method == "turning-points":
+        return _of_points(points, restoring, baseline, fixed)
+    result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
+    if method == "waveform" or _stands(result):
+        return result
+    by_points = _of_points(points, restoring, baseline, fixed)
+    if _stands(by_points):
+        why = result.light_reason if result.settled else "it did not settle"
+        return _amber(by_points, f"from the turning points, since of the waveform {why}")
+    for part in _larger_amplitudes(points):
+        larger = fit_waveform(samples, part, baseline=baseline, fixed=fixed, restoring=restoring)
+        if _stands(larger):
+            return _of_larger(larger, points, part)
+    return result if result.settled else by_points
 
 
-def _from_turning_points(
-    waveform: FitResult,
+def _stands(result: FitResult) -> bool:
+    """Whether it settled, and does not contradict the decay."""
+    return result.settled and result.light != "red"
+
+
+def _amber(result: FitResult, reason: str) -> FitResult:
+    return replace(result, light="amber", light_reason=reason)
+
+
+def _larger_amplitudes(points: TurningPoints) -> Iterator[TurningPoints]:
+    """Fewer and fewer of the turning points: at small amplitude bearings have other laws."""
+    amplitude = points.amplitude_rad
+    least = float(np.median(amplitude[-5:]))
+    while (least := _STEP * least) < _LEAST * float(amplitude[0]):
+        part = points.first(int(np.flatnonzero(amplitude >= least)[-1]) + 1)
+        if len(part) >= _FEWEST:
+            yield part
+
+
+def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) -> FitResult:
+    least = float(part.amplitude_rad[-1])
+    below = f"below {least:.2g} {points.unit} the decay is not that of the fitted law"
+    cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
+    return replace(_amber(result, f"{below}: that is left out"), cuts=(*result.cuts, cut))
+
+
+def restoring_of(points: TurningPoints) -> Restoring:
+    """Which restoring torque the times of the turning points ask for."""
+    from pendpipe.analysis.fit.swings import sine_coefficient
+
+    return "sine" if points.unit == "rad" and sine_coefficient(points).asks_for_sine else "linear"
+
+
+def _of_points(
     points: TurningPoints,
+    restoring: Restoring,
     baseline: Baseline,
     fixed: Mapping[str, float] | None,
 ) -> FitResult:
-    """Fit the turning points, where the waveform's law contradicts the decay.
+    if restoring == "linear":
+        return fit_points(points, baseline=baseline, fixed=fixed)
+    from pendpipe.analysis.fit.by_waveform import fit_points_with_sine
 
-    It stands if it is not contradicted itself: else the waveform's is shown.
-    """
-    result = fit_points(points, baseline=baseline, fixed=fixed)
-    if not result.settled or (result.light == "red" and waveform.settled):
-        return waveform
-    why = waveform.light_reason if waveform.settled else "it did not settle"
-    if result.light == "red":
-        return result
-    return replace(
-        result,
-        light="amber",
-        light_reason="from the turning points, since the waveform can't be fitted: " + why,
-    )
+    return fit_points_with_sine(points, baseline=baseline, fixed=fixed)

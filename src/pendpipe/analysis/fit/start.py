@@ -33,6 +33,8 @@ class Start(NamedTuple):
     reliable: int
     """How many turning points the start predicts to a fraction of a radian."""
     warnings: tuple[str, ...]
+    last_s: float | None = None
+    """The time after which the stop is near; None where Eq. 14 is to tell."""
 
 
 def start_values(
@@ -137,6 +139,9 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     first = float(start.value[5]) if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
+    if start.last_s is not None:
+        last = min(last, start.last_s + 0.5 * half_period)
+        width = 0.0
     y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
     if 0.0 < _STOP * width < y0 and end < 2.0 * _STOP * width:
         last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))

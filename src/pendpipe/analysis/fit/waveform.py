@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.minimise import Quadratic
 from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.analysis.fit.result import Restoring
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, compare, residuals, sample_with_jacobian
 
@@ -41,6 +42,8 @@ class Waveform:
     step
         The step of readings whose rounding is not random (see `rounding.py`); `noise_rms` is
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
+    restoring
+        The restoring torque.
     split
         What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
         held fixed; empty when the share is marginalised over its prior.
@@ -51,13 +54,15 @@ class Waveform:
     noise_rms: float
     split: Mapping[str, float]
     step: float = 0.0
+    restoring: Restoring = "linear"
     _last: dict[bytes, FloatArray] = field(default_factory=dict, compare=False, repr=False)
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
         hysteretic, viscous = self.parts(value)
         a, _, c, omega, angle, time, offset, _ = value.tolist()
-        return Eq8(omega, a, hysteretic, viscous, c), Release(time, angle, offset)
+        law = Eq8(omega, a, hysteretic, viscous, c, self.restoring)
+        return law, Release(time, angle, offset)
 
     def parts(self, value: FloatArray) -> tuple[float, float]:
         """The hysteretic and the viscous part of b."""

@@ -1,0 +1,209 @@
+"""sin x in the fit: where a recording asks for it, and with the right numbers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from pendpipe import cli
+from pendpipe.analysis.fit import fit_recording
+from pendpipe.analysis.fit.swings import balance, elliptic, fit_swings, sine_coefficient
+from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
+from pendpipe.errors import InputError
+from pendpipe.files import read_json
+from pendpipe.recording import Recording
+
+from .test_decrement import SHARED, pendulum, recorded
+
+OMEGA = 5.0
+TIME = np.arange(0.0, 120.0, 0.02)
+
+
+def points_of(law: Eq8, release: float, count: int, sd: float = 1e-4) -> TurningPoints:
+    motion = turning_points(law, Release(0.3, release), count=count)
+    error = sd * np.ones(count)
+    random = np.random.default_rng(5)
+    return TurningPoints(
+        np.arange(count),
+        motion.time_s + error / OMEGA * random.standard_normal(count),
+        error / OMEGA,
+        motion.angle_rad + error * random.standard_normal(count),
+        error,
+        np.zeros(count),
+        level_sd_rad=1e-4,
+    )
+
+
+def test_elliptic_integrals_are_scipy_s() -> None:
+    m = np.array([0.0, 1e-8, 0.3, 0.9, 1.0 - 1e-6])
+    k, e = elliptic(m)
+    np.testing.assert_allclose(k, ellipk(m), rtol=1e-13)
+    np.testing.assert_allclose(e, ellipe(m), rtol=1e-12)
+
+
+@pytest.mark.parametrize("release", [0.3, 1.5, 2.9])
+def test_half_swings_balance_their_energy(release: float) -> None:
+    law = Eq8(OMEGA, 0.02, 0.005, 0.005, 0.01, "sine")
+    omega, rates = balance(points_of(law, release, 40, sd=1e-9))
+    assert omega == pytest.approx(OMEGA, rel=2e-3)
+    loss = rates @ [0.5 * release**2, release, 1.0]
+    assert loss == pytest.approx(0.01 * release**2 + 0.01 * release + 0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("release", [0.3, 1.2, 2.5, 2.9])
+def test_the_fit_of_counted_turning_points_finds_the_law(release: float) -> None:
+    law = Eq8(OMEGA, 0.02, 0.005, 0.005, 0.01, "sine")
+    found = fit_swings(points_of(law, release, 30))
+    assert found is not None
+    assert found.minimum.converged
+    value = found.minimum.value
+    sd = np.sqrt(np.diag(np.linalg.inv(found.minimum.quadratic.normal)))
+    truth = np.array([0.02, 0.01, 0.01, OMEGA, release, 0.3])
+    assert np.all(np.abs(value[:6] - truth) < 4.0 * sd[:6])
+    loose = found.by_amplitudes().minimum.value
+    assert loose[3] == pytest.approx(OMEGA, rel=1e-3)
+    assert loose[:3] @ [0.25, 0.5, 1.0] == pytest.approx(0.02, rel=0.05)
+
+
+def test_sin_x_is_taken_only_where_the_times_ask_for_it() -> None:
+    sine = Eq8(OMEGA, 0.02, 0.005, 0.005, 0.001, "sine")
+    coefficient = sine_coefficient(points_of(sine, 1.0, 60))
+    assert coefficient.value == pytest.approx(1.0, abs=4.0 * coefficient.sd + 0.02)
+    assert coefficient.asks_for_sine
+    # A torsion wheel turns as far, with a torque that is linear.
+    wheel = sine_coefficient(points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 2.5, 60))
+    assert abs(wheel.value) < 0.02
+    assert not wheel.asks_for_sine
+    # Swings so small that nobody can tell stay linear, and so do torques that harden.
+    small = Eq8(OMEGA, viscous=0.01, restoring="sine")
+    assert not sine_coefficient(points_of(small, 0.01, 60)).asks_for_sine
+    points = points_of(Eq8(OMEGA, viscous=0.02), 0.5, 60)
+    faster = 0.05 * np.cumsum(points.amplitude_rad**2) * math.pi / OMEGA
+    hard = TurningPoints(
+        points.half_cycle, points.time_s - faster, points.time_sd_s, points.angle_rad,
+        points.angle_sd_rad, points.level_rad,
+    )  # fmt: skip
+    assert sine_coefficient(hard).value < -0.5
+    assert not sine_coefficient(hard).asks_for_sine
+
+
+@pytest.mark.parametrize("release", [0.5, 1.4, 2.9])
+def test_a_b_c_and_the_frequency_of_a_pendulum_that_swings_far(release: float) -> None:
+    law = Eq8(OMEGA, 0.02, 0.004, 0.006, 0.003, "sine")
+    truth = {"a": 0.02, "b": 0.01, "c": 0.003, "frequency": 0.5 * OMEGA / math.pi}
+    pulls = []
+    for seed in range(6):
+        result = fit_recording(
+            recorded(sample(law, Release(-0.2, release, 0.01), TIME), TIME, 1e-3, seed)
+        )
+        assert (result.restoring, result.method, result.light) == ("sine", "waveform", "green")
+        pulls.append([(result.value(k) - v) / result.parameters[k].sd for k, v in truth.items()])
+    assert np.all(np.abs(np.mean(pulls, axis=0)) < 1.7)
+    assert np.all(np.std(pulls, axis=0) < 2.0)
+
+
+@pytest.mark.parametrize("release", [0.6, 1.5, 2.5])
+def test_drag_in_its_true_form_is_lost_as_the_law_says(release: float) -> None:
+    # Not the energy form of the fit: the readings tell, and the losses agree all the same.
+    values = pendulum(release, TIME, quadratic=0.03, viscous=0.01, coulomb=0.002)
+    result = fit_recording(recorded(values, TIME, 1e-3))
+    assert result.restoring == "sine"
+    assert result.light != "red"
+    assert all(abs(check.excess) < 0.06 for check in result.decrement_check[:2])
+
+
+def test_a_wheel_that_turns_far_stays_linear() -> None:
+    law = Eq8(OMEGA, 0.0, 0.0, 0.01, 0.01)
+    result = fit_recording(recorded(sample(law, Release(-0.2, 2.5), TIME), TIME, 5e-3))
+    assert (result.restoring, result.light) == ("linear", "green")
+    assert result.value("c") == pytest.approx(0.01, abs=4.0 * result.parameters["c"].sd)
+
+
+def test_a_small_swing_is_fitted_as_before() -> None:
+    law = Eq8(OMEGA, 0.1, 0.005, 0.005, 1e-4)
+    recording = recorded(sample(law, Release(-0.2, 0.07), TIME), TIME, 1e-4)
+    points = find_turning_points(recording)
+    auto, linear = (
+        fit_recording(recording, points=points, restoring=restoring)
+        for restoring in (None, "linear")
+    )  # type: ignore[misc]
+    assert auto.as_json() == linear.as_json()
+
+
+def test_the_turning_points_alone_know_sin_x() -> None:
+    law = Eq8(OMEGA, 0.02, 0.004, 0.006, 0.003, "sine")
+    recording = recorded(sample(law, Release(-0.2, 2.0, 0.01), TIME), TIME, 1e-3)
+    result = fit_recording(recording, method="turning-points")
+    assert (result.method, result.restoring) == ("turning-points", "sine")
+    for name, value in {"a": 0.02, "b": 0.01, "c": 0.003, "offset": 0.01}.items():
+        assert abs(result.value(name) - value) < 4.0 * result.parameters[name].sd + 0.01 * value
+    assert result.value("frequency") == pytest.approx(0.5 * OMEGA / math.pi, rel=1e-4)
+
+
+def test_what_is_held_is_held_with_sin_x() -> None:
+    law = Eq8(OMEGA, 0.02, 0.004, 0.006, 0.003, "sine")
+    recording = recorded(sample(law, Release(-0.2, 1.4, 0.01), TIME), TIME, 1e-3)
+    for method in ("waveform", "turning-points"):
+        result = fit_recording(recording, method=method, fixed={"b": 0.01, "offset": 0.01})  # type: ignore[arg-type]
+        assert result.restoring == "sine"
+        assert result.value("b") == 0.01
+        assert result.value("offset") == 0.01
+
+
+def test_metres_have_no_sine() -> None:
+    values = sample(Eq8(OMEGA, viscous=0.01), Release(-0.2, 0.5), TIME)
+    with pytest.raises(InputError, match="metres has no sine"):
+        fit_recording(Recording(TIME, values, "displacement_m"), restoring="sine")
+
+
+def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> None:
+    values = sample(Eq8(OMEGA, 0.0, 0.0, 0.02, 1e-3), Release(-0.2, 0.5), TIME)
+    # A bearing that takes far more from small swings than from large ones.
+    small = np.abs(values) < 0.02
+    late = int(np.flatnonzero(~small)[-1])
+    values[late:] *= np.exp(-0.3 * (TIME[late:] - TIME[late]))
+    result = fit_recording(recorded(values, TIME, 1e-5), restoring="linear")
+    assert result.light == "amber"
+    assert "the decay is not that of the fitted law" in result.light_reason
+    assert result.cuts[-1]["stop_s"] == pytest.approx(TIME[-1])
+    assert result.value("b") == pytest.approx(0.02, rel=0.02)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")
+@pytest.mark.parametrize(
+    ("name", "torque"),
+    [
+        ("profcarter-adip/adip_pend_data.mat", "sine"),
+        ("profcarter-adip/cdip_pend_data.mat", "sine"),
+        ("yfysiks-encoder/data32.csv", "sine"),
+        ("yfysiks-encoder/data2_14.csv", "sine"),
+        ("nielsskov-cartpend/test1pend1.csv", "sine"),
+        ("nielsskov-cartpend/test1pend2.csv", "sine"),
+        ("kenevich-furuta-arm2/dataset4.txt", "sine"),
+        ("tylertian-phy180/lab1_data.txt", "sine"),
+        ("jiarui-phy180/8050.txt", "sine"),
+        ("jiarui-phy180/8053.txt", "sine"),
+        ("jiarui-phy180/8055.txt", "sine"),
+        ("davidw99-wood-steel-bob/damping_angle.xlsx", "sine"),
+        ("jlefebvre-phy180/q2_data.csv", "sine"),
+        ("martin8ner-pohl-eddy/1.3_100mA.csv", "linear"),
+        ("martin8ner-pohl-eddy/1.3_200mA.csv", "linear"),
+        ("kvlcc2-roll-decay/model_test_21337.csv", "linear"),
+    ],
+)
+def test_real_pendulums_swing_by_sin_x_and_wheels_do_not(
+    name: str, torque: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "fit.json"
+    cli.main(["fit", str(SHARED / name), "--out", str(out)])
+    content = read_json(out)
+    assert content["restoring"] == torque
+    if torque == "sine":
+        assert content["light"] != "red"
+        largest = content["decrement_check"][0]
+        assert largest["fitted"] == pytest.approx(largest["seen"], rel=0.05)
