@@ -175,8 +175,9 @@ def test_no_law_of_a_pendulum_that_swings_far_is_green_and_wrong(
             truth = true_loss(check.amplitude_rad, **STEADY_LOSSES)
             # What is seen is the truth, whatever was fitted.
             assert abs(check.seen - truth) < 0.03 * truth + 3.0 * check.seen_sd
+            unseen = 2.0 * check.seen_sd if result.light == "amber" else 0.0
             if result.light != "red":
-                assert check.fitted == pytest.approx(truth, rel=0.1)
+                assert abs(check.fitted - truth) < 0.1 * truth + unseen
     assert result.light != "red"
 
 
