@@ -32,6 +32,8 @@ _STEEP: Final = 1.0
 """The same over the fewest turning points: nearer to the stop no decrement can be seen."""
 _SEEN: Final = 4.0
 """Standard deviations that a turning point must stand out."""
+_STEPS: Final = 4.0
+"""Steps of the readings within which rounding moves all turning points alike."""
 
 
 class Decrement(NamedTuple):
@@ -87,7 +89,8 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
     tuple of Decrement
         The large amplitude first; empty where there are too few turning points.
     """
-    clear = points.chosen(points.amplitude_rad > _SEEN * points.angle_sd_rad)
+    least = np.maximum(_SEEN * points.angle_sd_rad, _STEPS * points.step_rad)
+    clear = points.chosen(points.amplitude_rad > least)
     while len(clear) > 3 * _FEWEST and _end_is_steep(clear.amplitude_rad):
         clear = clear.first(len(clear) - 1)
     if len(clear) < 4:

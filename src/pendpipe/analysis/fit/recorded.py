@@ -134,7 +134,8 @@ def _amber(result: FitResult, reason: str) -> FitResult:
 def _larger_amplitudes(points: TurningPoints) -> Iterator[TurningPoints]:
     """Fewer and fewer of the turning points: at small amplitude bearings have other laws."""
     amplitude = points.amplitude_rad
-    least = float(np.median(amplitude[-5:]))
+    # Noise may have made the last ones negative.
+    least = max(float(np.median(amplitude[-5:])), 1e-4 * float(amplitude[0]))
     while (least := _STEP * least) < _LEAST * float(amplitude[0]):
         part = points.first(int(np.flatnonzero(amplitude >= least)[-1]) + 1)
         if len(part) >= _FEWEST:
