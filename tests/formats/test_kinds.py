@@ -209,9 +209,7 @@ def test_a_step_of_an_encoder_or_of_the_other_unit_gives_the_unit(tmp_path: Path
     np.testing.assert_allclose(recording.values, small, atol=1e-3)
     assert not any("--unit" in guess for guess in recording.weak_guesses)
     printed = np.radians(np.rint(1e5 * np.degrees(small)) / 1e5)
-    recording = read_text(
-        tmp_path, text(TIME, printed, digits=12, head="x\ty\n".replace("\t", ","))
-    )
+    recording = read_text(tmp_path, text(TIME, printed, digits=12, head="x,y\n"))
     assert any("its step is 1e-05 degrees" in note for note in recording.notes)
     assert recording.quantity == "angle_rad"
 
@@ -306,6 +304,33 @@ def test_logger_pro_labview_and_pandas_as_text(tmp_path: Path) -> None:
     index = np.arange(len(TIME), dtype=float)
     pandas = text(index, TIME, ANGLE, head=",t,theta\n")
     same(read_text(tmp_path, pandas))
+
+
+def test_tracker_as_text_and_dates_beside_times(tmp_path: Path) -> None:
+    across = text(
+        TIME,
+        np.sin(ANGLE),
+        -np.cos(ANGLE),
+        np.degrees(ANGLE) - 90,
+        sign="\t",
+        head="t\tx\ty\tθ_{r}\n",
+    )
+    recording = read_text(tmp_path, "#mass_A\n" + across)
+    assert inspect(tmp_path / "a.txt").chosen == "θ_r"
+    same(recording)
+    dated = "".join(
+        f"5/1/2024,12:{int(t // 60):02d}:{t % 60:06.3f},{np.degrees(x):.4f}\n"
+        for t, x in zip(TIME, ANGLE, strict=True)
+    )
+    same(read_text(tmp_path, "Date,Time,Angle (deg)\n" + dated))
+
+
+def test_frames_that_are_only_counted_need_a_rate(tmp_path: Path) -> None:
+    count = np.arange(len(TIME), dtype=float)
+    rows = text(count, ANGLE, digits=6, head="frame,theta (rad)\n")
+    with pytest.raises(InputError, match=r"'frame' only counts.*--sample-rate"):
+        read_text(tmp_path, rows)
+    same(read_text(tmp_path, "fps: 30\n" + rows))
 
 
 def test_minus_signs_and_blanks_of_a_typesetter(tmp_path: Path) -> None:

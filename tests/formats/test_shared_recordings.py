@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.files import rows
 
 from pendpipe.analysis.free_decay import find_free_decay
 from pendpipe.errors import InputError, NotAnalysableError
@@ -146,3 +147,9 @@ def test_windaq_values_and_the_pause_are_those_known() -> None:
 def test_a_table_without_a_time_is_refused_and_says_so() -> None:
     with pytest.raises(InputError, match="no time column"):
         read(SHARED / "jiarui-phy180/PeriodVsAngleData.txt")
+
+
+def test_every_shared_file_is_read_right_or_refused_for_its_reason() -> None:
+    found = rows()
+    assert [row for row in found if row.outcome == "wrong"] == []
+    assert sum(row.outcome == "right" for row in found) > 0.9 * len(found)

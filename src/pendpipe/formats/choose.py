@@ -226,10 +226,10 @@ def _time(
         distinct = min(1.0, len(np.unique(finite)) / (0.5 * len(finite)))
         # A drifting reading rises too, but hardly in even steps.
         even = _evenness(finite)
-        first = place == 0 and role in ("unknown", "index", "length") and share > 0.99
+        first = place <= 0 and role in ("unknown", "index", "length") and share > 0.99
         if not named and even < 0.5 and not first:
             continue
-        score = 10.0 * named + 2.0 * (place == 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
+        score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
         if role == "index":
             score -= 5.0
         elif not named and _counts_samples(column, role):

@@ -137,7 +137,7 @@ def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
             if layout.is_number(cell):
                 found += 1
                 numbers[place] += 1
-            elif ":" in cell and _CLOCK.fullmatch(cell.lstrip("'")):
+            elif _DATE.fullmatch(cell) or (":" in cell and _CLOCK.fullmatch(cell.lstrip("'"))):
                 found += 1
             else:
                 blank += cell.lower() in BLANK_CELLS
@@ -212,7 +212,8 @@ def _is_row(line: str, layout: Layout) -> bool:
         return False
     filled = [cell for cell in cells if cell.lower() not in BLANK_CELLS]
     numbers = sum(map(layout.is_number, filled))
-    return numbers > 0 and 2 * numbers >= len(filled)
+    dates = sum(bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in filled)
+    return numbers > 0 and 2 * (numbers + dates) >= len(filled)
 
 
 def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
@@ -228,6 +229,7 @@ def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
         return None
 
 
+_DATE: Final = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _WITH_UNIT: Final = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]\S{0,5})")
 
 

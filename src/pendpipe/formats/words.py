@@ -125,6 +125,7 @@ def split_header(text: str) -> tuple[str, str]:
     (('theta', 'deg'), ('x', ''), ('Angle', 'rad'))
     """
     text = text.strip().strip('"').replace("$", "").replace("\\", "").strip()
+    text = re.sub(r"_\{([^}]*)\}", r"_\1", text)
     text = text[1:-1] if len(text) > 2 and text[0] == text[-1] == "'" else text
     text = re.sub(r"(?i)^(latest|run\s*\d+|data ?set\s*\d*|set\s*\d+)\s*:\s*", "", text)
     text = (
