@@ -21,13 +21,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
 from pendpipe.commands._campaign import add_campaign, add_record
 from pendpipe.errors import InputError
-
-if TYPE_CHECKING:
-    from pendpipe.acquisition.progress import ProgressLine
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -239,11 +235,43 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
     """Record into a raw file."""
     from pendpipe.acquisition.progress import ProgressLine
 
-    progress = ProgressLine(sys.stderr, arguments.duration)
+    options = {
+        "channels": (arguments.channel or 1,),
+        "rate_hz": arguments.rate,
+        "duration_s": arguments.duration,
+        "raw_path": raw,
+        "progress": ProgressLine(sys.stderr, arguments.duration),
+        "range_volts": arguments.range_volts,
+        "until_noise": arguments.until_noise,
+        "reconnect_s": arguments.reconnect,
+    }
     if arguments.device:
-        _simulated(arguments, raw, progress)
+        from pendpipe.acquisition.simulated import acquire_simulated, example_signal
+
+        where, _, kind = arguments.device.partition(":")
+        if where != "simulated" or not kind:
+            raise InputError(
+                f"--device {arguments.device}",
+                "only simulated devices go here",
+                "give simulated:di2108",
+            )
+        constant = arguments.volts_per_radian or 3.85
+        acquire_simulated(
+            kind,
+            example_signal(arguments.seed, constant),
+            clock_scale=_clock_scale(arguments),
+            volts_per_radian=constant,
+            **options,
+        )
     elif arguments.port:
-        _real(arguments, raw, progress)
+        from pendpipe.acquisition.recorder import record
+
+        record(
+            arguments.port,
+            arguments.model,
+            volts_per_radian=arguments.volts_per_radian,
+            **options,
+        )
     else:
         raise InputError(
             "acquire", "no instrument is named", "give --port PORT or --device simulated:di2108"
@@ -269,52 +297,6 @@ def _serve(arguments: argparse.Namespace) -> int:
             while device.failure is None:
                 time.sleep(0.05)
     return 0
-
-
-def _real(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
-    """Record from the instrument on a port."""
-    from pendpipe.acquisition.recorder import record
-
-    record(
-        arguments.port,
-        arguments.model,
-        channels=(arguments.channel or 1,),
-        rate_hz=arguments.rate,
-        duration_s=arguments.duration,
-        raw_path=raw,
-        volts_per_radian=arguments.volts_per_radian,
-        progress=progress,
-        range_volts=arguments.range_volts,
-        until_noise=arguments.until_noise,
-        reconnect_s=arguments.reconnect,
-    )
-
-
-def _simulated(arguments: argparse.Namespace, raw: Path, progress: ProgressLine) -> None:
-    """Record from a simulated instrument."""
-    from pendpipe.acquisition.simulated import acquire_simulated, example_signal
-
-    where, _, kind = arguments.device.partition(":")
-    if where != "simulated" or not kind:
-        raise InputError(
-            f"--device {arguments.device}",
-            "only simulated devices go here",
-            "give simulated:di2108",
-        )
-    acquire_simulated(
-        kind,
-        example_signal(arguments.seed, arguments.volts_per_radian or 3.85),
-        channels=(arguments.channel or 1,),
-        rate_hz=arguments.rate,
-        duration_s=arguments.duration,
-        clock_scale=_clock_scale(arguments),
-        raw_path=raw,
-        volts_per_radian=arguments.volts_per_radian or 3.85,
-        progress=progress,
-        range_volts=arguments.range_volts,
-        until_noise=arguments.until_noise,
-        reconnect_s=arguments.reconnect,
-    )
 
 
 def _clock_scale(arguments: argparse.Namespace) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 from pendpipe.acquisition.clock import Clock
-from pendpipe.acquisition.drivers.decoders import Decoder, Scans, SyncBitDecoder
+from pendpipe.acquisition.drivers.decoders import Decoder, SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
 
@@ -93,7 +93,6 @@ class Driver(ABC):
         self.line = line
         self.setup: Setup | None = None
         self._clock = clock
-        self._decoder: Decoder | None = None
         # How long no byte must come until a stream is held to have ended. The adapters of
         # USB keep bytes back for up to 16 ms; a simulated line does not.
         self.quiet_s = max(0.05 / clock.scale, 0.01)
@@ -170,7 +169,6 @@ class Driver(ABC):
         """
         if self.setup is None:
             raise RuntimeError("configure() comes before start()")
-        self._decoder = self.decoder(len(self.setup.channels))
         self._clear_the_line()
         self._start_stream()
 
@@ -211,12 +209,6 @@ class Driver(ABC):
     def receive(self, limit_s: float) -> bytes:
         """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""
         return self.line.receive(limit_s)
-
-    def read(self, limit_s: float) -> Scans:
-        """Receive and decode, for a use without the recorder."""
-        if self._decoder is None:
-            raise RuntimeError("start() comes before read()")
-        return self._decoder.feed(self.receive(limit_s))
 
     def ended(self, data: bytes) -> str:  # noqa: ARG002 - most families send none
         """Return the device's message that its stream has ended, if these bytes hold one."""
