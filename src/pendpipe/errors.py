@@ -1,4 +1,4 @@
-"""What is said when the input, and not the program, is at fault.
+"""User errors: the input or the usage is wrong, not the program.
 
 Every message is one line: where, what is wrong, what to do. The command line prints it
 and ends with status 2; a Snakemake stage writes it into ``refused.json`` instead.
@@ -10,12 +10,12 @@ from pathlib import Path
 
 
 class InputError(Exception):
-    """The input or the usage is wrong, and the user can mend it.
+    """The input or the usage is wrong, and the user can correct it.
 
     Parameters
     ----------
     place
-        The file (or port, or option) at fault; a path, or a path with a line or column
+        The file (or port, or option) with the error; a path, or a path with a line or column
         (``"a.csv, line 7"``).
     problem
         What is wrong with it, in a clause that needs no context.

@@ -381,7 +381,7 @@ def _numbers(
                 float(cells[index])
             except ValueError:
                 raise InputError(
-                    where, f"'{cells[index].strip()}' is no number", "mend or drop the row"
+                    where, f"'{cells[index].strip()}' is no number", "correct or drop the row"
                 ) from None
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
 
@@ -391,7 +391,7 @@ def _quality(place: Path, column: FloatArray, first_line: int) -> ByteArray:
     odd = np.flatnonzero(~np.isin(column, (GOOD, SUSPECT, MISSING)))
     if odd.size:
         raise InputError(
-            f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "mend the row"
+            f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "correct the row"
         )
     return column.astype(np.uint8)
 
@@ -419,7 +419,7 @@ def check(place: str | Path, recording: Recording, *, first_line: int | None = N
         marked = recording.quality == MISSING
         odd = np.flatnonzero(recording.quality > MISSING)
         if odd.size:
-            raise InputError(f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "mend the row")
+            raise InputError(f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "correct the row")
     bad = np.flatnonzero(~np.isfinite(time) | (~np.isfinite(values) & ~marked))
     if bad.size:
         raise InputError(

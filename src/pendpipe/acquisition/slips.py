@@ -100,7 +100,7 @@ def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Slip:
         for odd in range(1, size, 2)
     ]
     best = int(np.argmin(jumps))
-    # Channels that read alike don't tell: one byte lost is the likeliest then.
+    # Channels that read alike can't decide: one lost byte is the most likely then.
     sure = len(jumps) == 1 or sorted(jumps)[1] >= 2.0 * jumps[best]
     if not sure:
         best = len(jumps) - 1

@@ -170,7 +170,7 @@ def _check(
     unweighted = (spread == 0.0) & (angle_sd == 0.0)
     none_given = volts_sd is None and not angle_sd.any()
     if negative.any() or not np.isfinite(spread + angle_sd).all():
-        raise InputError(place, "a standard deviation is negative or not finite", "mend it")
+        raise InputError(place, "a standard deviation is negative or not finite", "correct it")
     if unweighted.any() and not none_given:
         raise InputError(
             place, "a point has no error, neither in volts nor in angle", "give its volts_sd"

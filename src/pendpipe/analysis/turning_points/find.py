@@ -106,7 +106,7 @@ def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measur
     while True:
         shape = _plain(len(places.number))
         measured = measure(samples, places, rough.level, shape, stride=stride)
-        late = measured.phase(samples.noise_rms)[~measured.lopsided]
+        late = measured.phase(samples.noise_rms)[~measured.one_sided]
         places = resmoothed(places, measured, samples.noise_rms)
         if np.nanmax(np.abs(late), initial=0.0) < _LOCKED or (steps := steps - 1) == 0:
             break
@@ -117,7 +117,7 @@ def _losses(
     places: Places, measured: Measured, noise: float, start: float
 ) -> tuple[FloatArray, LossRates, float]:
     """Amplitudes at the mean level, the rates they fall at, and that level."""
-    known = np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.lopsided
+    known = np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.one_sided
     shift = float(np.sum(measured.score[known]) / np.sum(measured.information[known]))
     amplitude = measured.amplitude - places.side * measured.coupling * shift
     sd = noise * np.sqrt(measured.variance)

@@ -47,7 +47,7 @@ def finished(state: State, keep: BoolArray) -> TurningPoints:
     clear = np.maximum(np.abs(amplitude), sd)
     relative, phase = shape_error(clear, rate, state.rates)
     # A period that changes from one half cycle to the next skews the wave about its turning.
-    skew = np.where(measured.single | measured.lopsided, places.unsteady_phase, 0.0)[keep]
+    skew = np.where(measured.single | measured.one_sided, places.unsteady_phase, 0.0)[keep]
     relative, phase = np.hypot(relative, 0.1 * skew**2), np.hypot(phase, 0.1 * skew**2)
     rounding = undithered_rms(clear, samples.step, noise)
     return TurningPoints(

@@ -47,7 +47,7 @@ def times_and_weights(
     size = np.maximum(measured.amplitude, 1e-12 * np.nanmax(measured.amplitude))
     phase_sd = np.hypot(noise * np.sqrt(measured.sine_variance) / size, 1e-3)
     known = np.isfinite(time) & (measured.amplitude > noise * np.sqrt(measured.variance))
-    known &= ~measured.lopsided
+    known &= ~measured.one_sided
     weight = np.where(known, (rate / phase_sd) ** 2, 0.0)
     return np.where(known, time, places.centre_s), weight
 

@@ -10,7 +10,7 @@ from pendpipe.analysis.turning_points import compiled
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
-_LOPSIDED: Final = 0.3
+_ONE_SIDED: Final = 0.3
 _PHASE_PRIOR: Final = 0.02
 
 
@@ -58,7 +58,7 @@ class Measured(NamedTuple):
     """How many there are."""
     coverage: FloatArray
     """Sum of the squared shape over the readings: what the amplitude rests on."""
-    lopsided: BoolArray
+    one_sided: BoolArray
     """Whether readings of one side are missing, so that amplitude and phase mix."""
     single: BoolArray
     """Whether the shape is the half cycle's own, and only its middle is fitted."""
@@ -134,11 +134,11 @@ def measure(
     )  # fmt: skip
     gram, right, square = compiled.half_cycle_sums(*arguments, free)
     prior = np.zeros(number)
-    lopsided = gram[:, 1, 2] ** 2 > _LOPSIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
+    one_sided = gram[:, 1, 2] ** 2 > _ONE_SIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:
         size = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (size * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
-        prior = np.where(lopsided, held, 0.0)
+        prior = np.where(one_sided, held, 0.0)
     solution, inverse = compiled.solve_half_cycles(gram, right, prior)
     flat = gram[:, 1:, 0]
     best = solution[:, :, 0]
@@ -155,7 +155,7 @@ def measure(
         residual_square=square - np.sum(best * right[:, 1:], axis=1),
         readings=gram[:, 0, 0],
         coverage=gram[:, 1, 1],
-        lopsided=lopsided,
+        one_sided=one_sided,
         single=np.zeros(number, dtype=bool),
     )
 
