@@ -419,7 +419,9 @@ def check(place: str | Path, recording: Recording, *, first_line: int | None = N
         marked = recording.quality == MISSING
         odd = np.flatnonzero(recording.quality > MISSING)
         if odd.size:
-            raise InputError(f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "correct the row")
+            raise InputError(
+                f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "correct the row"
+            )
     bad = np.flatnonzero(~np.isfinite(time) | (~np.isfinite(values) & ~marked))
     if bad.size:
         raise InputError(

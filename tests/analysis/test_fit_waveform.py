@@ -320,8 +320,10 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
         begun = quick_start(prepare(Recording(fine, values, "angle_rad"), "record"))
         assert begun is not None
         problem = Waveform(fine, values, begun.points.noise_rms_rad, {})
-        first, foresee = begun.start.value, problem.foresee
-        soon = minimise(problem.evaluate, first, BOUNDS, foresee=foresee, most=2)
+        first, predict_remaining = begun.start.value, problem.predict_remaining
+        soon = minimise(
+            problem.evaluate, first, BOUNDS, predict_remaining=predict_remaining, most=2
+        )
         if not soon.converged:
             continue
         late = minimise(problem.evaluate, soon.value, BOUNDS, tolerance=1e-10)

@@ -129,7 +129,9 @@ def _number(
     try:
         value = float(text)
     except ValueError:
-        raise InputError(where, f"{name} '{text}' is no number", "correct or drop the row") from None
+        raise InputError(
+            where, f"{name} '{text}' is no number", "correct or drop the row"
+        ) from None
     if not np.isfinite(value):
         raise InputError(where, f"{name} is {text}", "correct or drop the row")
     return value

@@ -23,8 +23,8 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
     Raises
     ------
     InputError
-        When the header has ``time_s`` and nothing that could be a reading, or a row is
-        at fault.
+        When the header has ``time_s`` and nothing that could be a reading, or a row
+        is damaged.
     """
     steered = (
         options.channel,

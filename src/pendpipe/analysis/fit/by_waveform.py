@@ -222,7 +222,7 @@ def _result(
     fixed: Mapping[str, float],
 ) -> tuple[FitResult, float]:
     """Judge what the fit has left; return the result and what its variances were enlarged by."""
-    # Of where the last step began, if that was so small that it was taken on trust.
+    # Of where the last step began, if that was so small that it was accepted unverified.
     residual = fitted.problem.residual(fitted.minimum.at)
     dof = len(residual) - len(NAMES) + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
@@ -298,7 +298,7 @@ def _fit(
             waveform.BOUNDS,
             held=held,
             chi2_only=problem.chi2,
-            foresee=problem.foresee,
+            predict_remaining=problem.predict_remaining,
         )
         if used >= len(points):
             return _Fitted(problem, minimum, held, start)

@@ -17,7 +17,7 @@ from pendpipe.arrays import FloatArray
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
 _SMALL: Final = 1e4
 _KEPT: Final = 1e-3
-_FORESEEN: Final = 1e-2
+_PREDICTED: Final = 1e-2
 """Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
 
 
@@ -37,7 +37,7 @@ class Minimum(NamedTuple):
     converged: bool
     evaluations: int
     at: FloatArray
-    """Where chi^2 was looked at: `value`, or what the last step, taken on trust, began from."""
+    """Where chi^2 was looked at: `value`, or what the last step, accepted unverified, began from."""
     gained: float = 0.0
     """By what that step lowers chi^2."""
 
@@ -50,7 +50,7 @@ def minimise(
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
     chi2_only: Callable[[FloatArray], float] | None = None,
-    foresee: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
+    predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
     most: int = 60,
 ) -> Minimum:
     """Minimise chi^2 by damped Gauss-Newton steps that respect bounds.
@@ -65,14 +65,14 @@ def minimise(
         Entries that are not fitted.
     tolerance
         The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
-        standard deviations. That step is still taken, on trust.
+        standard deviations. That step is still accepted, unverified.
     chi2_only
         chi^2 at a point, where that costs less. A step that lowers chi^2 by 1 +- e times
         what it promised is itself off by about e, and leaves e^2 of that to be gained: if
         this is below 1e-3 (0.03 standard deviations), it needs no new derivatives.
-    foresee
+    predict_remaining
         What a step leaves to be gained, from its two ends, the quadratic at the first and
-        what that promises. Below 1e-2 the step is taken on trust.
+        what that promises. Below 1e-2 the step is accepted unverified.
     most
         Greatest number of evaluations.
     """
@@ -91,7 +91,11 @@ def minimise(
             )
         trial = bounds.clip(value + step)
         near = level == 0 and promised < _SMALL
-        if foresee is not None and near and foresee(value, trial, now, promised) < _FORESEEN:
+        if (
+            predict_remaining is not None
+            and near
+            and predict_remaining(value, trial, now, promised) < _PREDICTED
+        ):
             return Minimum(trial, _moved(now, step), True, spent, value, promised)
         if chi2_only is not None and near:
             reached = now.chi2 - chi2_only(trial)

@@ -262,7 +262,7 @@ def read_fit(path: str | Path) -> FitResult:
     """
     content = read_json(path)
     if "refused" in content:
-        raise InputError(path, f"the record was refused ({content['refused']})", "mend it first")
+        raise InputError(path, f"the record was refused ({content['refused']})", "correct it first")
     try:
         return FitResult.from_json(content)
     except (KeyError, TypeError) as fault:

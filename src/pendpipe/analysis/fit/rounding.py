@@ -63,7 +63,7 @@ def rounded(
 
 
 def best_noise(residual: FloatArray, step: float, start: float) -> float:
-    """Noise before the rounding that makes the readings likeliest, between step/25 and step.
+    """The most likely noise before the rounding, between step/25 and step.
 
     By golden section on its logarithm. The diagnosis asks about the same noise in two more
     places, each with a question of its own: what a reading's neighbours make of it

@@ -90,10 +90,10 @@ class Waveform:
         chi2, _, _ = self._weighed(self.residual(value))
         return chi2 + PRIOR_INVERSE * off**2
 
-    def foresee(
+    def predict_remaining(
         self, value: FloatArray, trial: FloatArray, quadratic: Quadratic, promised: float
     ) -> float:
-        """Foresee what chi^2 a Gauss-Newton step leaves to be gained (too high rather than low).
+        """Predict what chi^2 a Gauss-Newton step leaves to be gained (too high rather than low).
 
         The model is as linear as the motion stays what it was: where its phase or its
         amplitude change by a part e, the step is wrong by about e of itself. And b's share

@@ -162,7 +162,9 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
     metadata = {key: value for key, value in head if key not in ("cut", "note")}
     if "refused" in metadata:
-        raise InputError(place, f"the record was refused ({metadata['refused']})", "correct it first")
+        raise InputError(
+            place, f"the record was refused ({metadata['refused']})", "correct it first"
+        )
     if start == len(lines) or lines[start].strip() != ",".join(COLUMNS):
         raise InputError(place, "this is no table of turning points", "run pendpipe turning-points")
     try:
