@@ -37,7 +37,7 @@ class Minimum(NamedTuple):
     converged: bool
     evaluations: int
     at: FloatArray
-    """Where chi^2 was looked at: `value`, or what the last step, accepted unverified, began from."""
+    """Where chi^2 was evaluated: `value`, or where the last, unverified step began."""
     gained: float = 0.0
     """By what that step lowers chi^2."""
 
