@@ -28,6 +28,8 @@ from pendpipe.formats.table import Column, NotThisFormatError, Table
 _CONTROLS: Final = bytes([*range(1, 9), *range(14, 27)])
 _WIDEST: Final = 64
 """Cells that a row may have, however narrow the others are; else at most four times theirs."""
+_LARGEST: Final = 512 << 20
+"""Bytes of a table: ten million rows. Its lines and cells take some five times that."""
 _LONGEST_LINE: Final = 1 << 20
 _LONGEST_HEADER: Final = 5000
 
@@ -63,6 +65,10 @@ def _unified(text: str) -> str:
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read a table from a text file, whatever its layout."""
+    if len(data) > _LARGEST:
+        raise InputError(
+            place, f"the table holds more than {_LARGEST >> 20} MB", "give a part of it"
+        )
     return table_of_text(place, decode(data), options, "csv")
 
 

@@ -15,6 +15,8 @@ from pendpipe.errors import InputError
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
 
+_LARGEST = 64 << 20
+"""A tree of elements takes some ten times the file's memory."""
 _START = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*<(\?xml|cassylab|Document|object)\b")
 
 
@@ -35,6 +37,10 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa
         raise NotThisFormatError("the file is no XML")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise InputError(place, "the XML declares entities", "export the data as CSV")
+    if len(data) > _LARGEST:
+        raise InputError(
+            place, f"the XML holds more than {_LARGEST >> 20} MB", "export the data as CSV"
+        )
     try:
         root = ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError) as fault:
