@@ -36,6 +36,6 @@ def warm_up() -> None:
 
 
 if __name__ == "__main__":
-    print("compiling (once on a machine, a minute or two)", file=sys.stderr)
+    print("compiling (once on a machine, about a minute)", file=sys.stderr)
     compileall.compile_dir(Path(__file__).parent, quiet=2)
     warm_up()
