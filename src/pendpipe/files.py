@@ -38,15 +38,20 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     """
     target = Path(path)
     make_folder(target.parent)
+    text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
     try:
         if target.is_dir():
             raise InputError(target, "this is a folder", "name a file in it")
+        if target.exists() and not target.is_file():
+            # A device or a pipe is written to: it is not for us to replace it.
+            with target.open(mode, **text) as stream:  # type: ignore[call-overload]
+                yield stream
+            return
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     except OSError as fault:
         raise _cannot_write(target, fault) from None
     temporary = Path(name)
     try:
-        text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
         with os.fdopen(handle, mode, **text) as stream:  # type: ignore[call-overload]
             yield stream
         # mkstemp gives 0600; a result is as readable as any other file its user makes.

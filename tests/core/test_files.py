@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -34,3 +36,19 @@ def test_a_torn_json_is_named_in_one_line(tmp_path: Path, content: str) -> None:
     with pytest.raises(DamagedError, match=r"fit\.json: ") as caught:
         read_json(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    if not hasattr(os, "mkfifo"):
+        pytest.skip("this system has no named pipes")
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text(encoding="utf-8")))
+    reader.start()
+    with replaced(pipe) as stream:
+        stream.write("time_s,volts\n")
+    reader.join(10)
+    assert got == ["time_s,volts\n"]
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]

@@ -72,13 +72,22 @@ def new_path(start: str | Path) -> Path:
 
 
 def new_path_beside(out: Path) -> Path:
-    """Name the raw file of a recording on the command line: ``OUT.raw`` if that is free."""
+    """Name the raw file of a recording on the command line: ``OUT.raw`` if that is free.
+
+    Beside a device or a pipe nothing is kept: ``recording.raw`` in the current folder is.
+    """
+    out = _file_of(out)
     first = out.with_suffix(".raw")
     return new_path(f"{out.with_suffix('')}.") if first.exists() else first
 
 
+def _file_of(out: Path) -> Path:
+    return Path("recording.csv") if out.exists() and not out.is_file() else out
+
+
 def paths_beside(out: Path) -> list[Path]:
     """List the raw files that `new_path_beside` has named for a recording."""
+    out = _file_of(out)
     pattern = re.compile(re.escape(out.stem) + rf"(\.{_STAMP})?\.raw")
     if not out.parent.is_dir():
         return []

@@ -169,6 +169,8 @@ def _check_place(out: Path) -> None:
     if out.is_dir():
         raise InputError(out, "this is a folder", "name a file in it")
     make_folder(out.parent)
+    if out.exists() and not out.is_file():
+        return  # a device or a pipe
     try:
         with tempfile.TemporaryFile(dir=out.parent):
             return
