@@ -16,6 +16,8 @@ so that each damage runs the stage once.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -92,7 +94,8 @@ class Manifest:
         content: dict[str, Any] = {"schema_version": 1, "stage": self.stage}
         for name in ("outputs", "extras", "sources"):
             content[name] = {key: entry._asdict() for key, entry in getattr(self, name).items()}
-        write_json(self.path, content | {"inputs": self.inputs, "repaired": list(self.repaired)})
+        content |= {"inputs": self.inputs, "repaired": list(self.repaired)}
+        write_json(self.path, content | {"check": _digest(content)})
 
     def damages(self, *, hash_all: bool = False) -> list[Damage]:
         """Compare the results with what was written.
@@ -115,22 +118,31 @@ def read_manifest(home: Path, stage: str) -> Manifest:
     Raises
     ------
     DamagedError
-        If the file is no manifest.
+        If the file is no manifest, or was altered.
     """
     manifest = Manifest(home, stage)
     if not manifest.path.is_file():
         return manifest
     try:
         content = read_json(manifest.path)
+        if content.pop("check") != _digest(content):
+            raise ValueError
         for name in ("outputs", "extras", "sources"):
             entries = content[name].items()
             setattr(manifest, name, {key: Sum(**entry) for key, entry in entries})
         manifest.inputs, manifest.repaired = dict(content["inputs"]), tuple(content["repaired"])
     except (InputError, AttributeError, KeyError, TypeError, ValueError):
         raise DamagedError(
-            manifest.path, "this is no manifest", "run snakemake again: its stage makes it anew"
+            manifest.path,
+            "this manifest is torn or altered",
+            "run snakemake again: its stage makes it anew",
         ) from None
     return manifest
+
+
+def _digest(content: dict[str, Any]) -> str:
+    """Hash a manifest's own content."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def manifests(home: Path) -> Iterator[Manifest]:

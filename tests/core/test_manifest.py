@@ -107,11 +107,12 @@ def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
     assert history(home) == f"{planned} {planned}"
 
 
-def test_a_damaged_manifest_is_damage_too(home: Path) -> None:
-    with_its_old_time(home / "manifest/fit.json", cut)
+@pytest.mark.parametrize("change", [cut, emptied, altered])
+def test_a_damaged_manifest_is_damage_too(home: Path, change: Callable[[bytes], bytes]) -> None:
+    with_its_old_time(home / "manifest/fit.json", change)
     assert history(home) != ""
     (line,) = manifest.set_aside_damaged(home)
-    assert "this is no manifest" in line
+    assert "this manifest is torn or altered" in line
     assert noticed(home) == []
 
 

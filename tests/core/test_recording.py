@@ -136,3 +136,19 @@ def test_a_reading_of_any_unit_keeps_it_in_the_plain_form(tmp_path: Path) -> Non
     assert again.weak_guesses == recording.weak_guesses
     assert dict(again.metadata) == {"unit": "counts"}
     np.testing.assert_array_equal(again.values, recording.values)
+
+
+@given(cut=st.integers(1, 40))
+def test_the_last_row_of_a_cut_file_is_no_sample(
+    cut: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Wherever it was cut: a number without its last digits would be a wrong reading."""
+    path = tmp_path_factory.mktemp("cut") / "recording.csv"
+    time_s = np.arange(10) / 15.0
+    write_plain(path, Recording(time_s, np.sin(time_s), "angle_rad"))
+    text = path.read_text()
+    path.write_text(text[:-cut])
+    again = read_plain(path)
+    whole = text[:-cut].count("\n") - 1
+    np.testing.assert_array_equal(again.values, np.sin(time_s[:whole]))
+    assert len(again.notes) == (0 if text[:-cut].endswith("\n") else 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from typing import Any
 
@@ -143,3 +144,13 @@ def test_a_refused_record_has_no_decay(tmp_path: Any) -> None:
     (folder / "turning_points.csv").write_text("# refused: no decay\n")
     with pytest.raises(NothingToDrawError, match="refused"):
         read_decay(tmp_path, {"record": "stub"})
+
+
+def test_a_cut_row_of_turning_points_is_not_drawn(example: Any, tmp_path: Any) -> None:
+    entry = entry_of(example, TYPICAL)
+    shutil.copytree(example.folder / TYPICAL, tmp_path / TYPICAL)
+    table = tmp_path / TYPICAL / "turning_points.csv"
+    table.write_text(table.read_text()[:-30])
+    whole, cut = (read_decay(folder, entry) for folder in (example.folder, tmp_path))
+    assert cut.time_s == pytest.approx(whole.time_s[: len(cut.time_s)], abs=0.0)
+    assert 1 <= len(whole.time_s) - len(cut.time_s) <= 2

@@ -92,9 +92,9 @@ def _record(
         "temperature_c": row.temperature_c,
         "refused": result.refused,
     }
-    if result.refused is not None:
+    if result.fit is None:
         return content
-    fit = result.fit
+    fit = result.fit.as_json()
     split = next((s for s in separated.records if s.measured.record == row.record), None)
     content |= {name: fit["parameters"][name] for name in fit["parameters"]}
     content |= {

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.estimate import Estimate
@@ -17,24 +18,19 @@ class RecordResult:
     """One record's fit and calibration, or why it has none."""
 
     record: Record
-    fit: dict[str, Any]
+    fit: FitResult | None
     calibration: dict[str, Any]
     refused: str | None = None
 
     @property
     def usable(self) -> bool:
         """Whether there is a fit that does not contradict the decay."""
-        return self.refused is None and self.fit["light"] != "red"
+        return self.fit is not None and self.fit.light != "red"
 
     def parameter(self, name: str) -> Estimate:
         """One of the fit's parameters (``a``, ``b``, ``c``, ``frequency``, ...)."""
-        return estimate(self.fit["parameters"][name])
-
-    @property
-    def quality_factor_limit(self) -> Estimate | None:
-        """Q with a = c = 0, where b is not zero."""
-        content = self.fit["quality_factor_limit"]
-        return None if content is None or content["value"] is None else estimate(content)
+        assert self.fit is not None
+        return self.fit.parameters[name]
 
 
 def estimate(content: dict[str, Any]) -> Estimate:
@@ -71,6 +67,7 @@ def read_results(campaign: Campaign) -> list[RecordResult]:
 
 
 def _read(folder: Path, record: Record) -> RecordResult:
-    fit = read_json(folder / "fit.json")
-    calibration = read_json(folder / "calibration.json")
-    return RecordResult(record, fit, calibration, fit.get("refused"))
+    path = folder / "fit.json"
+    refused = read_json(path).get("refused")
+    fit = None if refused else read_fit(path)
+    return RecordResult(record, fit, read_json(folder / "calibration.json"), refused)
