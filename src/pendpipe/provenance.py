@@ -109,7 +109,7 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _imported_by_name(call: ast.Call, module: str) -> set[str]:
-    """What ``importlib.import_module(f"pendpipe.formats.{name}")`` may import: each of them.
+    """What ``importlib.import_module(f"pendpipe.commands.{name}")`` may import: each of them.
 
     A package that imports its own modules writes ``f"{__name__}.{name}"``.
     """

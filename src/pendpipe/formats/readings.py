@@ -107,12 +107,10 @@ def _unit(
     finite = column.values[np.isfinite(column.values)]
     whole = bool(len(finite)) and bool(np.all(finite == np.rint(finite)))
     reach = _reach(finite)
-    if (
-        role in ("volts", "length", "unknown", "signal")
-        and whole
-        and reach > 20.0
-        and (role in ("volts", "signal") or reach > 400.0)
-    ):
+    # Whole numbers are an instrument's counts where degrees or millimetres would not be: a
+    # pendulum seldom goes beyond 180 degrees.
+    few = {"volts": 20.0, "signal": 20.0, "angle": 180.0, "length": 400.0, "unknown": 400.0}
+    if whole and reach > few.get(role, np.inf):
         return _Guess(
             Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
         )
