@@ -259,3 +259,20 @@ def test_what_stands_in_fit_json_comes_back() -> None:
     again = FitResult.from_json(json.loads(json.dumps(result.as_json())))
     assert again.decrement_check == result.decrement_check
     assert (again.light, again.light_reason) == (result.light, result.light_reason)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 2e-3])
+def test_fit_and_diagnosis_print_the_same_baseline(noise: float) -> None:
+    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.diagnosis import diagnose_recording
+
+    time = np.arange(0.0, 60.0, 0.05)
+    law = Eq8(OMEGA, 0.05, 0.0, 0.02, 1e-4)
+    recording = recorded(sample(law, Release(-0.3, 0.1), time), time, noise)
+    points, part = measure_recording(recording, "recording")
+    fitted = fit_recording(part, points=points)
+    diagnosed = diagnose_recording(recording).diagnosis.baseline
+    for name, estimate in fitted.parameters.items():
+        found = diagnosed.parameters[name]
+        assert abs(found.value - estimate.value) < 0.1 * estimate.sd
+        assert found.sd == pytest.approx(estimate.sd, rel=0.1)

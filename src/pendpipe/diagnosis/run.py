@@ -238,6 +238,9 @@ def diagnose_decay(
     stamps = (*([gap] if gap else []), *found.clock_notes)
     noise_rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _fitted_model(found.baseline, found)
+    if not fixed:
+        # A part of b that is held bounds b here, and not in the fit.
+        before = _as_fit_prints(before, part, points, baseline, place)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     after = before if same else _fitted_model(found.improved, found)
     if effects:
@@ -320,6 +323,35 @@ def _small_swings(found: Search) -> SmallSwings | None:
         return None
     swings = small_swings(found.named.fit, found.data, found.noise)
     return swings if swings is not None and swings.significant else None
+
+
+def _as_fit_prints(
+    before: FittedModel,
+    part: Recording,
+    points: TurningPoints,
+    baseline: Baseline,
+    place: str | Path,
+) -> FittedModel:
+    """Take the baseline's numbers from the fit, which has the same model and uses all readings.
+
+    Where the fit settles and does not contradict the decay, there is then one answer. Else the
+    search has lost the phase, as a least squares of all readings does in a gross misfit; the
+    diagnosis follows it along the motion, and its own numbers stand.
+    """
+    from pendpipe.analysis.fit import fit_recording
+
+    try:
+        fitted = fit_recording(
+            part,
+            points=points,
+            method="waveform",
+            restoring="linear",
+            baseline=baseline,
+            place=place,
+        )
+    except NotAnalysableError:
+        return before
+    return before if fitted.light == "red" else replace(before, parameters=fitted.parameters)
 
 
 def _fitted_model(fit: Fit, found: Search) -> FittedModel:
