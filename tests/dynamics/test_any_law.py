@@ -152,7 +152,7 @@ def test_beyond_the_stop_there_is_no_motion() -> None:
 
 
 def test_the_tangent_is_what_a_small_force_does() -> None:
-    """of_force, of_start and of_reset against motions followed with a little more of each."""
+    """of_force and of_start against motions followed with a little more of each."""
     pendulum = Pendulum(OMEGA, 0.05, 0.01, 0.01, 1e-4)
     base = eq8_motion(pendulum, 0.2, 40)
     tangent = Tangent(pendulum.acceleration, base)

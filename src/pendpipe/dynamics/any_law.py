@@ -273,8 +273,3 @@ class Tangent:
         # g/(1 - g0 cos psi)^2, by psi and by t; the pace is 1/(omega (1 - g0 cos psi)).
         scaled = acceleration * (motion.upwards * self.rates.pace**2 / motion.amplitude)
         return self.of_rates(-motion.clock.sine * scaled, (motion.clock.cosine / omega) * scaled)
-
-    def of_reset(self, by_log: FloatArray, by_time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Change of ln r and t by sudden changes of them, given as what they add up to."""
-        grown = _linear(self.motion.clock, self._steepness, by_log)
-        return grown, by_time + self.motion.clock.integral(self._pace * grown)

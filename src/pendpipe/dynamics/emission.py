@@ -28,23 +28,17 @@ def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> 
 
 
 @inlined
-def combine(
-    polynomials: FloatArray,
-    duration: float,
-    y: float,
-    sign: float,
-    first_sign: float,
-    amplitude: FloatArray,
-    clock: FloatArray,
-    total: FloatArray,
-) -> None:
+def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> None:
     """Turn a half cycle's own derivatives into those by the parameters of the whole motion.
 
-    Row 0 of `total` is the angle, row 1 its velocity dx/dtau, row 2 the derivative by the
+    Row 0 of `work.total` is the angle, row 1 its velocity dx/dtau, row 2 the derivative by the
     release's angle, then the directions: dx/dp = x_p + x_y dy/dp - (dx/dtau) dtau/dp, with
-    dy/dp = `amplitude` and dtau/dp = `clock` at the turning point where the half cycle starts.
+    dy/dp = `work.amplitude` and dtau/dp = `work.clock` at the turning point where the half cycle
+    starts.
     """
-    columns = amplitude.size
+    total, amplitude, clock = work.total, work.amplitude, work.clock
+    sign, first_sign = work.signs[0], work.signs[1]
+    columns = work.sensitivities
     waveform = polynomials[:NODE_COUNT]
     for j in range(waveform.size):
         total[0, j] = sign * y * waveform[j]
@@ -86,11 +80,11 @@ def emit(
         The index of the first sample, and about how many lie in the panel.
     """
     omega, release_s = work.motion[0], work.motion[1]
-    time_s, angle_rad, signs = work.time_s, work.angle_rad, work.signs
+    time_s, angle_rad = work.time_s, work.angle_rad
     end = samples_before(time_s, first, release_s + (start + duration) / omega, guess)
     if end == first:
         return end
-    combine(polynomials, duration, y, signs[0], signs[1], work.amplitude, work.clock, work.total)
+    combine(work, polynomials, duration, y)
     work.total[0, 0] += work.motion[2]
     # Whole blocks keep the loops free of remainders; what is written past the panel's end is
     # written again by the next panel (or as rest).

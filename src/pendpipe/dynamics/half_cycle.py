@@ -91,16 +91,7 @@ def _solve_panel(
     if not solve(node, work.shape, radius, half_width, tolerance):
         return False
     if work.sensitivities > 0:
-        sensitivities(
-            node,
-            work.shape,
-            work.directions,
-            radius,
-            half_width,
-            work.sigma,
-            work.shift,
-            work.columns,
-        )
+        sensitivities(work, node, radius, half_width)
     if polynomials.size == 0:
         return True
     return _in_time(work, node, radius, half_width, y, polynomials) or finest

@@ -44,6 +44,7 @@ from pendpipe.dynamics.panel import (
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.layout import Work
 
 
 @kernel
@@ -110,30 +111,22 @@ def _grow(node: FloatArray, half_width: float) -> None:
 
 
 @kernel
-def sensitivities(
-    node: FloatArray,
-    shape: FloatArray,
-    directions: FloatArray,
-    radius: float,
-    half_width: float,
-    sigma: FloatArray,
-    shift: FloatArray,
-    columns: FloatArray,
-) -> None:
-    """Differentiate a solved panel, at fixed time, by the amplitude and along `directions`.
+def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float) -> None:
+    """Differentiate a solved panel, at fixed time, by the amplitude and along the directions.
+
+    `work.sigma` and `work.shift` hold d ln r/dp and dtau/dp at fixed phase at the start of the
+    panel, and on return at its end; entry 0 is by the amplitude at the start of the half cycle,
+    then come the directions. `work.columns` receives dx/dp at fixed time at the nodes, a row each.
 
     Parameters
     ----------
-    node, shape, radius, half_width
+    work
+        The engine's arrays.
+    node, radius, half_width
         As in `panel.solve`, after it.
-    directions
-        A row a parameter: the derivatives of m, h, q and g by it.
-    sigma, shift
-        d ln r/dp and dtau/dp at fixed phase, at the start of the panel; on return, at its end.
-        Entry 0 is the amplitude at the start of the half cycle; then the directions.
-    columns
-        Receives dx/dp at fixed time at the nodes, one row a parameter.
     """
+    shape, directions = work.shape, work.directions
+    sigma, shift, columns = work.sigma, work.shift, work.columns
     _differentiate(node, shape, radius)
     _grow(node, half_width)
     for c in range(sigma.size):
