@@ -86,7 +86,7 @@ def test_a_place_that_cannot_be_written_is_the_users_fault(
 @pytest.mark.parametrize(
     ("words", "about"),
     [
-        (["diagnose", "f.csv"], "--out"),
+        (["turning-points", "f.csv"], "--out"),
         (["diagnose", "f.csv", "--out", "d", "--level", "x"], "'x' is no number"),
         (["diagnose", "f.csv", "--out", "d", "--level", "2"], "between 0 and 1"),
         (["fit", "f.csv", "--out", "o", "--start", "x"], "--start"),
