@@ -276,3 +276,18 @@ def test_fit_and_diagnosis_print_the_same_baseline(noise: float) -> None:
         found = diagnosed.parameters[name]
         assert abs(found.value - estimate.value) < 0.1 * estimate.sd
         assert found.sd == pytest.approx(estimate.sd, rel=0.1)
+
+
+def test_laws_that_are_right_are_green() -> None:
+    random, lights = np.random.default_rng(8), []
+    for _ in range(40):
+        omega = 2.0 * math.pi * float(np.exp(random.uniform(math.log(0.2), math.log(1.1))))
+        b = 0.5 * omega / float(np.exp(random.uniform(math.log(10.0), math.log(500.0))))
+        law = Eq8(omega, random.choice([0.0, 0.2]), 0.5 * b, 0.5 * b, random.choice([0.0, 1e-4]))
+        time = np.arange(0.0, 300.0, 0.04)
+        release = Release(-0.3, float(random.uniform(0.05, 0.3)), 0.003)
+        result = fit_recording(recorded(sample(law, release, time), time, 1e-4), restoring="linear")
+        lights.append(result.light)
+    assert "red" not in lights
+    # The check is at two standard deviations, three times.
+    assert lights.count("green") > 30

@@ -225,7 +225,11 @@ def half_cycles(
 def _passage(time: FloatArray, values: FloatArray) -> float:
     """Find when a swing passes the middle between its ends, for the last time."""
     above = values > 0.5 * (values[0] + values[-1])
-    at = int(np.flatnonzero(above[1:] != above[:-1])[-1])
+    passages = np.flatnonzero(above[1:] != above[:-1])
+    if not len(passages):
+        # Noise alone: it ends where it began.
+        return 0.5 * float(time[0] + time[-1])
+    at = int(passages[-1])
     middle = 0.5 * (values[0] + values[-1])
     share = (middle - values[at]) / (values[at + 1] - values[at])
     return float(time[at] + share * (time[at + 1] - time[at]))

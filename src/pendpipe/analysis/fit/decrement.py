@@ -30,7 +30,7 @@ _FALL: Final = 0.4
 """Of ln amplitude in a window; beyond, a parabola does not follow Coulomb's straight line."""
 _STEEP: Final = 1.0
 """The same over the fewest turning points: nearer to the stop no decrement can be seen."""
-_SEEN: Final = 4.0
+_SEEN: Final = 8.0
 """Standard deviations that a turning point must stand out."""
 _STEPS: Final = 4.0
 """Steps of the readings within which rounding moves all turning points alike."""
@@ -95,13 +95,26 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
         clear = clear.first(len(clear) - 1)
     if len(clear) < 4:
         return ()
-    found = [
-        seen_loss(clear.chosen(np.isin(np.arange(len(clear)), part)))
-        for part in _windows(np.log(clear.amplitude_rad))
-    ]
+    found = _seen(clear)
+    part = clear
+    while not found[-1][2] <= _CONFIRMED * abs(found[-1][1]) and len(part) > 3 * _FEWEST:
+        # The smallest amplitude at which the decrement is seen well.
+        part = part.first(int(0.95 * len(part)))
+        further = _seen(part)
+        if further[-1][2] <= _CONFIRMED * abs(further[-1][1]):
+            found = further
     return tuple(
         Decrement(amplitude, loss_of(law, amplitude), loss, sd) for amplitude, loss, sd in found
     )
+
+
+def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
+    """The decrement at the large, the middle and the small amplitude; see `seen_loss`."""
+    index = np.arange(len(points))
+    return [
+        seen_loss(points.chosen(np.isin(index, part)))
+        for part in _windows(np.log(points.amplitude_rad))
+    ]
 
 
 def _end_is_steep(amplitude: FloatArray) -> bool:
