@@ -87,7 +87,7 @@ KNOWN: dict[str, Holds | Refused] = {
     "profcarter-adip/adip_pend_data.mat": Holds("theta2", "rad", 1.23, 1000.0, 119.9, 0.0),
     "profcarter-adip/cdip_pend_data.mat": Holds("theta", "rad", 1.0, 1000.0, 119.9, 0.0),
     "ptibbets-labprob2/idf_wah.mat": Holds("PendPos", "rad", 1.70, 100.0, 178.5, 0.0),
-    "tjcork-imu/data-acc3.csv": Holds("PT", "rad", 0.1, 20.0, 1854.0, 0.0953),
+    "tjcork-imu/data-acc3.csv": Holds("PT", "rad", 0.0, 20.0, 1854.0, 0.0953),
     "tychoaussie-seismometer/SM3_SN001_freeperiod.csv": Holds("Laser", "counts", 0.0, 130.2, 49.1),
     "tylertian-phy180/lab1_data.txt": Holds("column 2", "rad", 0.70, 20.0, 116.4),
     "tylertian-phy180/trial1_rawdata.txt": Holds("column 2", "rad", 1.4, 29.6, 16.9),
@@ -159,9 +159,7 @@ def judge(name: str, known: Holds | Refused | None) -> Row:
         stem = known.column.removesuffix("(*)")
         if found.chosen != known.column and not (stem != known.column and stem in found.chosen):
             faults.append(f"column {found.chosen}, not {known.column}")
-        sure = unit == known.unit and (
-            not known.swing or abs(swing / known.swing - 1.0) < 0.15 or "PT" in known.column
-        )
+        sure = unit == known.unit and (not known.swing or abs(swing / known.swing - 1.0) < 0.15)
         if not sure and not (guessed and (known.unit == "any" or unit in ("1", "rad"))):
             faults.append(f"unit {unit} (swing {swing:.3g})")
         if known.rate_hz and abs(rate / known.rate_hz - 1.0) > 0.01:

@@ -199,7 +199,9 @@ def _by_size(
         why = "is taken to be in radians (its period grows as such swings' does)"
         # Of a pendulum 1 m long (2 s) metres look the same.
         usual = float(np.median(periods(time_s, column.values)[0]))
-        return _Guess(_RADIAN, why, weak=not named and abs(usual - 2.0) < 0.3)
+        if not named and abs(usual - 2.0) < 0.3:
+            return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", weak=True)
+        return _Guess(_RADIAN, why)
     if slope is not None and abs(slope) < 0.35 and reach > 0.35:
         # No pendulum of so many radians: a torsion pendulum, or another unit.
         odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"

@@ -152,8 +152,8 @@ def _unit_by_size(column: Column, reading: Column, values: FloatArray) -> tuple[
         if (period or 50.0 * step) > 3e7:
             factor, name = 1e-9, "nanoseconds"
         seen = f"a period of {period:.4g}" if period else f"steps of {step:.4g}"
-        note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit {name}:)"
-        return factor, note.replace("(--unit milliseconds:)", "(--unit s: for seconds)"), True
+        note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
+        return factor, note, True
     note = f"'{column.label}' is taken to be in seconds"
     weak = whole or not 0.02 < period < 60.0
     if weak and period:
