@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from pendpipe.analysis.fit.summary import LOSSES, qualities, quotable, small_period
+from pendpipe.analysis.fit.summary import (
+    LOSSES,
+    qualities,
+    quotable,
+    rate_with_error,
+    small_period,
+)
 from pendpipe.quantities import compact, with_error
 from pendpipe.report.page import TEMPLATES
 from pendpipe.report.vector import inline_svg
@@ -55,7 +61,10 @@ def render_recording(
     numbers = [("Period", with_error(period.value, period.sd, "s"))]
     if result.light != "red":
         titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"}
-        numbers += [(f"{letter} ({titles[letter]})", _rate(result, letter)) for letter in titles]
+        numbers += [
+            (f"{letter} ({titles[letter]})", rate_with_error(result[letter], short=False))
+            for letter in titles
+        ]
     rows = [
         (
             compact(each.amplitude_rad, unit),
@@ -91,13 +100,6 @@ def render_recording(
         warnings=result.warnings,
         provenance=result.provenance,
     )
-
-
-def _rate(result: FitResult, letter: str) -> str:
-    rate = result[letter]
-    if rate.at_bound:
-        return f"below {compact(rate.bounds95[1], rate.unit)} (95 %)"
-    return with_error(rate.value, rate.sd, rate.unit)
 
 
 def _svg(figure: Figure) -> str:

@@ -153,7 +153,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     name = "period, small amplitude" if result.restoring == "sine" else "period"
     found.append(_line(name, with_error(period.value, period.sd, "s", short=True)))
     for letter in "abc":
-        found.append(_line(letter, _rate(result.parameters[letter])))
+        found.append(_line(letter, rate_with_error(result[letter])))
     for each in qualities(result):
         q = with_error(each.quality_factor.value, each.quality_factor.sd, short=True)
         found.append(
@@ -172,11 +172,12 @@ def _line(name: str, value: str) -> str:
     return f"  {name:<26}{value}"
 
 
-def _rate(rate: Estimate) -> str:
-    """A rate with its error, or its upper limit where it lies at zero."""
-    if rate.at_bound and rate.interval95 is not None:
-        return f"below {compact(rate.interval95[1], rate.unit)} (95 %)"
-    return with_error(rate.value, rate.sd, rate.unit, short=True)
+def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
+    """Print a rate with its error, or its upper limit where it lies at zero."""
+    if rate.at_bound:
+        limit = float(f"{rate.bounds95[1]:.2g}")
+        return f"below {with_error(limit, None, rate.unit)} (95 %)"
+    return with_error(rate.value, rate.sd, rate.unit, short=short)
 
 
 def quotable(result: FitResult) -> str:
