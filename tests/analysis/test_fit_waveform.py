@@ -11,11 +11,10 @@ import pytest
 
 from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
-from pendpipe.analysis.fit.by_waveform import fit_plain_waveform, fit_waveform
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.minimise import minimise
-from pendpipe.analysis.fit.quick import quick_start
 from pendpipe.analysis.fit.rounding import rounded
+from pendpipe.analysis.fit.start import start_values
 from pendpipe.analysis.fit.waveform import BOUNDS, Waveform
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare
@@ -288,39 +287,16 @@ def test_the_likelihood_of_roundings_has_the_slope_it_says() -> None:
     assert wide == pytest.approx(0.0, abs=1e-12)
 
 
-PLAIN = {
-    "Fig. 8": FIG_8,
-    "hardly damped": Eq8(OMEGA, quadratic=0.01, hysteretic=1e-4, viscous=1e-4),
-    "Q of 20": Eq8(OMEGA, quadratic=0.02, hysteretic=0.008, viscous=0.002, coulomb=1e-5),
-}
-
-
-@pytest.mark.parametrize("name", PLAIN)
-@pytest.mark.parametrize("begin_s", [0.0, 0.4, 0.9, 1.3])
-def test_a_quick_start_ends_where_a_careful_one_does(name: str, begin_s: float) -> None:
-    start = Release(-0.3, -0.068, -0.4)
-    values = noisy(sample(PLAIN[name], start, TIME))
-    kept = (begin_s <= TIME) & (TIME < 60.0)
-    samples = prepare(Recording(TIME[kept], values[kept], "angle_rad"), "record")
-    quick = fit_plain_waveform(samples)
-    careful = fit_waveform(samples, turning_points_of(samples))
-    assert quick is not None
-    assert quick.turning_points == careful.turning_points
-    for parameter, estimate in careful.parameters.items():
-        assert abs(quick.value(parameter) - estimate.value) < 0.1 * estimate.sd
-        assert quick.parameters[parameter].sd == pytest.approx(estimate.sd, rel=0.03)
-
-
 def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     """Against the search gone on with until chi^2 can't be lowered by 1e-10."""
     fine = np.arange(32768) * (300.0 / 32768)
     trusted, off = 0, []
     for seed in range(60):
         values = noisy(sample(FIG_8, START, fine), 10.0 ** (-4.5 + 0.01 * seed), seed)
-        begun = quick_start(prepare(Recording(fine, values, "angle_rad"), "record"))
-        assert begun is not None
-        problem = Waveform(fine, values, begun.points.noise_rms_rad, {})
-        first, predict_remaining = begun.start.value, problem.predict_remaining
+        points = turning_points_of(prepare(Recording(fine, values, "angle_rad"), "record"))
+        problem = Waveform(fine, values, points.noise_rms_rad, {})
+        first = start_values(points, {}, {}, "eq8").value
+        predict_remaining = problem.predict_remaining
         soon = minimise(
             problem.evaluate, first, BOUNDS, predict_remaining=predict_remaining, most=2
         )
@@ -336,17 +312,3 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     assert trusted > 20
     assert np.max(np.array(off)[:, :3]) < 0.01
     assert np.max(off) < 0.1
-
-
-def test_a_quick_start_is_refused_where_the_record_is_not_plain() -> None:
-    clean = sample(FIG_8, START, TIME)
-    records = {
-        "a tail in the noise": (TIME, noisy(clean, 3e-3)),
-        "a wandering level": (TIME, noisy(clean + 2e-3 * np.sin(0.05 * TIME))),
-        "a gap": (np.delete(TIME, slice(500, 900)), np.delete(noisy(clean), slice(500, 900))),
-        "another period later on": (TIME, noisy(sample(FIG_8, START, TIME + 2e-5 * TIME**2))),
-        "a step": (TIME, noisy(clean + 1e-3 * (TIME > 100.0))),
-    }
-    for time_s, values in records.values():
-        samples = prepare(Recording(time_s, values, "angle_rad"), "record")
-        assert fit_plain_waveform(samples) is None

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.analysis.turning_points import compiled, plain
 from pendpipe.analysis.turning_points.shape import HARMONICS
-from pendpipe.physics.decay import amplitude
 
 FOLDER = Path(compiled.__file__).parent
 
@@ -171,15 +170,3 @@ def test_half_cycles_of_white_noise_scatter_as_it() -> None:
     assert count == 597
     assert ratio == pytest.approx(0.3**2, rel=4.0 * np.sqrt(2.0 / 597))
     assert plain.half_cycle_scatter(np.array([1.0, 2.0, 2.01, 3.0]), time_s, noise)[1] == 0
-
-
-@given(st.floats(0.0, 1.0), st.floats(0.0, 0.05), st.floats(0.0, 1e-3))
-def test_the_losses_of_equation_13_come_out_of_its_integral(a: float, b: float, c: float) -> None:
-    time_s, omega = np.arange(60.0), np.pi
-    y = amplitude(time_s, 0.1, a, b, c)
-    assume(y[-1] > 0.01)
-    found = plain.decay(time_s, y, 1e-6)
-    fitted = amplitude(time_s, found[3], *found[:3])
-    np.testing.assert_allclose(fitted, y, rtol=0, atol=1e-4)
-    assert found[:3].min() >= 0.0
-    assert found[4] * omega == pytest.approx(np.pi, abs=0.01)

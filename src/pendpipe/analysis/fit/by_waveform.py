@@ -25,7 +25,6 @@ from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
-from pendpipe.analysis.fit.quick import quick_start
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
@@ -101,7 +100,7 @@ def fit_waveform(
     else:
         start = start_values(points, held_rates, fixed, baseline)
         fitted = _fit(samples, points, start, held, parts)
-    return _result(_refined(fitted, samples), samples, points, baseline, fixed)[0]
+    return _result(_refined(fitted, samples), samples, points, baseline, fixed)
 
 
 def _with_sine(
@@ -200,28 +199,14 @@ def fit_points_with_sine(
     return replace(result, warnings=(*points.notes, *warnings_of(result, high**2)))
 
 
-def fit_plain_waveform(samples: Samples) -> FitResult | None:
-    """As `fit_waveform`, for a record that a quick look (`quick.py`) finds plain.
-
-    None if it isn't, or if Eq. 8 and white noise do not explain the readings: then the
-    turning points must be found with care.
-    """
-    quick = quick_start(samples)
-    if quick is None:
-        return None
-    fitted = _refined(_fit(samples, quick.points, quick.start, (), {}), samples)
-    result, stretched = _result(fitted, samples, quick.points, "eq8", {})
-    return result if stretched == 1.0 and fitted.minimum.converged else None
-
-
 def _result(
     fitted: _Fitted,
     samples: Samples,
     points: TurningPoints,
     baseline: Baseline,
     fixed: Mapping[str, float],
-) -> tuple[FitResult, float]:
-    """Judge what the fit has left; return the result and what its variances were enlarged by."""
+) -> FitResult:
+    """Judge what the fit has left; return the result."""
     # Of where the last step began, if that was so small that it was accepted unverified.
     residual = fitted.problem.residual(fitted.minimum.at)
     dof = len(residual) - len(NAMES) + len(fitted.held)
@@ -258,7 +243,7 @@ def _result(
     law, _ = fitted.problem.model(fitted.minimum.value)
     checks = check_decrement(points.chosen(inside), law)
     light, reason = light_of(checks, misfit=stretched, unit=points.unit)
-    full = replace(
+    return replace(
         result,
         quality_factor_hysteretic=hysteretic,
         quality_factor_viscous=viscous,
@@ -268,7 +253,6 @@ def _result(
         light=light,
         light_reason=reason,
     )
-    return full, stretched
 
 
 def _fit(

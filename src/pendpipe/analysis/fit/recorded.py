@@ -92,15 +92,11 @@ def _fit(
     points: TurningPoints | None,
     place: str | Path,
 ) -> FitResult:
-    from pendpipe.analysis.fit.by_waveform import fit_plain_waveform, fit_waveform
+    from pendpipe.analysis.fit.by_waveform import fit_waveform
     from pendpipe.analysis.turning_points.samples import prepare
 
     samples = prepare(recording, place)
     if points is None:
-        quick = method is None and restoring is None and baseline == "eq8" and not fixed
-        plain = fit_plain_waveform(samples) if quick else None
-        if plain is not None and plain.light != "red":
-            return plain
         from pendpipe.analysis.turning_points.find import turning_points_of
 
         points = turning_points_of(samples, place)

@@ -34,7 +34,6 @@ ARGUMENTS: Final = {
     "extent": "FiF",
     "stays": "FifF",
     "half_cycle_scatter": "FiFFiF",
-    "decay": "FFifFF",
     "track": "FiFFiiiFFi",
 }
 

@@ -65,19 +65,6 @@ def half_cycle_scatter(
     return float(result[0]), count
 
 
-def decay(time_s: FloatArray, y: FloatArray, sd: float) -> FloatArray:
-    """Eq. 13 and Eq. 8's period from turning points, by linear least squares.
-
-    Returns
-    -------
-    FloatArray
-        a, b, c >= 0 and y0; half period and time of the first turning point.
-    """
-    result = np.empty(6)
-    entries()["decay"](numbers(time_s), numbers(y), len(y), sd, result, np.empty(44))
-    return result
-
-
 def track(
     values: FloatArray, start: FloatArray, columns: FloatArray, first: int, room: int
 ) -> tuple[int, float, float]:

@@ -36,12 +36,6 @@ def _half_cycle_scatter(
     )
 
 
-def _decay(time_s: Any, y: Any, size: int, sd: float, result: Any, work: Any) -> int:
-    loops.decay(vector(time_s, size), vector(y, size), sd, vector(result, 6), vector(work, 44))
-    loops.line(vector(time_s, size), vector(y, size), vector(result, 6))
-    return 0
-
-
 def _track(
     values: Any, size: int, start: Any, columns: Any, stride: int, first: int, room: int,
     result: Any, work: Any, work_size: int,
