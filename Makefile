@@ -3,6 +3,8 @@
 .DELETE_ON_ERROR:
 .PHONY: campaign test report bench evidence proof check clean wheel
 
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
 PYTHON ?= python3
 CORES ?= 2
 SET ?= proof
@@ -11,7 +13,7 @@ BIN := .venv/bin
 RUN := PATH="$(CURDIR)/$(BIN):$$PATH" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 campaign: .venv/installed
-	$(RUN) snakemake --cores $(CORES)
+	$(RUN) snakemake --cores $(CORES) --quiet rules 2>&1 | awk -f workflow/stages.awk
 
 test: .venv/installed
 	$(RUN) pytest -q -n $(CORES)
