@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pendpipe.analysis.fit import read_fit
 from pendpipe.files import read_json
 from pendpipe.quantities import compact, with_error
 
@@ -171,7 +172,7 @@ beside the motion's 1.345 Hz: the beats come every 2.95 s. Amplitudes taken ever
 
 ANSWERS_HEAD = """### Ten answers as they are printed
 
-What `pendpipe diagnose` prints, for string pendulums (8050, lab1_data, damping_angle), rods
+What `pendpipe fit` and `pendpipe diagnose` print, for string pendulums (8050, lab1_data, damping_angle), rods
 (adip, data2_14, data32), a torsion wheel (1.3_100mA), a ship's roll (21337), a mass on a spring
 (filo0509) and a Furuta arm (dataset4).
 """
@@ -207,14 +208,15 @@ def section(results: Path, names: list[str], images: Path) -> list[str]:
 
 
 def answers(results: Path) -> list[str]:
-    """Quote the paragraphs of some recordings."""
-    found = [(name, results / name / "diagnosis/diagnosis.json") for name in ANSWERED]
-    quoted = [
-        [f"**{name}.** {read_json(path)['statement']}", ""]
-        for name, path in found
-        if path.is_file()
-    ]
-    return [line for lines in quoted for line in lines]
+    """Quote what both commands print about some recordings."""
+    lines = []
+    for name in ANSWERED:
+        fit, diagnosis = results / name / "fit.json", results / name / "diagnosis/diagnosis.json"
+        if fit.is_file() and "refused" not in read_json(fit):
+            lines += [f"**{name}**, `pendpipe fit`:", "", "```", str(read_fit(fit)), "```", ""]
+        if diagnosis.is_file():
+            lines += [f"**{name}**, `pendpipe diagnose`: {read_json(diagnosis)['statement']}", ""]
+    return lines
 
 
 def table(

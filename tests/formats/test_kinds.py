@@ -210,7 +210,7 @@ def test_a_step_of_an_encoder_or_of_the_other_unit_gives_the_unit(tmp_path: Path
     assert not any("--unit" in guess for guess in recording.weak_guesses)
     printed = np.radians(np.rint(1e5 * np.degrees(small)) / 1e5)
     recording = read_text(tmp_path, text(TIME, printed, digits=12, head="x,y\n"))
-    assert any("its step is 1e-05 degrees" in note for note in recording.notes)
+    assert any("its values are multiples of 1e-05" in note for note in recording.notes)
     assert recording.quantity == "angle_rad"
 
 

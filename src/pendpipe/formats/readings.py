@@ -223,7 +223,8 @@ def _by_step(finite: FloatArray) -> _Guess | None:
         ):
             digit = _printed_digit(finite, scale)
             if digit is not None:
-                return _Guess(unit, f"is taken to be in {name} (its step is {digit:.4g} {other})")
+                why = f"converted to {other}, its values are multiples of {digit:.4g}"
+                return _Guess(unit, f"is taken to be in {name} ({why})")
     step = resolution(finite)
     if step is None or _is_round(step):
         return None
