@@ -9,6 +9,7 @@ The known times are those of the recordings' own README (``../shared/recordings`
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,13 @@ def rows(records: list[dict[str, Any]]) -> list[str]:
 def main() -> None:
     """Print the table and write the page with four figures."""
     records = read_json(RESULTS / "comparison.json")["records"]
-    lines = [*HEAD.splitlines(), "", *rows(records), ""]
+    commit = subprocess.run(
+        ["git", "-C", str(ROOT), "describe", "--always", "--dirty"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    lines = [*HEAD.splitlines(), "", f"Answered by commit {commit}.", "", *rows(records), ""]
     images = ROOT / "docs/images"
     images.mkdir(exist_ok=True)
     for name in SHOWN:

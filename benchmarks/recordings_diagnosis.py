@@ -172,9 +172,9 @@ beside the motion's 1.345 Hz: the beats come every 2.95 s. Amplitudes taken ever
 
 ANSWERS_HEAD = """### Ten answers as they are printed
 
-What `pendpipe fit` and `pendpipe diagnose` print, for string pendulums (8050, lab1_data, damping_angle), rods
-(adip, data2_14, data32), a torsion wheel (1.3_100mA), a ship's roll (21337), a mass on a spring
-(filo0509) and a Furuta arm (dataset4).
+What `pendpipe fit` and `pendpipe diagnose` print, for string pendulums (8050, lab1_data,
+damping_angle), rods (adip, data2_14, data32), a torsion wheel (1.3_100mA), a ship's roll (21337),
+a mass on a spring (filo0509) and a Furuta arm (dataset4).
 """
 
 VISCOUS_HEAD = """### From the viscous baseline
