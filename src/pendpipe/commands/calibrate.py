@@ -14,6 +14,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pendpipe.commands import print_json
 from pendpipe.commands._campaign import add_record
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe calibrate``."""
     parser.add_argument("file", metavar="FILE", type=Path, help="table of volts against angles")
     parser.add_argument("--out", type=Path, metavar="JSON", help="write the result here")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the summary")
     parser.add_argument("--arm-m", type=float, metavar="M", help="arm of the displacements, metres")
     parser.add_argument(
         "--arm-sd-m", type=float, default=0.0, metavar="M", help="its standard deviation"
@@ -81,7 +83,10 @@ def _sensor(arguments: argparse.Namespace) -> int:
         relative_scale_sd=relative_sd,
         place=str(arguments.file),
     )
-    print(_statement(calibration))
+    if arguments.json:
+        print_json(calibration.as_json())
+    else:
+        print(_statement(calibration))
     if arguments.out:
         write_json(arguments.out, calibration.as_json())
     return 0

@@ -9,12 +9,11 @@ diagnosis.json and the figures.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pendpipe.commands import _reading
+from pendpipe.commands import _reading, print_json
 from pendpipe.commands._campaign import add_record
 
 if TYPE_CHECKING:
@@ -181,10 +180,8 @@ def _not_analysable(
 
 def _print_answer(arguments: argparse.Namespace, content: dict[str, Any]) -> None:
     """Print the paragraph, or the whole result with ``--json``."""
-    from pendpipe.files import finite
-
     if arguments.json:
-        print(json.dumps(finite(content), indent=1, allow_nan=False))
+        print_json(content)
     else:
         print(content["statement"])
 

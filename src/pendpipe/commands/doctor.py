@@ -9,6 +9,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pendpipe.commands import print_json
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe doctor``."""
@@ -28,14 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine and print."""
-    import json
-
     from pendpipe.doctor import examine
 
     found = examine(arguments.folder)
     if arguments.json:
         findings = [finding._asdict() for finding in found]
-        print(json.dumps({"schema_version": 1, "findings": findings}, indent=1))
+        print_json({"schema_version": 1, "findings": findings})
     elif found:
         print("\n".join(map(str, found)))
     else:

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import argparse
 
+from pendpipe.commands import print_json
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe effects``."""
     parser.add_argument("--list", action="store_true", help="one line an effect")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -18,7 +21,13 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.effects.catalogue import CATALOGUE
     from pendpipe.effects.manual import page
 
-    if arguments.list:
+    if arguments.json:
+        entries = [
+            {"id": each.identifier, "name": each.name, "kind": each.kind, "equation": each.equation}
+            for each in CATALOGUE
+        ]
+        print_json({"schema_version": 1, "effects": entries})
+    elif arguments.list:
         for effect in CATALOGUE:
             print(f"{effect.identifier:<22}{effect.kind:<13}{effect.name}")
     else:

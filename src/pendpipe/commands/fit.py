@@ -16,9 +16,9 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pendpipe.commands import _reading
+from pendpipe.commands import _reading, print_json
 from pendpipe.commands._campaign import add_record
 from pendpipe.errors import InputError
 
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.figure:
         _draw(arguments.figure, result)
     if arguments.json or arguments.out == "-":
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
     else:
         _print(arguments, result)
     return _status(arguments, result)
@@ -214,15 +214,7 @@ def _table(arguments: argparse.Namespace) -> int:
         rows.append(row(file, result))
         status = max(status, _status(arguments, result))
     if arguments.json:
-        _print_json({"schema_version": 1, "fits": found})
+        print_json({"schema_version": 1, "fits": found})
     else:
         print(table(rows))
     return status
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    import json
-
-    from pendpipe.files import finite
-
-    print(json.dumps(finite(content), indent=1, ensure_ascii=False))

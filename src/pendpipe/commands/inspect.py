@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from pendpipe.commands import _reading
+from pendpipe.commands import _reading, print_json
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection
@@ -21,12 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Inspect and print."""
-    from pendpipe.files import finite
     from pendpipe.formats import inspect
 
     found = inspect(arguments.file, _reading.options(arguments))
     if arguments.json:
-        print(json.dumps(finite(found.as_json()), indent=1, ensure_ascii=False))
+        print_json(found.as_json())
     else:
         print("\n".join(_lines(arguments.file, found)))
     return 0

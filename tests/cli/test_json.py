@@ -1,0 +1,35 @@
+"""Every command that answers prints one JSON object where it is asked to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pendpipe import cli
+
+ROD = str(Path(__file__).parents[2] / "examples/rod-pendulum.csv")
+
+
+@pytest.mark.parametrize(
+    ("command", "key"),
+    [
+        (["inspect", ROD], "sample_rate_hz"),
+        (["fit", ROD], "decrement_check"),
+        (["diagnose", ROD], "verdict"),
+        (["effects"], "effects"),
+        (["doctor", "{folder}"], "findings"),
+        (["calibrate", "{table}"], "volts_per_radian"),
+    ],
+)
+def test_a_commands_answer_is_one_json_object(
+    command: list[str], key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "caliper.csv"
+    rows = [f"{0.01 * step},{0.0385 * step + 0.001 * (step % 2)}" for step in range(-5, 6)]
+    table.write_text("angle_rad,volts\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "results").mkdir()
+    words = [word.format(folder=tmp_path / "results", table=table) for word in command]
+    assert cli.main([*words, "--json"]) == 0
+    assert key in json.loads(capsys.readouterr().out)
