@@ -6,6 +6,7 @@ import math
 
 from pendpipe.arrays import FloatArray
 
+_SI_UNITS = ("rad", "m", "V", "s", "Hz", "kg")
 _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", 3: "k", 6: "M"}
 
 
@@ -14,7 +15,14 @@ def prefixed(largest: float, unit: str) -> tuple[float, str]:
 
     >>> prefixed(0.068, "rad")
     (1000.0, 'mrad')
+
+    Counts, pixels and readings of an unknown unit have no prefixes.
+
+    >>> prefixed(0.068, "1")
+    (1.0, '')
     """
+    if unit.split("/")[0] not in _SI_UNITS:
+        return 1.0, "" if unit == "1" else unit
     if not (math.isfinite(largest) and largest > 0.0):
         return 1.0, unit
     power = min(max(3 * math.floor(math.log10(largest) / 3.0), -12), 6)
@@ -36,7 +44,7 @@ def compact(value: float, unit: str) -> str:
     factor, short = prefixed(abs(value), unit)
     shown = factor * value
     digits = f"{shown:#.3g}".rstrip(".") if abs(shown) < 999.5 else f"{shown:.0f}"
-    return f"{digits} {short}"
+    return f"{digits} {short}".rstrip()
 
 
 def pretty_unit(unit: str) -> str:
@@ -46,6 +54,7 @@ def pretty_unit(unit: str) -> str:
     'rad⁻¹ s⁻¹'
     """
     known = {
+        "1": "",
         "1/(rad s)": "rad⁻¹ s⁻¹", "1/(m s)": "m⁻¹ s⁻¹", "1/s": "s⁻¹", "s^2": "s²",
         "kg m^2": "kg m²",
     }  # fmt: skip
