@@ -110,7 +110,7 @@ def _fit(
     by_points = _of_points(points, restoring, baseline, fixed)
     if _stands(by_points):
         why = result.light_reason if result.settled else "it did not settle"
-        return _amber(by_points, f"from the turning points, since of the waveform {why}")
+        return _amber(by_points, f"from the turning points, because for the waveform {why}")
     for part in _larger_amplitudes(points):
         larger = fit_waveform(samples, part, baseline=baseline, fixed=fixed, restoring=restoring)
         if _stands(larger):

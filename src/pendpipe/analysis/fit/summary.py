@@ -188,10 +188,10 @@ def quotable(result: FitResult) -> str:
         return "Quote none of a, b, c: run pendpipe diagnose to learn what the law lacks."
     if result.chi2_per_dof > 2.0:
         return (
-            "Quote Q at these amplitudes. Physics is missing from the law, so quote a, b and c only"
-            " after pendpipe diagnose has been asked what it is."
+            "Quote Q at these amplitudes. Physics is missing from the law: run pendpipe diagnose"
+            " before you quote a, b or c."
         )
-    return "Quote Q at these amplitudes. a, b and c can replace each other: quote all three."
+    return "Quote Q at these amplitudes. a, b and c are correlated: quote all three."
 
 
 HEAD: Final = ("file", "light", "period (s)", "a (1/rad s)", "b (1/s)", "c (rad/s)", "Q", "at")
