@@ -18,7 +18,7 @@ rule caliper:
         "the sensor against a caliper"
     shell:
         "pendpipe acquire --campaign {resources.configuration:q} --caliper --out {output.table:q} 2> {log:q}"
-        " && pendpipe calibrate {output.table:q} {params.arm} --out {output.sensor:q} 2>> {log:q}"
+        " && pendpipe calibrate {output.table:q} {params.arm} --out {output.sensor:q} >> {log:q} 2>&1"
 
 
 rule calibrate:

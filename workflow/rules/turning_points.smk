@@ -16,4 +16,4 @@ rule turning_points:
         "{wildcards.record}: turning points"
     shell:
         "pendpipe turning-points {input.recording:q} --record {wildcards.record:q}"
-        " --calibration {input.calibration:q} --out {output:q} {params.refusal} 2> {log:q}"
+        " --calibration {input.calibration:q} --out {output:q} {params.refusal} > {log:q} 2>&1"
