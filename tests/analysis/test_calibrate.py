@@ -220,3 +220,8 @@ def test_a_bad_table_is_one_line_and_status_2(
     assert fault in line
     assert line.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_point_far_beyond_the_others_ends_in_no_traceback() -> None:
+    points = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 1e12])
+    assert calibrate(points, points).volts_per_radian.value == pytest.approx(1.0)

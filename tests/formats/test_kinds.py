@@ -579,3 +579,12 @@ def test_the_cells_of_a_workbook_are_counted_before_they_are_read(tmp_path: Path
         archive.writestr("xl/worksheets/sheet1.xml", b"<sheetData>" + row * 60_000)
     with pytest.raises(InputError, match="more than 3000000 cells"):
         read(tmp_path / "a.xlsx")
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "values"), [("times", 1e300, 1), ("readings", 1, 1e-300)]
+)
+def test_an_absurd_scale_is_refused(tmp_path: Path, name: str, times: float, values: float) -> None:
+    rows = "".join(f"{times * t},{values * x}\n" for t, x in zip(TIME, ANGLE, strict=True))
+    with pytest.raises(InputError, match=f"the {name} span"):
+        read_text(tmp_path, "t (s),theta (rad)\n" + rows)

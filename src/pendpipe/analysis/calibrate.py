@@ -127,7 +127,8 @@ def _linearity(
     chi2_curve = float(np.sum((target - powers @ coefficients) ** 2))
     improvement = float(np.sum(target**2)) - chi2_curve
     scale = 1.0 if known else chi2_curve / (count - 4)
-    sds = np.sqrt(scale * np.diag(np.linalg.inv(powers.T @ powers)))
+    # One point far beyond the others leaves no inverse: they have one angle beside it.
+    sds = np.sqrt(scale * np.diag(np.linalg.pinv(powers.T @ powers)))
     # An exact line leaves residuals of rounding only, in which there is nothing to test.
     exact = np.max(np.abs(residual)) <= 1e-13 * abs(slope) * largest
     if known:

@@ -191,6 +191,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
     )
     check(table.place, recording)
+    _check_scale(table.place, recording)
     return recording
 
 
@@ -257,3 +258,17 @@ def _markers(markers: tuple[Marker, ...]) -> dict[str, str]:
         f"marker_{number}": f"{mark.sample}; {mark.time_s!r} s; {mark.comment}"
         for number, mark in enumerate(markers, start=1)
     }
+
+
+def _check_scale(place: str | Path, recording: Recording) -> None:
+    """Refuse times and readings whose squares leave the range of numbers."""
+    readings = recording.values[recording.usable]
+    spans = {
+        "times": np.ptp(recording.time_s),
+        "readings": np.ptp(readings) if readings.size else 0,
+    }
+    for name, span in spans.items():
+        if span and not 1e-30 < span < 1e30:
+            raise InputError(
+                place, f"the {name} span {span:.3g}, which no pendulum does", "check their unit"
+            )

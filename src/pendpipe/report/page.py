@@ -27,8 +27,10 @@ from pendpipe.report.vector import inline_svg
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
 BUDGET_BYTES: Final = 5_000_000
-"""The page stays below this; what no longer fits is named, and left in its file."""
-_RESERVE_BYTES: Final = 500_000
+"""The page stays below this up to 700 records; what no longer fits is named, left in its file."""
+_RESERVE_BYTES: Final = 350_000
+_RECORD_BYTES: Final = 6_000
+"""What a record takes beside its figures: its row, its section, its share of the downloads."""
 
 Content = Mapping[str, Any]
 
@@ -61,14 +63,15 @@ def render(
     """
     drawn = _campaign_figures(figures)
     entries = list(comparison["records"])
+    budget = BUDGET_BYTES - _RESERVE_BYTES - _RECORD_BYTES * len(entries)
     has_theory = bool(comparison.get("has_theory"))
     table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
-    decays, outside = _decays(folder, table.lines, spent=sum(map(len, drawn.values())))
+    decays, outside = _decays(folder, table.lines, budget - sum(map(len, drawn.values())))
     spent = sum(map(len, [*drawn.values(), *decays.values()]))
-    proven = proof(challenge, spent=spent, budget=BUDGET_BYTES - _RESERVE_BYTES)
+    proven = proof(challenge, spent=spent, budget=budget)
     spent += proven.bytes if proven else 0
     asked = configuration.get("diagnose") or {}
-    diagnosed = _diagnoses(asked, folder, entries, spent)
+    diagnosed = _diagnoses(asked, folder, entries, spent, budget)
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
     environment = Environment(
@@ -140,11 +143,10 @@ def _campaign_figures(figures: Path) -> dict[str, Markup]:
     return drawn
 
 
-def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Markup], list[str]]:
-    """Each record's decay figure while the budget lasts, and the records beyond it."""
+def _decays(folder: Path, table: list[Line], left: int) -> tuple[dict[str, Markup], list[str]]:
+    """Each record's decay figure while the bytes left last, and the records beyond it."""
     decays: dict[str, Markup] = {}
     outside: list[str] = []
-    left = BUDGET_BYTES - _RESERVE_BYTES - spent
     for line in table:
         path = folder / line.name / "figures" / "decay.svg"
         if line.refused or not path.is_file():
@@ -162,12 +164,14 @@ def _decays(folder: Path, table: list[Line], spent: int) -> tuple[dict[str, Mark
     return decays, outside
 
 
-def _diagnoses(asked: Content, folder: Path, entries: list[Content], spent: int) -> list[Diagnosed]:
+def _diagnoses(
+    asked: Content, folder: Path, entries: list[Content], spent: int, budget: int
+) -> list[Diagnosed]:
     """The records' diagnoses, where the campaign asks for them."""
     if not asked.get("enabled", True):
         return []
     names = [str(entry["record"]) for entry in entries]
-    return diagnoses(folder, names, spent=spent, budget=BUDGET_BYTES - _RESERVE_BYTES)
+    return diagnoses(folder, names, spent=spent, budget=budget)
 
 
 def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
@@ -195,11 +199,17 @@ def _downloads(table: Table, summary: Content) -> dict[str, str]:
     writer.writerow(["record", "fit", "fluid", "branch", *pairs])
     for line in table.lines:
         numbers = [text for cell in line.cells for text in (cell.value, cell.sd)]
-        writer.writerow([line.name, line.health.word, line.fluid, line.branch, *numbers])
+        words = [line.name, line.health.word, line.fluid, line.branch]
+        writer.writerow([*map(_no_formula, words), *numbers])
     return {
         "records.csv": _data_address("text/csv", stream.getvalue()),
         "campaign.json": _data_address("application/json", json.dumps(summary, indent=1)),
     }
+
+
+def _no_formula(text: str) -> str:
+    """A word that a spreadsheet would take for a formula, with the apostrophe that stops it."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 def _data_address(kind: str, text: str) -> str:
