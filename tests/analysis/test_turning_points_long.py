@@ -64,3 +64,15 @@ def test_a_pause_in_a_long_record_is_counted_over() -> None:
     points = in_blocks(cut, turning_points_of, block=1 << 16)
     turning = points.half_cycle + 1.0 - (0.3 + math.atan(rate / math.pi)) / math.pi
     assert np.max(np.abs(points.time_s - turning)) < 0.01
+
+
+@pytest.mark.parametrize("noise", [3e-5, 1e-4])
+def test_the_noise_of_a_long_record_is_found_wherever_its_readings_lie(noise: float) -> None:
+    """The half cycles hold no whole number of readings: none turns on a reading."""
+    time = np.arange(300_000) / 100.0
+    motion = 0.1 * np.exp(-1e-5 * time) * np.cos(6.0 * time + 0.3)
+    readings = motion + noise * np.random.default_rng(2).standard_normal(len(time))
+    samples = Samples(time, readings, "rad", None, noise)
+    points = in_blocks(samples, turning_points_of, block=1 << 16)
+    assert points.noise_rms_rad == pytest.approx(noise, rel=0.02)
+    assert np.isfinite(points.angle_sd_rad).all()

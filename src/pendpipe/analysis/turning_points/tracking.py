@@ -165,7 +165,11 @@ def track(
             if size > 0 and count % _SAMPLED == 0:
                 lo = math.floor(at + 0.5) - reach
                 residual += _squares(values[lo : lo + number], level)
-                residual -= found[0, 0] ** 2 * even + found[1, 0] ** 2 * odd
+                # About the reading, where cosine and sine are orthogonal: turned back.
+                back = (math.floor(at + 0.5) - at) * w * interval_s
+                about = found[0, 0] * math.cos(back) + found[1, 0] * math.sin(back)
+                aside = found[1, 0] * math.cos(back) - found[0, 0] * math.sin(back)
+                residual -= about * about * even + aside * aside * odd
                 freedom += number - 2
             total, measured = 0.0, 0
             for j in range(size):
