@@ -16,8 +16,6 @@ import numpy as np
 
 from pendpipe.arrays import IntArray
 
-MOST_CHANNELS: Final = 29
-"""As many as the 1156-byte header describes; the longer headers are untried."""
 MOST_SAMPLES: Final = 1 << 29
 """Pointers count samples in 31 bits, the data size bytes in 32."""
 _HEADER_BYTES: Final = 1156
