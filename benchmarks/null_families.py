@@ -1,0 +1,425 @@
+"""False alarms and coverage on decays that lack nothing, under many kinds of noise.
+
+    python -m benchmarks.null_families --number 300 [--family red] [--journal FILE] [--processes 2]
+
+Each recording is a solution of Eq. 8 and noise, nothing else: every name, and every curve, is
+false. Motion and noise are made here, with numpy and scipy and no code of the library, so that
+the library's own idea of noise is not what it is tried with. A recording is the function of its
+family and its number.
+
+The motion is solved by half cycles. With x = r cos(psi), v = -omega r sin(psi) and the loss
+G = -(f(r) + 2 b_v omega r sin(psi)), f(r) = (pi/2) (c omega + b_h omega r + a omega r^2), while
+v < 0 (the other half is its mirror image),
+
+    dr/dt = G sin(psi)/omega,    dpsi/dt = omega + G cos(psi)/(omega r),
+
+both analytic in psi from 0 to pi: Picard's iteration on Chebyshev nodes converges to rounding.
+a, b = b_v + b_h and c are the rates of Eq. 13. How the loss of a smoothed recording changes the
+motion itself is a measurement effect of its own; here smoothing acts on the noise alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+from zlib import crc32
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+from scipy import signal, stats
+
+Array = NDArray[np.float64]
+ROOT: Final = Path(__file__).parents[1]
+NODES: Final = 24
+RATES: Final = ("a", "b", "c", "frequency")
+STATED: Final = frozenset({"coloured-noise"})
+"""Effects that say what the noise is, and name no cause."""
+
+
+# ---------------------------------------------------------------- the motion
+
+
+@dataclass(frozen=True)
+class Law:
+    """Eq. 8 with a linear restoring torque, by the rates of Eq. 13.
+
+    Parameters
+    ----------
+    frequency_hz
+        omega/(2 pi) of Eq. 8.
+    quadratic, viscous, hysteretic, coulomb
+        a in 1/(rad s), b_v and b_h in 1/s, c in rad/s.
+    """
+
+    frequency_hz: float
+    quadratic: float
+    viscous: float
+    hysteretic: float
+    coulomb: float
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """What a fit should find."""
+        linear = self.viscous + self.hysteretic
+        found = (self.quadratic, linear, self.coulomb, self.frequency_hz)
+        return dict(zip(RATES, found, strict=True))
+
+
+def _nodes() -> tuple[Array, Array, Array]:
+    """Phases from 0 to pi, values to coefficients, and values to integrals from 0."""
+    u = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+    to_series = np.linalg.inv(chebyshev.chebvander(u, NODES - 1))
+    summed = np.array([chebyshev.chebint(c, lbnd=-1) for c in to_series.T]).T
+    integral = np.pi / 2 * chebyshev.chebvander(u, NODES) @ summed
+    return np.pi / 2 * (1 + u), to_series, integral
+
+
+PSI, SERIES, INTEGRAL = _nodes()
+
+
+def half_cycle(law: Law, amplitude: float) -> tuple[Array, Array]:
+    """Amplitude r and time at the phases `PSI`, from rest at a turning point."""
+    omega = 2 * np.pi * law.frequency_hz
+    sine, cosine = np.sin(PSI), np.cos(PSI)
+    r = np.full(NODES, amplitude)
+    for _ in range(60):
+        dry = np.pi / 2 * omega * (law.coulomb + (law.hysteretic + law.quadratic * r) * r)
+        loss = -(dry + 2 * law.viscous * omega * r * sine)
+        pace = omega + loss * cosine / (omega * r)
+        again = amplitude + INTEGRAL @ (loss * sine / (omega * pace))
+        change = np.abs(again - r).max()
+        r = again
+        if change < 1e-15 * amplitude:
+            return r, INTEGRAL @ (1 / pace)
+    raise ArithmeticError(f"the half cycle from {amplitude:g} rad does not converge: {law}")
+
+
+def motion(law: Law, amplitude: float, time_s: Array) -> tuple[Array, Array]:
+    """Angle and amplitude r at the given times after a release from rest at ``amplitude``."""
+    angle, level = np.empty_like(time_s), np.empty_like(time_s)
+    start, side, at = 0.0, 1.0, 0
+    while at < len(time_s):
+        r, clock = half_cycle(law, amplitude)
+        end = int(np.searchsorted(time_s, start + clock[-1]))
+        if end > at:
+            wanted = time_s[at:end] - start
+            to_clock, to_level = SERIES @ clock, SERIES @ r
+            slope = chebyshev.chebder(to_clock)
+            u = 2 * wanted / clock[-1] - 1
+            for _ in range(6):
+                u -= (chebyshev.chebval(u, to_clock) - wanted) / chebyshev.chebval(u, slope)
+            level[at:end] = chebyshev.chebval(u, to_level)
+            angle[at:end] = side * level[at:end] * np.cos(np.pi / 2 * (1 + u))
+        amplitude, side, start, at = r[-1], -side, start + clock[-1], end
+    return angle, level
+
+
+# ---------------------------------------------------------------- the noise
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A recording without its noise: times, angle, amplitude, and the noise's rms, SI."""
+
+    time_s: Array
+    angle: Array
+    level: Array
+    noise_rms: float
+
+    @property
+    def rate_hz(self) -> float:
+        """Readings a second."""
+        return float(1 / (self.time_s[1] - self.time_s[0]))
+
+
+Family = Callable[[np.random.Generator, Swing], Array]
+"""What adds noise to a swing, and returns the readings."""
+
+
+def _unit(noise: Array) -> Array:
+    return (noise - noise.mean()) / noise.std()
+
+
+def _coloured(rng: np.random.Generator, swing: Swing, power: Callable[[Array], Array]) -> Array:
+    """Gaussian noise of a spectrum, rms 1; four times as long at first, so that it drifts too."""
+    long = 4 * len(swing.time_s)
+    frequency = np.fft.rfftfreq(long, 1 / swing.rate_hz)[1:]
+    drawn = rng.normal(size=(2, len(frequency)))
+    sizes = np.sqrt(power(frequency)) * (drawn[0] + 1j * drawn[1])
+    return _unit(np.fft.irfft(np.r_[0, sizes], long)[: len(swing.time_s)])
+
+
+def white(rng: np.random.Generator, swing: Swing) -> Array:
+    """Each reading by itself."""
+    return swing.angle + swing.noise_rms * rng.normal(size=len(swing.angle))
+
+
+def memory(rng: np.random.Generator, swing: Swing) -> Array:
+    """AR(1), phi 0.3 to 0.95; in every second one beside white noise of up to half its power."""
+    phi, share = rng.uniform(0.3, 0.95), rng.uniform(0, 0.5) * rng.integers(2)
+    drawn = rng.normal(size=len(swing.angle) + 1000)
+    slow = signal.lfilter([np.sqrt(1 - phi**2)], [1, -phi], drawn)[1000:]
+    noise = np.sqrt(1 - share) * slow + np.sqrt(share) * rng.normal(size=len(slow))
+    return swing.angle + swing.noise_rms * noise
+
+
+def red(rng: np.random.Generator, swing: Swing) -> Array:
+    """Slope 0.5 to 3, corner 0.02 to 0.5 Hz: white above the corner, or level below it.
+
+    Noise that is level below its corner stands on white noise of 0.1 to 0.5 of its rms.
+    """
+    slope, corner_hz = rng.uniform(0.5, 3), np.exp(rng.uniform(*np.log([0.02, 0.5])))
+    if rng.integers(2):
+        noise = _coloured(rng, swing, lambda f: 1 + (corner_hz / f) ** slope)
+    else:
+        noise = _coloured(rng, swing, lambda f: (1 + (f / corner_hz) ** 2) ** (-slope / 2))
+        noise = _unit(noise + rng.uniform(0.1, 0.5) * rng.normal(size=len(noise)))
+    return swing.angle + swing.noise_rms * noise
+
+
+def changing(rng: np.random.Generator, swing: Swing) -> Array:
+    """White, its sd falling by 3, growing by 3, or proportional to the amplitude down to 1/3."""
+    run = np.linspace(0, 1, len(swing.angle))
+    forms = (1.5 - run, 0.5 + run, np.maximum(swing.level / swing.level[0], 1 / 3))
+    sd = forms[rng.integers(3)]
+    sd = sd / np.sqrt(np.mean(sd**2))
+    return swing.angle + swing.noise_rms * sd * rng.normal(size=len(run))
+
+
+def heavy_tails(rng: np.random.Generator, swing: Swing) -> Array:
+    """Student's t with 3 to 5 degrees of freedom, scaled to its standard deviation."""
+    freedom = rng.uniform(3, 5)
+    noise = rng.standard_t(freedom, size=len(swing.angle)) / np.sqrt(freedom / (freedom - 2))
+    return swing.angle + swing.noise_rms * noise
+
+
+def smoothed(rng: np.random.Generator, swing: Swing) -> Array:
+    """A running mean of 3, 5 or 7, binomial weights of as many, or a Butterworth low pass."""
+    width, kind = int(rng.choice([3, 5, 7])), rng.integers(3)
+    drawn = rng.normal(size=len(swing.angle) + 1000)
+    if kind == 2:
+        order, edge = int(rng.integers(1, 5)), rng.uniform(0.15, 0.6)
+        noise = signal.lfilter(*signal.butter(order, edge), drawn)
+    else:
+        weights = np.poly(-np.ones(width - 1)) if kind else np.ones(width)
+        noise = signal.lfilter(weights, 1, drawn)
+    return swing.angle + swing.noise_rms * _unit(noise[1000:])
+
+
+def rounded(rng: np.random.Generator, swing: Swing) -> Array:
+    """White noise and a converter of 8 to 16 bits, whose range is 1.2 to 3 times the swing."""
+    span = 2 * rng.uniform(1.2, 3) * np.abs(swing.angle).max()
+    step = span / 2.0 ** rng.integers(8, 17)
+    noisy = white(rng, swing)
+    return step * np.round(noisy / step)
+
+
+FAMILIES: Final[dict[str, Family]] = {
+    "white": white,
+    "memory": memory,
+    "red": red,
+    "changing": changing,
+    "heavy-tails": heavy_tails,
+    "smoothed": smoothed,
+    "rounded": rounded,
+}
+TRUE_NAMES: Final = {"rounded": frozenset({"coarse-quantisation"})}
+"""By family: what stands in the catalogue and is there."""
+
+
+# ---------------------------------------------------------------- a recording
+
+
+@dataclass(frozen=True)
+class Null:
+    """A recording that lacks nothing, and its law."""
+
+    time_s: Array
+    angle_rad: Array
+    law: Law
+    noise_rms: float
+
+
+def draw(family: str, number: int) -> Null:
+    """The recording of a family and a number, always the same."""
+    rng = np.random.default_rng([crc32(family.encode()), number])
+    while True:
+        cycles, in_cycle = np.exp(rng.uniform(*np.log([[30, 10], [120, 60]])))
+        readings = round(cycles * in_cycle)
+        if 1000 <= readings <= 6000:
+            break
+    frequency = float(np.exp(rng.uniform(*np.log([0.3, 2]))))
+    amplitude, falls_by = rng.uniform(0.05, 0.3), rng.uniform(0.5, 3.3)
+    shares = rng.dirichlet([1, 1, 1]) * rng.permutation([1, 1, rng.integers(2)])
+    # T = integral of dy/(a y^2 + b y + c) from y0 exp(-falls_by) to y0 sets the scale of all three.
+    y = np.exp(-np.linspace(0, falls_by, 400))
+    pace = shares @ np.array([y**2, y, np.full_like(y, 0.2)])
+    scale = -np.trapezoid(1 / pace, y) * frequency / cycles
+    hysteretic = rng.choice([0.0, 0.0, 1.0, rng.uniform()])
+    law = Law(
+        frequency,
+        quadratic=float(scale * shares[0] / amplitude),
+        viscous=float(scale * shares[1] * (1 - hysteretic)),
+        hysteretic=float(scale * shares[1] * hysteretic),
+        coulomb=float(scale * shares[2] * 0.2 * amplitude),
+    )
+    first, offset = rng.uniform() / frequency, 0.1 * amplitude * rng.uniform(-1, 1)
+    time_s = np.arange(readings) / (in_cycle * frequency)
+    angle, level = motion(law, amplitude, first + time_s)
+    noise_rms = amplitude / float(np.exp(rng.uniform(*np.log([200, 5000]))))
+    read = FAMILIES[family](rng, Swing(time_s, angle + offset, level, noise_rms))
+    return Null(time_s, read, law, noise_rms)
+
+
+# ---------------------------------------------------------------- the answers
+
+
+def answer(key: tuple[str, int]) -> dict[str, Any]:
+    """Ask the library about one recording; what is needed of its answer."""
+    import pendpipe as pp
+
+    family, number = key
+    null = draw(family, number)
+    recording = pp.Recording(time_s=null.time_s, angle_rad=null.angle_rad)
+    kept: dict[str, Any] = {"family": family, "number": number}
+    before = time.process_time()
+    try:
+        content = pp.diagnose(recording).to_dict()
+    except Exception as error:
+        return kept | {"failed": repr(error), "cpu_s": time.process_time() - before}
+    kept |= {"verdict": content["verdict"], "cpu_s": time.process_time() - before}
+    if content["verdict"] == "not-analysable":
+        return kept | {"reason": content["reason"]}
+    found = content["improved"]["parameters"]
+    covers: dict[str, bool | None] = {}
+    for name, truth in null.law.rates.items():
+        low, high = found[name]["interval95"] or (None, None)
+        inside = (low is None or low <= truth) and (high is None or truth <= high)
+        covers[name] = None if low is None and high is None else inside
+    return kept | {
+        "p_value": content["p_value"],
+        "effects": [[effect["id"], effect["probability"]] for effect in content["effects"]],
+        "covers": covers,
+        "chi2_per_dof": content["improved"]["chi2_per_dof"],
+        "noise_ratio": content["noise_rms_rad"] / null.noise_rms,
+    }
+
+
+def code_digest() -> str:
+    """Of the library and of this file: an answer belongs to both."""
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    for path in sorted((ROOT / "src").rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def read_journal(journal: Path, code: str) -> dict[tuple[str, int], dict[str, Any]]:
+    """Answers of this code; a last line that was cut off counts as none."""
+    found = {}
+    lines = journal.read_text("utf-8").splitlines() if journal.exists() else []
+    for line in lines:
+        try:
+            kept = json.loads(line)
+        except ValueError:
+            continue
+        if kept["code"] == code:
+            found[kept["family"], kept["number"]] = kept
+    return found
+
+
+def ask(wanted: Iterable[tuple[str, int]], processes: int) -> Iterator[dict[str, Any]]:
+    """Answers as they come."""
+    if processes == 1:
+        yield from map(answer, wanted)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        yield from pool.map(answer, wanted)
+
+
+def wilson(hits: int, trials: int) -> str:
+    """A share in percent with its 95 % interval (Wilson's score interval)."""
+    if not trials:
+        return "-"
+    low, high = stats.binomtest(hits, trials).proportion_ci(method="wilson")
+    return f"{100 * hits / trials:.1f} ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def false_names(kept: dict[str, Any]) -> list[str]:
+    """Names and curves that are not there."""
+    true = STATED | TRUE_NAMES.get(kept["family"], frozenset())
+    return [name for name, _ in kept.get("effects", []) if name not in true]
+
+
+def row(title: str, kept: list[dict[str, Any]]) -> str:
+    """One line of the table."""
+    answered = [each for each in kept if "covers" in each]
+    wrong = [names for each in answered if (names := false_names(each))]
+    stated = sum(any(name in STATED for name, _ in each["effects"]) for each in answered)
+    covers = []
+    for name in RATES:
+        known = [each["covers"][name] for each in answered if each["covers"][name] is not None]
+        covers.append(f"{100 * np.mean(known):.1f}" if known else "-")
+    every = [c for each in answered for c in each["covers"].values() if c is not None]
+    chi2 = [each["chi2_per_dof"] for each in answered]
+    cpu_s = [each["cpu_s"] for each in kept]
+    counts = {name: sum(name in names for names in wrong) for names in wrong for name in names}
+    shown = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    cells = [
+        title,
+        f"{len(kept)}",
+        f"{len(kept) - len(answered)}",
+        f"{len(wrong)}: {wilson(len(wrong), len(answered))}",
+        f"{stated}",
+        *covers,
+        wilson(sum(every), len(every)),
+        f"{median(chi2):.2f}, {max(chi2):.2f}" if chi2 else "-",
+        f"{median(cpu_s):.1f}, {max(cpu_s):.1f}",
+        shown,
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+HEAD: Final = (
+    "| family | asked | not answered | false names, % | noise stated | a | b | c | f"
+    " | covered, % | chi^2/dof, median and largest | CPU s | which |\n" + "|---" * 13 + "|"
+)
+
+
+def main() -> None:
+    """Ask what has not been asked yet, and print a line a family."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--number", type=int, default=300, help="recordings a family")
+    parser.add_argument("--family", action="append", choices=FAMILIES, help="repeatable")
+    parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/null_families.jsonl")
+    parser.add_argument("--processes", type=int, choices=(1, 2), default=1)
+    arguments = parser.parse_args()
+    families, code = arguments.family or list(FAMILIES), code_digest()
+    known = read_journal(arguments.journal, code)
+    arguments.journal.parent.mkdir(parents=True, exist_ok=True)
+    print(HEAD, flush=True)
+    pooled = []
+    for family in families:
+        keys = [(family, number) for number in range(arguments.number)]
+        left = [key for key in keys if key not in known]
+        with arguments.journal.open("a", encoding="utf-8") as stream:
+            for kept in ask(left, arguments.processes):
+                stream.write(json.dumps(kept | {"code": code}) + "\n")
+                stream.flush()
+                known[kept["family"], kept["number"]] = kept
+        answers = [known[key] for key in keys]
+        pooled += answers
+        print(row(family, answers), flush=True)
+    print(row("pooled", pooled))
+
+
+if __name__ == "__main__":
+    main()
