@@ -45,7 +45,7 @@ def fit_recording(
         waveform, and the turning points where the waveform's law contradicts the decay.
     restoring
         The restoring torque, ``"linear"`` or ``"sine"``. By default sin x where the turning
-        points of a recording in radians ask for it (`swings.SineCoefficient`).
+        points of a recording in radians favour it (`swings.start_of`).
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
@@ -101,7 +101,10 @@ def _fit(
 
         points = turning_points_of(samples, place)
     if restoring is None:
-        restoring = restoring_of(points)
+        from pendpipe.analysis.fit.swings import start_of
+
+        stated = not any("(--unit)" in guess for guess in recording.weak_guesses)
+        restoring = start_of(points, stated=stated).favoured
     if method == "turning-points":
         return _of_points(points, restoring, baseline, fixed)
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
@@ -143,13 +146,6 @@ def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) ->
     below = f"below {least:.2g} {points.unit} the decay is not that of the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
     return replace(_amber(result, f"{below}: that is left out"), cuts=(*result.cuts, cut))
-
-
-def restoring_of(points: TurningPoints) -> Restoring:
-    """Which restoring torque the times of the turning points ask for."""
-    from pendpipe.analysis.fit.swings import sine_coefficient
-
-    return "sine" if points.unit == "rad" and sine_coefficient(points).asks_for_sine else "linear"
 
 
 def _of_points(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from pendpipe.analysis.fit.minimise import Minimum, Quadratic, minimise
 from pendpipe.analysis.fit.period import period_excess
 from pendpipe.analysis.fit.quadratic import Bounds, bounded_step
+from pendpipe.analysis.fit.result import Restoring
 from pendpipe.analysis.fit.waveform import BOUNDS, OFFSET, Waveform
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -27,11 +29,16 @@ _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
 _SEEN: Final = 3.0
-"""Standard deviations from which an amplitude, or a coefficient, is seen."""
+"""Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
+coefficient may be off."""
 _AGREES: Final = 2.0
-"""Standard deviations within which the free coefficient agrees with 1."""
+"""Standard deviations within which the coefficient agrees with 1 where it has to tell by itself."""
 _NEAR: Final = 0.2
 """How near to 1 it must be where sin x removes most of chi^2."""
+_PENDULUM: Final = 0.25
+"""Amplitude in rad from which sin x lengthens the period by 0.4 %, more than frequencies wander:
+what swings so far is taken for a pendulum unless its half cycles speak against it."""
+_BLOCKS: Final = 8
 _STOP: Final = 6.0
 """In widths of the Coulomb stop: amplitudes below are left out."""
 _TOP: Final = 3.13
@@ -44,23 +51,113 @@ CLOCK: Final = (3, 5)
 """Of what the times tell: omega, and when it starts."""
 
 
-class SineCoefficient(NamedTuple):
+class Coefficient(NamedTuple):
     """How much of sin x the times of the turning points ask for: 0 nothing, 1 all of it."""
 
     value: float
     sd: float
+    """From parts of the decay left out in turn, and from what a drift of the frequency would do."""
+    scatter: float
+    """The part of `sd` that is no drift."""
     removed: float
     """Part of chi^2 of the times that the whole of sin x removes."""
 
     @property
-    def asks_for_sine(self) -> bool:
-        """Whether the restoring torque is sin x rather than x, by these times.
+    def agrees(self) -> bool:
+        """Whether the times alone ask for sin x.
 
         The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and what else
         there is moves the coefficient by less than 0.2.
         """
-        agrees = abs(self.value - 1.0) < _AGREES * self.sd and self.value > _SEEN * self.sd
-        return agrees or (self.removed > 0.5 and abs(self.value - 1.0) < _NEAR)
+        near = abs(self.value - 1.0) < _AGREES * self.scatter and self.value > _SEEN * self.scatter
+        return near or (self.removed > 0.5 and abs(self.value - 1.0) < _NEAR)
+
+    @property
+    def excludes_sine(self) -> bool:
+        """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
+        return abs(self.value - 1.0) > _SEEN * self.sd
+
+
+class LawStart(NamedTuple):
+    """Eq. 8 with one torque, from half periods and energies; the motion itself is not fitted."""
+
+    restoring: Restoring
+    rates: FloatArray
+    """a, b, c of Eq. 13, shape (3,)."""
+    angular_frequency: float
+    """omega, rad/s: with sin x that of small amplitudes."""
+    angle_rad: float
+    """Signed angle of the first turning point, about the offset."""
+    time_s: float
+    """When that is."""
+    offset_rad: float
+    slip_rad: float
+    """Largest phase by which the law's turning points and the measured ones part."""
+
+    @property
+    def value(self) -> FloatArray:
+        """The same in the order of `waveform.NAMES`, b half hysteretic; shape (8,)."""
+        return np.array(
+            [*self.rates, self.angular_frequency, self.angle_rad, self.time_s, self.offset_rad, 0.5]
+        )
+
+
+class Start(NamedTuple):
+    """What half periods and energies tell before any motion is fitted."""
+
+    linear: LawStart
+    sine: LawStart | None
+    """None where the readings are no angles, or the half cycles are too few."""
+    favoured: Restoring
+    """The torque that the half cycles favour."""
+    coefficient: Coefficient
+    """Of sin x, set free: a torque (1 - eta) x + eta sin x, as far as the period goes."""
+
+
+def start_of(points: TurningPoints, *, stated: bool = True) -> Start:
+    """Find where fits of the linear and of the sine law begin, and which the half cycles favour.
+
+    Parameters
+    ----------
+    points
+        The turning points; gaps between them are allowed.
+    stated
+        Whether it is known that the readings are angles. If so, swings beyond 0.25 rad are a
+        pendulum's unless the half cycles exclude sin x; else the half cycles must ask for it.
+
+    Returns
+    -------
+    Start
+        For each law a, b, c, omega, angle and time of the first turning point, and the offset;
+        the favoured law; the coefficient of sin x, set free, with its standard deviation.
+
+    Notes
+    -----
+    A half swing from A to A' takes [K(A) + K(A')]/omega and loses omega^2 (cos A' - cos A); with
+    the linear law pi/omega and omega^2 (A^2 - A'^2)/2. Two half swings are taken together, so that
+    an error of the level, and sides that differ, cancel. omega and the first time come from the
+    straight line through the times against the half swings counted so; the losses from
+    non-negative least squares (`balance`).
+
+    Examples
+    --------
+    >>> from pendpipe import turning_points
+    >>> points = turning_points("examples/rod-pendulum.csv")
+    >>> start = start_of(points)
+    >>> start.favoured, round(start.linear.angular_frequency, 3)
+    ('linear', 5.485)
+    """
+    linear = _law_start(points, "linear")
+    coefficient = sine_coefficient(points)
+    inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
+    sine = _law_start(points, "sine") if inside and len(_clear(points)) >= _FEWEST else None
+    favoured: Restoring = "linear"
+    if sine is not None and (
+        coefficient.agrees
+        or (stated and abs(sine.angle_rad) > _PENDULUM and not coefficient.excludes_sine)
+    ):
+        favoured = "sine"
+    return Start(linear, sine, favoured, coefficient)
 
 
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,25 +183,39 @@ class Energies(NamedTuple):
     """a, b, c of Eq. 13, shape (3,)."""
 
 
-def balance(points: TurningPoints) -> Energies:
-    """Find omega and the losses from amplitudes and half periods, with sin x.
+def balance(points: TurningPoints, restoring: Restoring = "sine") -> Energies:
+    """Find omega and the losses from amplitudes and half periods.
 
-    A half swing from A to A' takes 2 K/omega, and loses
+    With sin x a half swing from A to A' takes (K + K')/omega, and loses
     omega^2 (cos A' - cos A) = omega (A + A') [pi c/2 + pi b_h s + 2 pi a s^2]
     + 16 omega b_v [E - (1 - s^2) K], with s = sin((A + A')/4) and the elliptic integrals of
-    modulus s; b counts as half hysteretic and half viscous.
+    modulus s; b counts as half hysteretic and half viscous. Linear: small s.
     """
-    amplitude, sd = np.clip(points.amplitude_rad, 0.0, _TOP), points.angle_sd_rad
+    sd = points.angle_sd_rad
     swings = np.diff(points.half_cycle).astype(np.float64)
+    if restoring == "sine":
+        amplitude = np.clip(points.amplitude_rad, 0.0, _TOP)
+        s = np.sin(0.25 * (amplitude[1:] + amplitude[:-1]))
+        k, e = elliptic(s**2)
+        viscous = 8.0 * (e - (1.0 - s**2) * k)
+        energy, slope = -np.cos(amplitude), np.sin(amplitude)
+    else:
+        amplitude = np.maximum(points.amplitude_rad, 0.0)
+        s = 0.25 * (amplitude[1:] + amplitude[:-1])
+        viscous = 2.0 * math.pi * s**2
+        energy, slope = 0.5 * amplitude**2, amplitude
     both = amplitude[1:] + amplitude[:-1]
-    s = np.sin(0.25 * both)
-    k, e = elliptic(s**2)
-    omega = float(np.median(2.0 * k * swings / np.diff(points.time_s)))
-    lost = np.cos(amplitude[1:]) - np.cos(amplitude[:-1])
-    linear = 0.5 * math.pi * both * s + 8.0 * (e - (1.0 - s**2) * k)
-    columns = np.stack([2.0 * math.pi * both * s**2, linear, 0.5 * math.pi * both], axis=1)
-    columns *= swings[:, None] / omega
-    error = np.hypot(np.sin(amplitude[1:]) * sd[1:], np.sin(amplitude[:-1]) * sd[:-1])
+    # Two half swings together, where there are two.
+    together = 2 if len(points) > _FEWEST else 1
+    lasts = np.diff(points.time_s)
+    turns = quarters(amplitude, restoring) * swings
+    omega = float(np.median(_sums(turns, together) / _sums(lasts, together)))
+    columns = np.stack(
+        [2.0 * math.pi * both * s**2, 0.5 * math.pi * both * s + viscous, 0.5 * math.pi * both]
+    )
+    columns = np.stack([_sums(each * swings / omega, together) for each in columns], axis=1)
+    lost = energy[:-together] - energy[together:]
+    error = np.hypot(slope[together:] * sd[together:], slope[:-together] * sd[:-together])
     weight = 1.0 / (error + 0.03 * np.abs(np.median(lost)) + 1e-300) ** 2
     normal = columns.T @ (weight[:, None] * columns)
     gradient = columns.T @ (weight * lost)
@@ -112,46 +223,104 @@ def balance(points: TurningPoints) -> Energies:
     return Energies(omega, np.maximum(rates, 0.0))
 
 
-def sine_coefficient(points: TurningPoints) -> SineCoefficient:
-    """Fit the times with a free coefficient of sin x, at the larger amplitudes.
+def _sums(values: FloatArray, together: int) -> FloatArray:
+    """Each value with the next ones."""
+    return np.asarray(np.convolve(values, np.ones(together), "valid"))
 
-    A half swing lasts (pi/omega) [1 + losses + eta (2 K/pi - 1)]: the times are linear in
-    pi/omega and in eta pi/omega.
-    """
+
+def quarters(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
+    """Phase omega t of the half swings between neighbours: two quarter periods, or pi."""
+    if restoring == "linear":
+        return np.full(len(amplitude) - 1, math.pi)
+    quarter = elliptic(np.sin(0.5 * np.clip(amplitude, 0.0, _TOP)) ** 2)[0]
+    return np.asarray(quarter[1:] + quarter[:-1])
+
+
+def _clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
+    """Those that stand out of the noise, and above a part of the largest."""
     amplitude = points.amplitude_rad
     seen = (amplitude > _SEEN * points.angle_sd_rad) & (amplitude < _TOP)
-    seen &= amplitude > _LARGE * np.max(amplitude, where=seen, initial=0.0)
-    if np.count_nonzero(seen) < _FEWEST:
-        return SineCoefficient(0.0, math.inf, 0.0)
-    part = points.chosen(seen)
-    omega, rates = balance(part)
-    swings = np.diff(part.half_cycle).astype(np.float64)
-    mean = 0.5 * (part.amplitude_rad[1:] + part.amplitude_rad[:-1])
-    slower = 2.0 / math.pi * elliptic(np.sin(0.5 * mean) ** 2)[0] - 1.0
-    a, b, c = rates.tolist()
-    excess = period_excess(mean, omega, a, b, c, 0.5)
-    counted = np.stack([np.cumsum((1.0 + excess) * swings), np.cumsum(slower * swings)], axis=1)
-    columns = np.ones((len(part), 3))
-    columns[:, 1:] = np.concatenate([np.zeros((1, 2)), counted])
-    weight = 1.0 / part.time_sd_s
-    design, right = columns * weight[:, None], (part.time_s - part.time_s[0]) * weight
+    return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
-    def left(held: FloatArray, free: FloatArray) -> tuple[FloatArray, FloatArray]:
-        values = np.linalg.lstsq(held, free, rcond=1e-12)[0]
-        return np.asarray(values), np.asarray(free - held @ values)
 
-    values, residual = left(design, right)
-    plain = float(np.sum(left(design[:, :2], right)[1] ** 2))
-    bent = float(
-        np.sum(left(np.stack([design[:, 0], design[:, 1] + design[:, 2]], axis=1), right)[1] ** 2)
+def _counted(
+    points: TurningPoints, restoring: Restoring
+) -> tuple[FloatArray, FloatArray, Energies]:
+    """Phase from the first turning point to each by a law without losses; what they add."""
+    unit = restoring if points.unit == "rad" else "linear"
+    found = balance(points, unit)
+    swings = np.diff(points.half_cycle).astype(np.float64)
+    amplitude = points.amplitude_rad
+    a, b, c = found.rates.tolist()
+    mean = 0.5 * (amplitude[1:] + amplitude[:-1])
+    excess = period_excess(mean, found.angular_frequency, a, b, c, 0.5)
+    phase = swings * quarters(amplitude, unit)
+    return (
+        np.concatenate([[0.0], np.cumsum(phase)]),
+        np.concatenate([[0.0], np.cumsum(math.pi * excess * swings)]),
+        found,
     )
-    square, freedom = float(residual @ residual), max(len(part) - 3, 1)
-    alike = min(max(float(residual[1:] @ residual[:-1]) / max(square, 1e-300), 0.0), 0.8)
-    scatter = max(1.0, square / freedom) * (1.0 + alike) / (1.0 - alike)
-    alone = float(np.linalg.norm(left(design[:, :2], design[:, 2])[1]))
-    eta = float(values[2] / values[1])
-    sd = math.sqrt(scatter) / max(alone * abs(float(values[1])), 1e-300)
-    return SineCoefficient(eta, sd, 1.0 - bent / plain if plain > 0.0 else 0.0)
+
+
+def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:
+    """The start of one law: times on a straight line against the phase."""
+    part = _clear(points) if restoring == "sine" else points
+    phase, excess, found = _counted(part, restoring)
+    design = np.stack([np.ones_like(phase), phase + excess], axis=1) / part.time_sd_s[:, None]
+    late = part.time_s - part.time_s[0]
+    first, slope = np.linalg.lstsq(design, late / part.time_sd_s, rcond=None)[0].tolist()
+    slip = np.max(np.abs(late - first - slope * (phase + excess))) / slope
+    return LawStart(
+        restoring, found.rates, 1.0 / slope, float(part.angle_rad[0]),
+        float(part.time_s[0]) + first, float(np.mean(points.level_rad)), float(slip),
+    )  # fmt: skip
+
+
+def sine_coefficient(points: TurningPoints) -> Coefficient:
+    """Fit the times with a free coefficient of sin x, at the larger amplitudes.
+
+    A half swing lasts [pi (1 + losses) + eta (K + K' - pi)]/omega: the times are linear in
+    1/omega and in eta/omega. The level's error makes them alternate.
+
+    The coefficient's error does not trust that the times scatter independently: an eighth of the
+    decay is left out in turn, the phase beyond it free. And by what it changes if the frequency may
+    drift in time, it is uncertain too.
+    """
+    part = _clear(points, _LARGE)
+    if len(part) < _FEWEST or points.unit != "rad":
+        return Coefficient(0.0, math.inf, math.inf, 0.0)
+    phase, excess, _ = _counted(part, "sine")
+    plain = math.pi * (part.half_cycle - part.half_cycle[0])
+    weight = 1.0 / part.time_sd_s
+    columns = np.stack([plain + excess, phase - plain, np.ones_like(phase), part.side], axis=1)
+    columns *= weight[:, None]
+    right = (part.time_s - part.time_s[0]) * weight
+
+    def eta(design: FloatArray, use: FloatArray | slice = slice(None)) -> float:
+        values = np.linalg.lstsq(design[use], right[use], rcond=1e-13)[0]
+        return float(values[1] / values[0])
+
+    def square(design: FloatArray) -> float:
+        values = np.linalg.lstsq(design, right, rcond=1e-13)[0]
+        return float(np.sum((right - design @ values) ** 2))
+
+    value, count = eta(columns), len(part)
+    blocks = min(_BLOCKS, count // 3)
+    edges = np.linspace(0, count, blocks + 1).astype(int).tolist()
+    without = []
+    for low, high in pairwise(edges):
+        use = np.ones(count, dtype=bool)
+        use[low:high] = False
+        step = weight * (np.arange(count) >= high)
+        inner = low > 0 and high < count
+        without.append(eta(np.column_stack([columns, step]) if inner else columns, use))
+    scatter = math.sqrt((blocks - 1) * float(np.var(without)))
+    slower = np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
+    drift = eta(np.column_stack([columns, weight * slower])) - value
+    linear, bent = square(columns[:, [0, 2, 3]]), columns[:, [0, 2, 3]]
+    bent[:, 0] += columns[:, 1]
+    removed = 1.0 - square(bent) / linear if linear > 0.0 else 0.0
+    return Coefficient(value, math.hypot(scatter, drift), scatter, removed)
 
 
 @dataclass(frozen=True)

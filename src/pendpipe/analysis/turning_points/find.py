@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.blocks import BLOCK, in_blocks
+from pendpipe.analysis.turning_points.far import far_points
 from pendpipe.analysis.turning_points.finish import State, finished, kept, last_seen
 from pendpipe.analysis.turning_points.follow import first_places, follow_tail, resmoothed
 from pendpipe.analysis.turning_points.harmonics import odd_harmonics, own_square
@@ -66,8 +67,10 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
 def turning_points_of(samples: Samples, place: str | Path = "recording") -> TurningPoints:
     """As `find_turning_points`, of readings that are prepared already."""
     if len(samples) > 2 * BLOCK:
-        return in_blocks(samples, lambda piece: _of_piece(piece, place))
-    return _of_piece(samples, place)
+        points = in_blocks(samples, lambda piece: _of_piece(piece, place))
+    else:
+        points = _of_piece(samples, place)
+    return far_points(samples, points)
 
 
 def _of_piece(samples: Samples, place: str | Path) -> TurningPoints:
