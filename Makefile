@@ -44,7 +44,8 @@ check: .venv/installed
 	$(RUN) snakefmt --check Snakefile workflow
 	$(RUN) snakemake --lint
 
-.venv/installed: pyproject.toml challenge/pyproject.toml constraints.txt
+.venv/installed: pyproject.toml setup.py challenge/pyproject.toml constraints.txt
+	@echo "setting up .venv/ (some minutes: the engine is compiled on the way)"
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]" --editable ./challenge
 	$(BIN)/python -m pendpipe.warm_up
@@ -54,11 +55,9 @@ check: .venv/installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]" --editable ./challenge
 	touch $@
 
-# A wheel that brings the engine's machine code along (for x86-64 processors with AVX2), so that
-# a first call need not compile.
+# Brings the engine's machine code along (setup.py), so that a first call need not compile.
 wheel: .venv/installed
-	rm -rf src/pendpipe/dynamics/shipped
-	NUMBA_CACHE_DIR=$$(mktemp -d) PENDPIPE_SHIP=1 $(BIN)/python -m pendpipe.warm_up
+	rm -rf build
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 # Raw files of an instrument (results/RECORD/raw) can't be made again: they stay.

@@ -1,7 +1,8 @@
-"""Compile what is compiled: ``python -m pendpipe.warm_up``.
+"""Compile what is compiled: ``python -m pendpipe.warm_up``, ``python -m pendpipe.warm_up ship``.
 
-numba keeps compiled functions on disk, so only the first call on a machine waits for the
-compiler. The set-up makes that call, lest the first jobs of a campaign all do it at once.
+The second is what ``pip install`` runs (`setup.py`): it puts the engine's machine code into the
+package. The first makes the first call, which compiles what such code is not made for, lest the
+first jobs of a campaign all do it at once.
 Python's own byte code is written for the same reason: pip does so for what it copies, not
 for an editable installation, and where PYTHONDONTWRITEBYTECODE is set nobody else would.
 """
@@ -35,7 +36,18 @@ def warm_up() -> None:
     best_noise(noise, 1e-3, 1e-4)  # of coarse readings
 
 
+def ship() -> None:
+    """Put the engine's machine code into the package."""
+    from pendpipe.analysis.turning_points import compiled as loops
+    from pendpipe.dynamics import compiled as engine
+
+    engine.ship(loops.file_name(), loops.compile_loops)
+    engine.ship(engine.file_name(), engine.compile_engine)
+
+
 if __name__ == "__main__":
-    print("compiling (once on a machine, about a minute)", file=sys.stderr)
-    compileall.compile_dir(Path(__file__).parent, quiet=2)
-    warm_up()
+    if sys.argv[1:] == ["ship"]:
+        ship()
+    else:
+        compileall.compile_dir(Path(__file__).parent, quiet=2)
+        warm_up()

@@ -58,11 +58,11 @@ def first_call(folder: Path, more: str = "") -> list[str]:
 def kept(tmp_path: Path) -> Path:
     """Return a folder with the machine code of this installation, compiled if need be."""
     compiled.engine()
-    for folder in compiled.folders():
-        if (folder / compiled.file_name()).exists():
-            (tmp_path / compiled.file_name()).write_bytes(
-                (folder / compiled.file_name()).read_bytes()
-            )
+    name = compiled.file_name()
+    here = [folder / name for folder in compiled.folders()]
+    for path in (*here, compiled.SHIPPED / compiled.shipped_name(name)):
+        if path.exists():
+            (tmp_path / name).write_bytes(path.read_bytes())
             return tmp_path
     pytest.skip("no folder to keep compiled code in")
 
@@ -85,7 +85,7 @@ def test_damaged_code_is_compiled_anew(kept: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept))
     monkeypatch.setattr(compiled, "SHIPPED", kept / "nothing")
     # The compiler itself takes half a minute: set-up runs it, and every test runs its code.
-    monkeypatch.setattr(compiled, "_compile", lambda: [a_small_function])
+    monkeypatch.setattr(compiled, "compile_engine", lambda: [a_small_function])
     renewed = compiled.engine.__wrapped__()
     assert renewed.owner == [a_small_function]
     assert machine_code.load(path) is not None
@@ -128,8 +128,22 @@ def test_a_new_process_runs_shipped_code_without_compiling(
     (kept / compiled.shipped_name(compiled.file_name())).write_bytes(code)
     monkeypatch.setattr(compiled, "SHIPPED", kept)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(kept / "empty"))
-    monkeypatch.setattr(compiled, "_compile", lambda: pytest.fail("compiled"))
+    monkeypatch.setattr(compiled, "compile_engine", lambda: pytest.fail("compiled"))
     assert callable(compiled.engine.__wrapped__())
+
+
+def test_an_installation_brings_the_code_of_its_sources_and_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not machine_code.can_be_portable():
+        pytest.skip("no code is shipped for this processor")
+    monkeypatch.setattr(compiled, "SHIPPED", tmp_path)
+    (tmp_path / "engine-older.bin").write_bytes(b"")
+    compiled.ship(compiled.file_name(), lambda: [a_small_function])
+    (found,) = tmp_path.iterdir()
+    assert found.name == compiled.shipped_name(compiled.file_name())
+    assert machine_code.load(found) is not None
+    compiled.ship(compiled.file_name(), lambda: pytest.fail("compiled again"))
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,7 @@ SOURCES = (
     "views.py",
 )
 SHIPPED = Path(__file__).parent / "shipped"
-"""Machine code for many machines, which a wheel may bring along."""
-SHIP = "PENDPIPE_SHIP"
-"""The variable of the environment that asks for it to be made (`make wheel`)."""
+"""Machine code for many machines, made while the package is built (`setup.py`)."""
 _FUNCTIONS = {"engine": 92, "turning": 33}
 """About how many functions the compiler has to do."""
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -92,8 +90,6 @@ def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int]
     with _progress(name.partition("-")[0]):
         entries = compile_all()
     parts = [(entry.inspect_llvm(), entry.native_name) for entry in entries]
-    if SHIP in os.environ and machine_code.can_be_portable():
-        machine_code.keep(SHIPPED / shipped_name(name), parts, portable=True)
     for folder in folders():
         try:
             machine_code.keep(folder / name, parts)
@@ -104,6 +100,19 @@ def kept(name: str, compile_all: Callable[[], Sequence[Any]]) -> tuple[list[int]
                 old.unlink(missing_ok=True)
         break
     return [entry.address for entry in entries], entries
+
+
+def ship(name: str, compile_all: Callable[[], Sequence[Any]]) -> None:
+    """Make the code of `kept` for many machines, unless it is there; older code goes."""
+    from pendpipe.dynamics import machine_code
+
+    path = SHIPPED / shipped_name(name)
+    if path.exists() or not machine_code.can_be_portable():
+        return
+    for old in SHIPPED.glob(f"{name.rsplit('-', 2)[0]}-*.bin"):
+        old.unlink()
+    parts = [(entry.inspect_llvm(), entry.native_name) for entry in compile_all()]
+    machine_code.keep(path, parts, portable=True)
 
 
 @contextlib.contextmanager
@@ -138,7 +147,7 @@ def _progress(stem: str) -> Iterator[None]:
         print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
 
 
-def _compile() -> list[Any]:
+def compile_engine() -> list[Any]:
     """Compile the engine."""
     from pendpipe.dynamics.entry import compiled_entry
 
@@ -149,10 +158,10 @@ def _compile() -> list[Any]:
 def engine() -> Callable[..., int]:
     """Return the engine's entry; see `entry.py` for its arguments.
 
-    The first call in a new installation compiles for half a minute; those in later processes
-    take about a tenth of a second.
+    Where the installation brought no machine code for this processor, the first call compiles
+    for half a minute; else, and in later processes, it takes about a tenth of a second.
     """
-    (address,), owner = kept(file_name(), _compile)
+    (address,), owner = kept(file_name(), compile_engine)
     function = _ENTRY(address)
     function.owner = owner  # type: ignore[attr-defined]
     return function

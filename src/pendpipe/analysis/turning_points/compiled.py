@@ -72,7 +72,8 @@ def file_name() -> str:
     return name_of("turning-points", [Path(__file__).parent / name for name in SOURCES])
 
 
-def _compile() -> list[Any]:
+def compile_loops() -> list[Any]:
+    """Compile the loops."""
     from pendpipe.analysis.turning_points.entries import compiled_entries
 
     return compiled_entries(ARGUMENTS)
@@ -81,7 +82,7 @@ def _compile() -> list[Any]:
 @cache
 def entries() -> dict[str, Any]:
     """Return the compiled loops by name, as functions of arrays, integers and numbers."""
-    addresses, owner = kept(file_name(), _compile)
+    addresses, owner = kept(file_name(), compile_loops)
     found: dict[str, Any] = {"owner": owner}
     for (name, letters), address in zip(ARGUMENTS.items(), addresses, strict=True):
         prototype = ctypes.CFUNCTYPE(ctypes.c_int64, *(_KINDS[letter] for letter in letters))
