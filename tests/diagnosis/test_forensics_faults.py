@@ -21,7 +21,7 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.state import State
 from pendpipe.effects.catalogue import CATALOGUE
-from pendpipe.effects.catalogue.restoring import CubicStiffness
+from pendpipe.effects.catalogue.restoring import cubic_stiffness
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
@@ -200,7 +200,7 @@ def test_a_random_torque_is_measured(clean: FloatArray) -> None:
 
 
 def test_missing_stiffness_is_not_a_random_torque() -> None:
-    stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (CubicStiffness(),))
+    stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (cubic_stiffness,))
     readings = stiff.reading(np.append(AIR.values(), 3e-3)) + white(generator(), AIR.count)
     record = fitted(AIR, readings)
     assert record.fit.chi2 > 1.1 * AIR.count

@@ -19,7 +19,7 @@ from pendpipe.diagnosis.state import State, first_noise, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, B
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.catalogue.restoring import CircularError
+from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
@@ -57,7 +57,7 @@ def searching(record: Recording, guess: float = 1.0) -> tuple[State, list[int]]:
         asked.append(len(part.data))
         if part.fit.model.effects:
             return False
-        model = part.fit.model.adding(CircularError())
+        model = part.fit.model.adding(circular_error)
         start = np.append(beginning.value, 1.0)
         try:
             value = progressive_start(model, part.data, part.noise.white_rms, start)
@@ -143,7 +143,7 @@ def test_a_search_that_is_not_taken_leaves_the_record_whole(
     def add_circular_error(part: State) -> bool:
         if not found or part.fit.model.effects:
             return False
-        model = part.fit.model.adding(CircularError())
+        model = part.fit.model.adding(circular_error)
         start = np.append(beginning.value, 1.0)
         part.settle(
             refine(

@@ -13,7 +13,7 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.progressive_window import progressive_start
 from pendpipe.diagnosis.refine import refine
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.catalogue.restoring import CircularError
+from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 
 RATE_HZ, NOISE_RAD, LINEAR = 20.0, 1e-3, 0.012
@@ -33,7 +33,7 @@ def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_
     )
     values = solved.y[0] + NOISE_RAD * np.random.default_rng(4).standard_normal(len(TIME_S))
     data = Data(TIME_S, values, 1.0 / RATE_HZ, True, np.ones(len(TIME_S)))
-    model = Model(TIME_S, 1.0 / RATE_HZ, (CircularError(),), order=20)
+    model = Model(TIME_S, 1.0 / RATE_HZ, (circular_error,), order=20)
     slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)
     start = np.array([0.0, LINEAR, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
     value = progressive_start(model, data, NOISE_RAD, start)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+from inspect import get_annotations
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from pendpipe.dynamics.sampling import Sampled
 
 Kind = Literal["dynamics", "measurement", "parameter", "unnamed"]
+How = Literal["acceleration", "kick", "reading", "delay"]
+"""The methods of `Effect` by which one enters."""
 
 
 class Parameter(NamedTuple):
@@ -138,7 +142,7 @@ class Span(NamedTuple):
 class Effect:
     """One thing that may have been left out.
 
-    A subclass sets the class variables and overrides what the effect changes: the
+    `enters` declares one by these class variables and the function by which it changes the
     acceleration, the state (a kick), the reading, or the reading's clock. Its `values` are
     those of `parameters` in their order: first the sizes, at zero of which the effect is
     absent, then the shape (an exponent, an instant, a time constant ...).
@@ -149,7 +153,7 @@ class Effect:
     kind: ClassVar[Kind]
     equation: ClassVar[str]
     """LaTeX."""
-    parameters: ClassVar[tuple[Parameter, ...]]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
     example: ClassVar[tuple[float, ...]] = ()
     """Values at which it is plain to see for a pendulum of about 1 Hz released at 0.15 rad; in the
     manual, and what the tests of every effect take."""
@@ -253,3 +257,58 @@ class Effect:
     def small(self, span: Span) -> float:
         """Return a size so small that the effect is linear in it."""
         return 1e-6
+
+
+def enters(
+    how: How, base: type[Effect] = Effect, **attributes: Any
+) -> Callable[[Callable[..., Any]], Effect]:
+    """Declare an effect by the function through which it enters.
+
+    The function takes what that method of `Effect` takes, its values one by one; its docstring
+    is the effect's text in the manual.
+
+    Parameters
+    ----------
+    how
+        The method.
+    base
+        The kind of scan (`pendpipe.effects.scan`).
+    attributes
+        Class variables of `Effect`, and methods of it as functions without ``self``.
+
+    Examples
+    --------
+    >>> @enters("reading", identifier="tilt", parameters=(Parameter("s2", "1/rad", -1.0, 1.0),))
+    ... def tilt(sampled, pendulum, s2):
+    ...     return s2 * sampled.angle**2
+    >>> tilt.identifier, tilt.kind, tilt.count
+    ('tilt', 'measurement', 1)
+    """
+    kind = "dynamics" if how in ("acceleration", "kick") else "measurement"
+
+    def declare(function: Callable[..., Any]) -> Effect:
+        def method(_: Effect, *given: Any) -> Any:
+            *where, values = given
+            return function(*where, *values)
+
+        own = {how: method, "__module__": function.__module__, "kind": kind}
+        return _made(base, function.__name__, function.__doc__, own, attributes)
+
+    return declare
+
+
+def without_template(module: str, text: str, **attributes: Any) -> Effect:
+    """Declare an effect that a test of its own finds, by its text in the manual."""
+    own = {"__module__": module, "kind": "measurement", "has_signature": False}
+    return _made(Effect, str(attributes["identifier"]), text, own, attributes)
+
+
+def _made(
+    base: type[Effect], name: str, text: str | None, own: dict[str, Any], given: dict[str, Any]
+) -> Effect:
+    known = {name for kind in base.__mro__ for name in (*vars(kind), *get_annotations(kind))}
+    if unknown := given.keys() - known:
+        raise TypeError(f"{name}: an effect has no {', '.join(sorted(unknown))}")
+    methods = {name: staticmethod(each) if callable(each) else each for name, each in given.items()}
+    effect: Effect = type(name, (base,), {"__doc__": text, **own, **methods})()
+    return effect

@@ -10,7 +10,7 @@ from pendpipe.effects.effect import Effect, Parameter
 
 _OPENING = """# What may have been left out
 
-Made by `pendpipe effects`; each entry is one class in `src/pendpipe/effects/catalogue/`, from
+Made by `pendpipe effects`; each entry is one function in `src/pendpipe/effects/catalogue/`, from
 which the simulation (`[[effects]]` in a model file), the diagnosis and this page are all taken.
 
 `x` is the angle from the equilibrium, `r` its amplitude, `psi` the phase (x = r cos psi), `y`
@@ -18,9 +18,9 @@ the reading or an amplitude, `omega` that of Eq. 8. Times are in s from the turn
 motion starts from (dynamics) or from the first reading (measurement); instants called `time`
 are those of the record. The symbol of an acceleration that is added is +=.
 
-**Adding one**: write a class like `CubicStiffness` (declaration, and the acceleration,
-kick, reading or delay it makes, and an `example`) into a module of that package, or into a new
-one: it is found there. The tests of every effect then run on its example; add one of its own
+**Adding one**: write a function like `cubic_stiffness` (its declaration with an `example`, and
+the acceleration, kick, reading or delay that it makes) into a module of that package, or into a
+new one: it is found there. The tests of every effect then run on its example; add one of its own
 signature to `tests/effects/`, and run `pendpipe effects > docs/effects.md`.
 """
 

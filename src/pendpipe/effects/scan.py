@@ -22,6 +22,11 @@ def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:
     return [tuple(float(value) for value in row) for row in itertools.product(*axes)]
 
 
+def between(low: float, high: float, count: int) -> FloatArray:
+    """Return values in equal ratios; up to twice the lowest at least."""
+    return np.geomspace(low, max(high, 2.0 * low), count)
+
+
 STRAIGHT_S: Final = 1e7
 """A relaxation time that no record can tell from infinity."""
 RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S)
@@ -48,11 +53,12 @@ USUAL_DRIFT: Final = 1e-3
 so in a few kelvin, the clock of a program that times itself so at the worst."""
 
 
-def unusual_drift(span: Span, rate: float, tau: float) -> float:
+def unusual_drift(values: FloatArray, span: Span) -> float:
     """Return twice the logarithm by which a drift is larger than usual ones; 0 where it is not.
 
     A density that falls as 1/change^2 beyond the usual, and is flat in the logarithm within.
     """
+    rate, tau = values.tolist()
     change = abs(rate) * float(relaxed(np.asarray(span.duration_s), tau))
     return 2.0 * math.log(max(change / USUAL_DRIFT, 1.0))
 
@@ -93,10 +99,18 @@ def smooth_step(motion: Motion, instant_s: float) -> FloatArray:
     return np.asarray(0.5 + 0.5 * np.tanh(1.2 * late))
 
 
+def elapsed(time_s: FloatArray) -> FloatArray:
+    """Return the time since the first reading, s."""
+    return np.asarray(time_s - time_s[0])
+
+
 def reading_step(time_s: FloatArray, instant_s: float) -> FloatArray:
     """Return a step from 0 to 1 at an instant, at the readings; it lasts one interval."""
     interval = (time_s[-1] - time_s[0]) / max(len(time_s) - 1, 1)
     return np.asarray(np.clip((time_s - instant_s) / interval + 0.5, 0.0, 1.0))
+
+
+INSTANT: Final = Parameter("time", "s", -math.inf, math.inf)
 
 
 class Sudden(Effect):

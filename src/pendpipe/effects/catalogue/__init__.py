@@ -1,7 +1,7 @@
 """The catalogue: every effect that is known, each declared once in a module of this package.
 
-A new effect is a class in one of these modules, or in a module of its own: whatever is defined
-here with an `identifier` is found.
+A new effect is a function declared by `enters` in one of these modules, or in a module of its
+own: whatever is declared here is found.
 """
 
 from __future__ import annotations
@@ -31,21 +31,14 @@ _FIRST: Final = (
 
 
 def _found() -> Iterator[Effect]:
-    """Yield an instance of every effect, module by module, as they are defined."""
+    """Yield every effect, module by module, as they are declared."""
     names = [module.name for module in pkgutil.iter_modules(__path__)]
     for name in sorted(names, key=lambda name: (*_FIRST, name).index(name)):
         module = importlib.import_module(f"{__name__}.{name}")
-        for kind in vars(module).values():
-            if (
-                isinstance(kind, type)
-                and issubclass(kind, Effect)
-                and kind.__module__ == module.__name__
-                and hasattr(kind, "identifier")
-            ):
-                effect = kind()
-                # A variant of an entry, which only the diagnosis uses, has a key of its own.
-                if effect.key == effect.identifier:
-                    yield effect
+        for effect in vars(module).values():
+            # A variant of an entry, which only the diagnosis uses, has a key of its own.
+            if isinstance(effect, Effect) and effect.key == effect.identifier:
+                yield effect
 
 
 CATALOGUE: Final[tuple[Effect, ...]] = tuple(_found())
