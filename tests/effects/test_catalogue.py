@@ -14,6 +14,7 @@ from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.effects.derivatives import jacobian, response
+from pendpipe.effects.effect import enters
 from pendpipe.effects.manual import page
 from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
@@ -276,3 +277,12 @@ def test_a_scan_keeps_most_of_what_lies_between_its_rows(identifier: str) -> Non
         best.append(math.sqrt(float(np.max(np.sum(products**2, axis=1)))))
     assert float(np.median(best)) > 0.9
     assert min(best) > 0.6
+
+
+def test_a_misspelt_declaration_is_refused() -> None:
+    """A word that no effect has would be lost otherwise."""
+    with pytest.raises(TypeError, match=r"push: an effect has no equatoin"):
+
+        @enters("reading", identifier="push", equatoin="y = x")
+        def push(sampled: object, pendulum: object, size: float) -> float:
+            return size

@@ -8,16 +8,14 @@ its own fitted motion (`Curve.reduced`).
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from pendpipe.effects.effect import Effect, Pendulum, Span
-from pendpipe.effects.scan import (
-    phase_since_reversal,
-)
+from pendpipe.effects.effect import Effect, How, Pendulum, Span, subclass
+from pendpipe.effects.scan import phase_since_reversal
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
     from pendpipe.dynamics.sampling import Sampled
 
 
-class Curve(Effect, ABC):
+class Curve(Effect):
     """A curve over `argument`, by its values at the knots.
 
     Parameters
@@ -40,7 +38,6 @@ class Curve(Effect, ABC):
     """
 
     kind = "unnamed"
-    parameters = ()
     prior = -3.0
     argument: ClassVar[str]
     """What the curve is drawn against, with its unit."""
@@ -49,10 +46,14 @@ class Curve(Effect, ABC):
     flavour: ClassVar[str] = ""
     of_anything: ClassVar[bool] = False
     """Whether it follows whatever may happen, at whatever time."""
+    make_knots: ClassVar[Callable[[Span], FloatArray]]
+    """Returns where the basis functions have their peaks."""
+    unit: ClassVar[Callable[[Pendulum, Span], float]]
+    """Returns what may reasonably be there, in the unit of `ordinate`."""
 
     def __init__(self, span: Span, coefficients: FloatArray | None = None) -> None:
         self.span = span
-        self.knots = self.make_knots(span)
+        self.knots = type(self).make_knots(span)
         self.basis_size = self.count_basis_functions()
         self.coefficients = np.eye(self.basis_size) if coefficients is None else coefficients
         self.sizes = self.coefficients.shape[1]  # type: ignore[misc]
@@ -71,10 +72,6 @@ class Curve(Effect, ABC):
         """Any."""
         return [(-np.inf, np.inf)] * self.sizes
 
-    @abstractmethod
-    def make_knots(self, span: Span) -> FloatArray:
-        """Return where the basis functions have their peaks."""
-
     def count_basis_functions(self) -> int:
         """Return how many basis functions there are."""
         return len(self.knots)
@@ -87,61 +84,151 @@ class Curve(Effect, ABC):
         """Return the curve's value, in its reasonable units."""
         return np.asarray(np.interp(at, self.knots, self.coefficients @ values))
 
-    @abstractmethod
     def scale(self, pendulum: Pendulum) -> float:
         """Return the reasonable unit in that of `ordinate`."""
+        return type(self).unit(pendulum, self.span)
 
     def small(self, span: Span) -> float:
         """A thousandth of what is reasonable."""
         return 1e-3
 
 
-class AmplitudeCurve(Curve, ABC):
+class AmplitudeCurve(Curve):
     """A curve over the amplitude, straight between knots that stand in equal ratios."""
-
-    number: ClassVar[int]
-    """Of knots."""
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the amplitude, in equal ratios."""
-        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
-        ends = (0.95 * last, 1.05 * span.first_amplitude)
-        return np.asarray(np.geomspace(*ends, self.number))
 
     def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
         """Return the curve's value: straight between the knots over ln y."""
         return np.asarray(np.interp(np.log(at), np.log(self.knots), self.coefficients @ values))
 
 
-def _positions(span: Span) -> FloatArray:
+def follows(
+    how: How,
+    along: Callable[[Any], FloatArray],
+    make_knots: Callable[[Span], FloatArray],
+    unit: Callable[[Pendulum, Span], float],
+    base: type[Curve] = Curve,
+    **attributes: Any,
+) -> Callable[[Callable[..., FloatArray]], type[Curve]]:
+    """Declare a curve by the function through which it enters.
+
+    The function takes what that method of `Effect` takes, with the curve's value at each node
+    or reading in the place of the fitted values.
+
+    Parameters
+    ----------
+    how
+        The method.
+    along
+        The curve's argument, from a motion or a sampled motion.
+    make_knots, unit
+        As in `Curve`.
+    base, attributes
+        The kind of curve, and its class variables.
+    """
+
+    def declare(function: Callable[..., FloatArray]) -> type[Curve]:
+        def method(
+            curve: Curve, moving: Motion | Sampled, pendulum: Pendulum, values: FloatArray
+        ) -> FloatArray:
+            value = curve.scale(pendulum) * curve.curve(values, along(moving))
+            return np.asarray(function(moving, pendulum, value))
+
+        own = {how: method, "make_knots": make_knots, "unit": unit}
+        return subclass(base, function.__name__, function.__doc__, own | attributes)
+
+    return declare
+
+
+def angles(span: Span) -> FloatArray:
     """Knots over the angle: closer at the middle, where every swing passes."""
     half = np.array([0.0, 0.04, 0.1, 0.2, 0.34, 0.52, 0.74, 1.02])
     return np.asarray(span.first_amplitude * np.concatenate([-half[:0:-1], half]))
 
 
-class RestoringCurve(Curve):
-    """A restoring torque that is any function of the angle."""
+def amplitudes(number: int) -> Callable[[Span], FloatArray]:
+    """Knots over the amplitude, in equal ratios."""
 
-    identifier = "unnamed-restoring"
-    name = "a restoring torque of unknown form"
-    equation = r"\omega^2 x \to \omega^2 x + F(x)"
-    argument, ordinate = "angle, rad", "extra restoring torque over omega^2, rad"
-    discriminating_test = (
+    def knots(span: Span) -> FloatArray:
+        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
+        return np.geomspace(0.95 * last, 1.05 * span.first_amplitude, number)
+
+    return knots
+
+
+def instants(number: int) -> Callable[[Span], FloatArray]:
+    """Knots over the time."""
+
+    def knots(span: Span) -> FloatArray:
+        return np.linspace(span.start_s, span.stop_s, number)
+
+    return knots
+
+
+def phases(_: Span) -> FloatArray:
+    """Knots over the half swing."""
+    return np.linspace(0.0, np.pi, 9)
+
+
+def ways(span: Span) -> FloatArray:
+    """Knots from a turning point to the next, closer where the way begins."""
+    shares = np.array([0.0, 0.03, 0.08, 0.16, 0.28, 0.44, 0.66, 1.02])
+    return np.asarray(2.0 * span.first_amplitude * shares)
+
+
+def usual_loss_rate(pendulum: Pendulum, span: Span) -> float:
+    """The usual loss rate, 1/s: that of the middle amplitude."""
+    middle = math.sqrt(span.first_amplitude * span.last_amplitude)
+    return (
+        pendulum.quadratic * middle + pendulum.linear + pendulum.coulomb / middle
+    ) + 1e-4 * pendulum.angular_frequency
+
+
+def usual_friction(pendulum: Pendulum, span: Span) -> float:
+    """The usual friction, rad/s^2."""
+    return usual_friction_profile(pendulum, span) * span.first_amplitude
+
+
+def usual_friction_profile(pendulum: Pendulum, span: Span) -> float:
+    """The usual friction over the amplitude, 1/s^2."""
+    return usual_loss_rate(pendulum, span) * pendulum.angular_frequency
+
+
+def share_of_swing(share: float) -> Callable[[Pendulum, Span], float]:
+    """A part of the first amplitude, rad."""
+
+    def unit(_: Pendulum, span: Span) -> float:
+        return share * span.first_amplitude
+
+    return unit
+
+
+def hundredth(_: Pendulum, __: Span) -> float:
+    """A pure number."""
+    return 0.01
+
+
+def hundredth_of_a_radian(pendulum: Pendulum, _: Span) -> float:
+    """Its time, s."""
+    return 0.01 / pendulum.angular_frequency
+
+
+@follows(
+    "acceleration",
+    attrgetter("angle"),
+    angles,
+    share_of_swing(0.1),
+    identifier="unnamed-restoring",
+    name="a restoring torque of unknown form",
+    equation=r"\omega^2 x \to \omega^2 x + F(x)",
+    argument="angle, rad",
+    ordinate="extra restoring torque over omega^2, rad",
+    discriminating_test=(
         "measure the torque against the angle at rest, or map it with a second pendulum"
-    )
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the angle."""
-        return _positions(span)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -omega^2 F(x)."""
-        scale = self.scale(pendulum) * pendulum.angular_frequency**2
-        return -scale * self.curve(values, motion.angle)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """A tenth of the amplitude."""
-        return 0.1 * self.span.first_amplitude
+    ),
+)
+def restoring_curve(motion: Motion, pendulum: Pendulum, torque: FloatArray) -> FloatArray:
+    """A restoring torque that is any function of the angle."""
+    return -(pendulum.angular_frequency**2) * torque
 
 
 class DampingCurve(AmplitudeCurve):
@@ -152,74 +239,54 @@ class DampingCurve(AmplitudeCurve):
     equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
     argument, ordinate = "amplitude, rad", "extra loss rate, 1/s"
     flavour = "amplitude"
-    number = 15
     discriminating_test = (
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
     )
+    make_knots = amplitudes(15)
+    unit = usual_loss_rate
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
         """Return -2 beta(r) v."""
         beta = self.scale(pendulum) * self.curve(values, motion.amplitude)
         return np.asarray(-2.0 * beta * motion.velocity)
 
-    def scale(self, pendulum: Pendulum) -> float:
-        """The usual loss rate."""
-        return usual_loss_rate(pendulum, self.span)
 
-
-class FrictionCurve(Curve):
+@follows(
+    "acceleration",
+    attrgetter("angle"),
+    angles,
+    usual_friction,
+    identifier="unnamed-damping",
+    name="a friction that depends on the angle in an unknown way",
+    equation=r"\ddot x \to \ddot x + g(x)\,\mathrm{sgn}\,\dot x",
+    argument="angle, rad",
+    ordinate="extra friction, rad/s^2",
+    flavour="angle",
+    discriminating_test="turn the bearing by a few degrees: a rough spot goes with it",
+)
+def friction_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> FloatArray:
     """A friction that is any function of the angle."""
-
-    identifier = "unnamed-damping"
-    name = "a friction that depends on the angle in an unknown way"
-    equation = r"\ddot x \to \ddot x + g(x)\,\mathrm{sgn}\,\dot x"
-    argument, ordinate = "angle, rad", "extra friction, rad/s^2"
-    flavour = "angle"
-    discriminating_test = "turn the bearing by a few degrees: a rough spot goes with it"
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the angle."""
-        return _positions(span)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -g(x) sgn(v)."""
-        friction = self.scale(pendulum) * self.curve(values, motion.angle)
-        return np.asarray(-motion.direction * friction)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """The usual friction."""
-        usual = usual_loss_rate(pendulum, self.span) * pendulum.angular_frequency
-        return usual * self.span.first_amplitude
+    return -motion.direction * friction
 
 
-class ProfileCurve(Curve):
-    """A friction in proportion to the amplitude, of any form along the half swing."""
-
-    identifier = "unnamed-damping"
-    name = "a friction of unknown form along each half swing"
-    equation = r"\ddot x \to \ddot x + y\,h(\psi)\,\mathrm{sgn}\,\dot x"
-    argument, ordinate = (
-        "phase since the last turning point, rad",
-        "extra friction over amplitude, 1/s^2",
-    )
-    flavour = "profile"
-    discriminating_test = (
+@follows(
+    "acceleration",
+    phase_since_reversal,
+    phases,
+    usual_friction_profile,
+    identifier="unnamed-damping",
+    name="a friction of unknown form along each half swing",
+    equation=r"\ddot x \to \ddot x + y\,h(\psi)\,\mathrm{sgn}\,\dot x",
+    argument="phase since the last turning point, rad",
+    ordinate="extra friction over amplitude, 1/s^2",
+    flavour="profile",
+    discriminating_test=(
         "sample the swing faster, and look at the velocity about the turning points"
-    )
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the half swing."""
-        return np.linspace(0.0, np.pi, 9)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -r h(psi) sgn(v)."""
-        phase = phase_since_reversal(motion)
-        profile = self.scale(pendulum) * self.curve(values, phase)
-        return np.asarray(-motion.direction * motion.amplitude * profile)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """The usual friction over the amplitude."""
-        return usual_loss_rate(pendulum, self.span) * pendulum.angular_frequency
+    ),
+)
+def profile_curve(motion: Motion, pendulum: Pendulum, profile: FloatArray) -> FloatArray:
+    """A friction in proportion to the amplitude, of any form along the half swing."""
+    return -motion.direction * motion.amplitude * profile
 
 
 class DriveCurve(Curve):
@@ -232,10 +299,8 @@ class DriveCurve(Curve):
     equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
     argument, ordinate = "time, s", "extra torque over omega^2 y"
     discriminating_test = "repeat the run: what depends on the time of day does not come again"
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the time."""
-        return np.linspace(span.start_s, span.stop_s, 10)
+    make_knots = instants(10)
+    unit = hundredth
 
     def count_basis_functions(self) -> int:
         """In phase and in quadrature."""
@@ -250,176 +315,156 @@ class DriveCurve(Curve):
         force = in_phase * omega * motion.angle + quadrature * motion.velocity
         return np.asarray(self.scale(pendulum) * omega * force)
 
-    def scale(self, pendulum: Pendulum) -> float:
-        """A hundredth."""
-        return 0.01
 
-
-class ReadingCurve(Curve):
+@follows(
+    "reading",
+    attrgetter("angle"),
+    angles,
+    share_of_swing(0.05),
+    identifier="unnamed-measurement",
+    name="a sensor curve of unknown form",
+    equation=r"y = x + s(x)",
+    argument="angle, rad",
+    ordinate="reading minus angle, rad",
+    flavour="angle",
+    discriminating_test="calibrate the sensor at rest over the whole range",
+)
+def reading_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> FloatArray:
     """A sensor whose reading is any function of the angle."""
-
-    identifier = "unnamed-measurement"
-    name = "a sensor curve of unknown form"
-    equation = r"y = x + s(x)"
-    argument, ordinate = "angle, rad", "reading minus angle, rad"
-    flavour = "angle"
-    discriminating_test = "calibrate the sensor at rest over the whole range"
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the angle."""
-        return _positions(span)
-
-    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return s(x)."""
-        return self.scale(pendulum) * self.curve(values, sampled.angle)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """A twentieth of the amplitude."""
-        return 0.05 * self.span.first_amplitude
+    return added
 
 
-class OffsetCurve(Curve):
+@follows(
+    "reading",
+    attrgetter("time_s"),
+    instants(14),
+    share_of_swing(0.05),
+    in_time=True,
+    of_anything=True,
+    identifier="unnamed-measurement",
+    name="a wandering offset",
+    equation=r"y = x + s(t)",
+    argument="time, s",
+    ordinate="offset, rad",
+    flavour="time",
+    discriminating_test="record the pendulum at rest for as long",
+)
+def offset_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> FloatArray:
     """An offset that wanders in time."""
-
-    in_time = of_anything = True
-    identifier = "unnamed-measurement"
-    name = "a wandering offset"
-    equation = r"y = x + s(t)"
-    argument, ordinate = "time, s", "offset, rad"
-    flavour = "time"
-    discriminating_test = "record the pendulum at rest for as long"
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the time."""
-        return np.linspace(span.start_s, span.stop_s, 14)
-
-    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return s(t)."""
-        return self.scale(pendulum) * self.curve(values, sampled.time_s)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """A twentieth of the amplitude."""
-        return 0.05 * self.span.first_amplitude
-
-
-def usual_loss_rate(pendulum: Pendulum, span: Span) -> float:
-    """The usual loss rate, 1/s: that of the middle amplitude."""
-    middle = math.sqrt(span.first_amplitude * span.last_amplitude)
-    return (
-        pendulum.quadratic * middle + pendulum.linear + pendulum.coulomb / middle
-    ) + 1e-4 * pendulum.angular_frequency
+    return added
 
 
 CURVES: Sequence[type[Curve]] = (
-    RestoringCurve,
+    restoring_curve,
     DampingCurve,
-    FrictionCurve,
-    ProfileCurve,
+    friction_curve,
+    profile_curve,
     DriveCurve,
-    ReadingCurve,
-    OffsetCurve,
+    reading_curve,
+    offset_curve,
 )
 
 
-class MemoryCurve(FrictionCurve):
+def way_since_reversal(motion: Motion) -> FloatArray:
+    """r (1 - cos psi), psi from the last turning point, rad."""
+    return np.asarray(motion.amplitude * (1.0 - np.cos(phase_since_reversal(motion))))
+
+
+def _resists_the_more(curve: Curve, values: FloatArray) -> bool:
+    """A contact that is pushed on resists the more the farther it has crept."""
+    first, *_, last = curve.coefficients @ values
+    return bool(last > first)
+
+
+@follows(
+    "acceleration",
+    way_since_reversal,
+    ways,
+    usual_friction,
+    identifier="unnamed-damping",
+    name="a friction that remembers the last turning point",
+    equation=r"\ddot x \to \ddot x + g(|x - x_\mathrm{turn}|)\,\mathrm{sgn}\,\dot x",
+    argument="way since the turning point, rad",
+    ordinate="extra friction, rad/s^2",
+    flavour="memory",
+    discriminating_test=(
+        "turn it back in mid swing, by hand and slowly: the friction must start anew from there"
+    ),
+    believable=_resists_the_more,
+)
+def memory_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> FloatArray:
     """A friction that is any function of the way since the last turning point.
 
     Contacts that creep before they slide do so (Iwan's and Masing's loops): each half cycle
     they lose, and stiffen, by the amplitude.
     """
-
-    name = "a friction that remembers the last turning point"
-    equation = r"\ddot x \to \ddot x + g(|x - x_\mathrm{turn}|)\,\mathrm{sgn}\,\dot x"
-    argument, ordinate = "way since the turning point, rad", "extra friction, rad/s^2"
-    flavour = "memory"
-    discriminating_test = (
-        "turn it back in mid swing, by hand and slowly: the friction must start anew from there"
-    )
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots from a turning point to the next, closer where the way begins."""
-        shares = np.array([0.0, 0.03, 0.08, 0.16, 0.28, 0.44, 0.66, 1.02])
-        return np.asarray(2.0 * span.first_amplitude * shares)
-
-    def believable(self, values: FloatArray) -> bool:
-        """A contact that is pushed on resists the more the farther it has crept."""
-        first, *_, last = self.coefficients @ values
-        return bool(last > first)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -g(r (1 - cos psi)) sgn(v), psi from the last turning point."""
-        phase = phase_since_reversal(motion)
-        way = motion.amplitude * (1.0 - np.cos(phase))
-        return np.asarray(-motion.direction * self.scale(pendulum) * self.curve(values, way))
+    return -motion.direction * friction
 
 
-class DampingInTimeCurve(Curve):
-    """A loss that is any function of the time."""
-
-    in_time = True
-    identifier = "unnamed-damping"
-    name = "a loss that depends on the time in an unknown way"
-    equation = r"2 b \dot x \to 2 [b + \beta(t)]\,\dot x"
-    argument, ordinate = "time, s", "extra loss rate, 1/s"
-    flavour = "time"
-    discriminating_test = (
+@follows(
+    "acceleration",
+    attrgetter("time_s"),
+    instants(25),
+    usual_loss_rate,
+    in_time=True,
+    identifier="unnamed-damping",
+    name="a loss that depends on the time in an unknown way",
+    equation=r"2 b \dot x \to 2 [b + \beta(t)]\,\dot x",
+    argument="time, s",
+    ordinate="extra loss rate, 1/s",
+    flavour="time",
+    discriminating_test=(
         "release it again with the same amplitude: what depends on the time is not the same"
-    )
-
-    def make_knots(self, span: Span) -> FloatArray:
-        """Knots over the time."""
-        return np.linspace(span.start_s, span.stop_s, 25)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 beta(t) v."""
-        beta = self.scale(pendulum) * self.curve(values, motion.time_s)
-        return np.asarray(-2.0 * beta * motion.velocity)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """The usual loss rate."""
-        return usual_loss_rate(pendulum, self.span)
+    ),
+)
+def damping_in_time_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) -> FloatArray:
+    """A loss that is any function of the time."""
+    return -2.0 * rate * motion.velocity
 
 
-class GainCurve(AmplitudeCurve):
+@follows(
+    "reading",
+    attrgetter("amplitude"),
+    amplitudes(13),
+    hundredth,
+    AmplitudeCurve,
+    identifier="unnamed-measurement",
+    name="a gain that depends on the swing in an unknown way",
+    equation=r"y = x\,[1 + g(y)]",
+    argument="amplitude, rad",
+    ordinate="gain less 1",
+    flavour="gain",
+    discriminating_test="film the swing: a second sensor must see the same amplitudes",
+)
+def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatArray:
     """A sensor whose gain is any function of the swing."""
-
-    identifier = "unnamed-measurement"
-    name = "a gain that depends on the swing in an unknown way"
-    equation = r"y = x\,[1 + g(y)]"
-    argument, ordinate = "amplitude, rad", "gain less 1"
-    flavour = "gain"
-    number = 13
-    discriminating_test = "film the swing: a second sensor must see the same amplitudes"
-
-    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return g(r) x."""
-        gain = self.scale(pendulum) * self.curve(values, sampled.amplitude)
-        return np.asarray(gain * sampled.angle)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """A hundredth."""
-        return 0.01
+    return gain * sampled.angle
 
 
-class DelayCurve(GainCurve):
-    """A reading that comes later by any function of the swing."""
-
-    name = "a delay that depends on the swing in an unknown way"
-    equation = r"y = x(t - \tau(y))"
-    argument, ordinate = "amplitude, rad", "delay, s"
-    flavour = "delay"
-    discriminating_test = (
+@follows(
+    "reading",
+    attrgetter("amplitude"),
+    amplitudes(13),
+    hundredth_of_a_radian,
+    AmplitudeCurve,
+    identifier="unnamed-measurement",
+    name="a delay that depends on the swing in an unknown way",
+    equation=r"y = x(t - \tau(y))",
+    argument="amplitude, rad",
+    ordinate="delay, s",
+    flavour="delay",
+    discriminating_test=(
         "pass a light barrier at the middle: its times must show the same frequency"
-    )
-
-    def reading(self, sampled: Sampled, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -tau(r) v."""
-        delay = self.scale(pendulum) * self.curve(values, sampled.amplitude)
-        return np.asarray(-delay * sampled.velocity)
-
-    def scale(self, pendulum: Pendulum) -> float:
-        """A hundredth of the time of a radian."""
-        return 0.01 / pendulum.angular_frequency
+    ),
+)
+def delay_curve(sampled: Sampled, pendulum: Pendulum, delay: FloatArray) -> FloatArray:
+    """A reading that comes later by any function of the swing."""
+    return -delay * sampled.velocity
 
 
-FOLLOW_UP_CURVES: Sequence[type[Curve]] = (MemoryCurve, DampingInTimeCurve, GainCurve, DelayCurve)
+FOLLOW_UP_CURVES: Sequence[type[Curve]] = (
+    memory_curve,
+    damping_in_time_curve,
+    gain_curve,
+    delay_curve,
+)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from inspect import get_annotations
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pendpipe.dynamics.sampling import Sampled
 
 Kind = Literal["dynamics", "measurement", "parameter", "unnamed"]
+AnyEffect = TypeVar("AnyEffect", bound="Effect")
 How = Literal["acceleration", "kick", "reading", "delay"]
 """The methods of `Effect` by which one enters."""
 
@@ -292,7 +293,11 @@ def enters(
             return function(*where, *values)
 
         own = {how: method, "__module__": function.__module__, "kind": kind}
-        return _made(base, function.__name__, function.__doc__, own, attributes)
+        given = {
+            name: staticmethod(each) if callable(each) else each
+            for name, each in attributes.items()
+        }
+        return subclass(base, function.__name__, function.__doc__, own | given)()
 
     return declare
 
@@ -300,15 +305,14 @@ def enters(
 def without_template(module: str, text: str, **attributes: Any) -> Effect:
     """Declare an effect that a test of its own finds, by its text in the manual."""
     own = {"__module__": module, "kind": "measurement", "has_signature": False}
-    return _made(Effect, str(attributes["identifier"]), text, own, attributes)
+    return subclass(Effect, str(attributes["identifier"]), text, own | attributes)()
 
 
-def _made(
-    base: type[Effect], name: str, text: str | None, own: dict[str, Any], given: dict[str, Any]
-) -> Effect:
+def subclass(
+    base: type[AnyEffect], name: str, text: str | None, attributes: dict[str, Any]
+) -> type[AnyEffect]:
+    """Return a subclass with a docstring, class variables and methods."""
     known = {name for kind in base.__mro__ for name in (*vars(kind), *get_annotations(kind))}
-    if unknown := given.keys() - known:
+    if unknown := attributes.keys() - known:
         raise TypeError(f"{name}: an effect has no {', '.join(sorted(unknown))}")
-    methods = {name: staticmethod(each) if callable(each) else each for name, each in given.items()}
-    effect: Effect = type(name, (base,), {"__doc__": text, **own, **methods})()
-    return effect
+    return cast(type[AnyEffect], type(name, (base,), {"__doc__": text, **attributes}))
