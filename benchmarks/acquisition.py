@@ -531,7 +531,6 @@ def _damaged(folder: Path) -> list[str]:
     return rows
 
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "acquisition.md"
 PARTS: dict[str, Callable[[Path], str]] = {
     "faults": fault_table,
     "slips": slip_table,
@@ -547,21 +546,12 @@ PARTS: dict[str, Callable[[Path], str]] = {
 }
 
 
-def put(part: str, table: str) -> None:
-    """Replace what stands between a part's markers in the page."""
-    begin, end = f"<!-- measured: {part} -->", f"<!-- end: {part} -->"
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(begin)
-    _, _, after = rest.partition(end)
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
-
-
 def main(arguments: list[str] | None = None) -> int:
     for part in arguments or list(PARTS):
         with tempfile.TemporaryDirectory(prefix="pendpipe-") as folder:
             table = PARTS[part](Path(folder))
         print(f"\n{part}\n\n{table}", flush=True)
-        put(part, table)
+        journal.put("acquisition.md", part, f"{table}\n\nMade by commit {journal.commit()}.")
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,36 +13,61 @@ from pendpipe.provenance import code_version
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / ".evidence"
+READERS = (
+    "pendpipe.acquisition.simulated",
+    "pendpipe.formats.writing",
+    "src/pendpipe/formats/*.py",
+    "benchmarks/fuzz*.py",
+    "benchmarks/acquisition*.py",
+)
+"""The readers, the acquisition, and what tries them."""
 
 
 @cache
-def code() -> str:
-    """Digest of the readers, the acquisition, and of what tries them."""
+def code(sources: tuple[str, ...] = READERS) -> str:
+    """Digest of code: modules with all that they import, and files by pattern."""
     digest = hashlib.sha256()
-    for module in ("pendpipe.acquisition.simulated", "pendpipe.formats.writing"):
-        digest.update(code_version(module).encode())
-    for folder, pattern in (
-        ("src/pendpipe/formats", "*.py"),
-        ("benchmarks", "fuzz*.py"),
-        ("benchmarks", "acquisition*.py"),
-    ):
-        for path in sorted((ROOT / folder).glob(pattern)):
+    for source in sources:
+        if "/" not in source:
+            digest.update(code_version(source).encode())
+            continue
+        for path in sorted(ROOT.glob(source)):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def read(name: str, nothing: Any) -> Any:
+@cache
+def commit() -> str:
+    """The commit at work; ``-dirty`` behind it where files were changed since."""
+    return subprocess.run(
+        ["git", "-C", str(ROOT), "describe", "--always", "--dirty"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+
+
+def read(name: str, nothing: Any, sources: tuple[str, ...] = READERS) -> Any:
     """Return what is kept under a name; `nothing` if it is of other code."""
     path = KEPT / f"{name}.json"
     if not path.exists():
         return nothing
     kept = json.loads(path.read_text(encoding="utf-8"))
-    return kept["done"] if kept.get("code") == code() else nothing
+    return kept["done"] if kept.get("code") == code(sources) else nothing
 
 
-def keep(name: str, done: Any) -> None:
+def keep(name: str, done: Any, sources: tuple[str, ...] = READERS) -> None:
     """Keep it; what was there before gives way at once or not at all."""
     KEPT.mkdir(exist_ok=True)
     beside = KEPT / f"{name}.new"
-    beside.write_text(json.dumps({"code": code(), "done": done}), encoding="utf-8")
+    beside.write_text(json.dumps({"code": code(sources), "done": done}), encoding="utf-8")
     beside.replace(KEPT / f"{name}.json")
+
+
+def put(page: str, part: str, table: str) -> None:
+    """Replace what stands between a part's markers in a page of the documentation."""
+    path = ROOT / "docs" / page
+    begin, end = f"<!-- measured: {part} -->", f"<!-- end: {part} -->"
+    before, _, rest = path.read_text(encoding="utf-8").partition(begin)
+    _, _, after = rest.partition(end)
+    path.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")

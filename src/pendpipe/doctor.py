@@ -12,7 +12,7 @@ from pendpipe.errors import InputError
 from pendpipe.files import read_json, sha256
 from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
 
-_TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
+TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
 _NO_RESULTS: Final = (FOLDER, "logs", "raw", "challenge", "challenge-sealed")
 _RUN: Final = "snakemake makes it again"
@@ -49,14 +49,21 @@ def examine(results: Path) -> list[Finding]:
     Raises
     ------
     InputError
-        If there is no such folder.
+        If there is no such folder, nor a sign of a run that was to make it.
     """
+    found = [
+        finding
+        for project in dict.fromkeys((Path(), results.parent))
+        for finding in _of_snakemake(project / ".snakemake")
+    ]
     if not results.is_dir():
+        if found:  # killed before the first result
+            return found
         raise InputError(results, "there is no such folder", "name a folder of results")
     homes = [results, *sorted(path for path in results.iterdir() if path.is_dir())]
     homes = [home for home in homes if home.name not in _NO_RESULTS]
     known = {home: list(manifest.manifests(home)) for home in homes}
-    found = [finding for home in homes for finding in _of_manifests(home, known[home])]
+    found += [finding for home in homes for finding in _of_manifests(home, known[home])]
     found += [finding for home in homes for finding in _stale(home)]
     listed = {
         (home / name).resolve()
@@ -64,10 +71,7 @@ def examine(results: Path) -> list[Finding]:
         for entry in known[home]
         for name in (*entry.outputs, *entry.extras)
     }
-    found += _of_files(results, listed)
-    for project in dict.fromkeys((Path(), results.parent)):
-        found += _of_snakemake(project / ".snakemake")
-    return found
+    return [*found, *_of_files(results, listed)]
 
 
 def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
@@ -112,7 +116,7 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
     """Files that no stage claims, and recordings that were never decoded."""
     for path in sorted(path for path in results.rglob("*") if path.is_file()):
         inside = path.relative_to(results).parts[:-1]
-        if _TEMPORARY.fullmatch(path.name):
+        if TEMPORARY.fullmatch(path.name):
             yield Finding(
                 "temporary",
                 str(path),

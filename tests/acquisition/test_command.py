@@ -192,3 +192,13 @@ def test_make_clean_spares_what_an_instrument_has_recorded(tmp_path: Path) -> No
     subprocess.run([make, "-s", "clean"], cwd=tmp_path, check=True)
     left = [path.name for path in (tmp_path / "results").rglob("*") if path.is_file()]
     assert sorted(left) == ["1.raw", "README.md"]
+
+
+def test_a_simulated_record_is_the_same_whenever_it_is_made(tmp_path: Path) -> None:
+    """Date and measured rate are the run's: they go to the log, not into the result."""
+    made = []
+    for name in ("first", "second"):
+        call = ["--campaign", "config/config.yaml", "--record", "air-12"]
+        assert main(["acquire", *call, "--out", str(tmp_path / name / "recording.csv")]) == 0
+        made.append((tmp_path / name / "recording.csv").read_bytes())
+    assert made[0] == made[1]

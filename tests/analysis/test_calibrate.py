@@ -201,6 +201,7 @@ def test_command_reads_degrees_and_decimal_commas(tmp_path: Path) -> None:
         ("angle_rad,angle_deg,volts\n0,0,1\n", "exactly one"),
         ("angle_rad,volts\n0,1\n1,two\n2,3\n", "line 3: volts 'two' is no number"),
         ("angle_rad,volts\n0,1\n1\n", "line 3: volts is missing"),
+        ("angle_rad,volts\n0,1\n1,2\n2,3\n1e12,4\n", "line 5: angle_rad is 1e12"),
         ("angle_rad,volts\n0,1\n1,nan\n", "line 3: volts is nan"),
         ("angle_rad,volts\n0,1\n1,2\n", "too few"),
         ("displacement_m,volts\n0,1\n1,2\n2,3\n", "--arm-m"),

@@ -588,3 +588,10 @@ def test_an_absurd_scale_is_refused(tmp_path: Path, name: str, times: float, val
     rows = "".join(f"{times * t},{values * x}\n" for t, x in zip(TIME, ANGLE, strict=True))
     with pytest.raises(InputError, match=f"the {name} span"):
         read_text(tmp_path, "t (s),theta (rad)\n" + rows)
+
+
+def test_times_before_zero_are_kept_and_named(tmp_path: Path) -> None:
+    rows = "".join(f"{t - 100},{x}\n" for t, x in zip(TIME, ANGLE, strict=True))
+    recording = read_text(tmp_path, "t (s),theta (rad)\n" + rows)
+    assert recording.time_s[0] == TIME[0] - 100
+    assert "the times begin at -100 s, before their zero" in recording.notes

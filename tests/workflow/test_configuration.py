@@ -111,7 +111,7 @@ def test_a_file_that_is_no_configuration_is_named_in_one_line(
     with pytest.raises(InputError, match=r"config\.yaml") as caught:
         read_configuration(path)
     assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match="can't be read"):
+    with pytest.raises(InputError, match=r"can't be read \(Is a directory\)"):
         read_configuration(tmp_path)
 
 

@@ -102,5 +102,15 @@ def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) ->
     assert {"kind", "path", "problem", "safe"} == set(findings[0])
 
 
+def test_a_lock_is_named_before_there_are_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    put(".snakemake/locks/0.input.lock")(tmp_path)
+    (found,) = examine(Path("results"))
+    assert found.kind == "locked"
+    assert "--unlock" in found.safe
+
+
 def test_a_folder_that_is_not_there_is_the_users_error(tmp_path: Path) -> None:
     assert main(["doctor", str(tmp_path / "none")]) == 2

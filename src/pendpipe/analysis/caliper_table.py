@@ -13,6 +13,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
+_LARGEST: Final = 1e6
+"""No angle, displacement or voltage of a sensor is as large: what claims to be is a slip."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,6 @@ def _number(
         raise InputError(
             where, f"{name} '{text}' is no number", "correct or drop the row"
         ) from None
-    if not np.isfinite(value):
+    if not abs(value) < _LARGEST:  # nor is NaN
         raise InputError(where, f"{name} is {text}", "correct or drop the row")
     return value

@@ -176,6 +176,8 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     if drawn.any():
         notes.append(f"{_where(base.time_s, drawn)} on a straight line: interpolated, not measured")
         quality = np.where(drawn, MISSING, GOOD if quality is None else quality).astype(np.uint8)
+    if base.time_s.size and base.time_s[0] < 0:
+        notes.append(f"the times begin at {base.time_s[0]:.6g} s, before their zero")
     metadata = {**_kept(table), **base.metadata, **_markers(table.markers)}
     if found.quantity == "reading":
         metadata["unit"] = found.unit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,13 @@ from pendpipe.recording import Recording, read_plain, write_plain
 
 RATE_HZ = 60.0
 """Scans a second of an instrument in a campaign."""
+OF_THE_RUN = (
+    "recorded_at",
+    "sample_rate_measured_hz",
+    "sample_rate_measured_sd_hz",
+    "unseen_loss_below_s",
+)
+"""What depends on the date and the host's clock: of a simulated record it goes to the log."""
 
 
 def acquire_record(
@@ -66,8 +74,12 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
         duration_s=truth.duration_s,
         clock_scale=truth.device.clock_scale,
     )
-    # What a laboratory would not know stays out of the recording: no truth in its header.
-    return replace(recording, metadata={**recording.metadata, "source": "simulated"})
+    # What a laboratory would not know stays out of the recording: no truth in its header. So
+    # does what only this run of the simulation could know: the same campaign gives the same bytes.
+    metadata = {**recording.metadata, "source": "simulated"}
+    for key in OF_THE_RUN:
+        print(f"{key}: {metadata.pop(key)}", file=sys.stderr)
+    return replace(recording, metadata=metadata)
 
 
 def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:

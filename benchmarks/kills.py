@@ -1,0 +1,472 @@
+"""Kill, starve and repeat a small campaign: the next run ends as an undisturbed one.
+
+    python -m benchmarks.kills                       every part; goes on where it was stopped
+    python -m benchmarks.kills group job --number 10 of these parts ten cases more each
+
+Each case runs four records (three of a simulated instrument, one file) in a project of its own,
+disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same command
+again and compares every file of the results, byte for byte, with an undisturbed run. Left out
+are the logs, which carry the dates, and temporary files that a killed process left. The table is
+written into docs/integrity.md. What was done is kept in ``.evidence`` for as long as the code is
+the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any, Final
+
+from benchmarks import journal
+from pendpipe.doctor import TEMPORARY
+from pendpipe.files import sha256
+from pendpipe.manifest import SET_ASIDE
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+GUARDS: Final = (
+    "pendpipe.manifest",
+    "pendpipe.doctor",
+    "pendpipe.stages.refusal",
+    "pendpipe.stages.acquire",
+    "workflow/rules/*.smk",
+    "profiles/*/*",
+    "./Snakefile",
+    "benchmarks/kills.py",
+)
+"""What a case tries: other code of the campaign makes other numbers, but guards nothing."""
+CONFIGURATION: Final = """
+title: Tiny
+records: records.tsv
+results: results
+simulated:
+  release:
+    water: {angle_rad: 0.068, samples: 2048, duration_s: 60.0}
+    air: {angle_rad: 0.25, samples: 2048, duration_s: 200.0}
+typical_record: low
+"""
+RECORDS: Final = (
+    "record\tsource\tfluid\tbranch\tgeometry\ttemperature_c\n"
+    "high\tsimulated\twater\thigh\thigh-4\t20.0\n"
+    "low\tsimulated\twater\tlow\tlow-5\t20.0\n"
+    "air\tsimulated\tair\tair\tair-07\t20.0\n"
+    "file\tdecay.csv\n"
+)
+PATIENCE_S: Final = 600.0
+"""No run of the small campaign takes as long."""
+
+Sums = dict[str, str]
+Case = dict[str, Any]
+
+
+class Project:
+    """A campaign with its workflow in a folder of its own; Snakemake runs there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.results = folder / "results"
+        folder.mkdir(exist_ok=True)
+        shutil.copy(ROOT / "Snakefile", folder)
+        for name in ("workflow", "config", "profiles"):
+            shutil.copytree(ROOT / name, folder / name)
+        shutil.copy(ROOT / "examples/string-pendulum.csv", folder / "decay.csv")
+        (folder / "tiny.yaml").write_text(CONFIGURATION, encoding="utf-8")
+        (folder / "records.tsv").write_text(RECORDS, encoding="utf-8")
+
+    def start(
+        self,
+        *arguments: str,
+        cores: int = 2,
+        limit: int | None = None,
+        printed: IO[bytes] | None = None,
+        **environment: str,
+    ) -> subprocess.Popen[bytes]:
+        """Start Snakemake as the leader of a group; `limit` is the most bytes of a file."""
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        command = [sys.executable, "-m", "snakemake", "--cores", str(cores)]
+
+        def limited() -> None:
+            import resource
+
+            if limit is not None:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+        with tempfile.TemporaryFile() as nobody:
+            return subprocess.Popen(
+                [*command, "--configfile", "tiny.yaml", *arguments],
+                cwd=self.folder,
+                env=os.environ | {"PATH": path} | environment,
+                stdout=printed or nobody,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                preexec_fn=limited if limit is not None else None,
+            )
+
+    def run(self, *arguments: str, **options: Any) -> tuple[int, str]:
+        """Run Snakemake to its end; return its status and what it printed."""
+        with tempfile.TemporaryFile() as printed:
+            status = self.start(*arguments, printed=printed, **options).wait(PATIENCE_S)
+            printed.seek(0)
+            return status, printed.read().decode(errors="replace")
+
+    def doctor(self) -> list[dict[str, str]]:
+        """What `pendpipe doctor` finds; nothing where there are neither results nor a lock."""
+        command = [sys.executable, "-m", "pendpipe.cli", "doctor", "results", "--json"]
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
+        return list(json.loads(done.stdout)["findings"]) if done.stdout else []
+
+    def wait(self, process: subprocess.Popen[bytes], share: float, files: int) -> bool:
+        """Wait until a share of the files is there; return whether the run is still alive.
+
+        A tenth of the instants lie before the first file, when the run is planned.
+        """
+        begun = time.monotonic()
+        while process.poll() is None:
+            made = sum(path.is_file() for path in self.results.rglob("*"))
+            if share < 0.1 and time.monotonic() - begun > 30.0 * share:
+                return True
+            if made >= max(1.0, (share - 0.1) / 0.9 * files):
+                time.sleep(0.5 * (share * files % 1.0))
+                return process.poll() is None
+            time.sleep(0.03)
+        return False
+
+    def sums(self) -> Sums:
+        """The hash of each result."""
+        return {
+            path.relative_to(self.results).as_posix(): sha256(path)
+            for path in sorted(self.results.rglob("*"))
+            if path.is_file()
+            and path.parent.name != "logs"
+            and not TEMPORARY.fullmatch(path.name)
+            and SET_ASIDE not in path.name
+        }
+
+    def jobs(self) -> list[int]:
+        """The processes of pendpipe at work in this folder, without the shells around them."""
+        found = []
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                words = (process / "cmdline").read_bytes().split(b"\0")
+                if words[1:2] and words[1].endswith(b"/pendpipe") and self._is_at(process):
+                    found.append(int(process.name))
+        return found
+
+    def alive(self) -> int:
+        """How many processes of any kind are at work in this folder."""
+        return sum(self._is_at(process) for process in Path("/proc").glob("[0-9]*"))
+
+    def _is_at(self, process: Path) -> bool:
+        try:
+            return (process / "cwd").resolve() == self.folder.resolve()
+        except OSError:
+            return False
+
+
+def kill_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill Snakemake and all its jobs with signal 9."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(PATIENCE_S)
+
+
+def count(findings: Sequence[dict[str, str]]) -> dict[str, int]:
+    """How many findings of each kind."""
+    kinds = [finding["kind"] for finding in findings]
+    return {kind: kinds.count(kind) for kind in sorted(set(kinds))}
+
+
+class Trial:
+    """The undisturbed run that all cases are compared with.
+
+    Parameters
+    ----------
+    scratch
+        A folder for the projects.
+    """
+
+    def __init__(self, scratch: Path) -> None:
+        self.scratch = scratch
+        project = Project(scratch / "undisturbed")
+        self.begun_bytes, self.begun_files = size_of(project.folder)
+        status, said = project.run()
+        if status:
+            raise SystemExit(f"the undisturbed run ended with status {status}:\n{said}")
+        self.results, self.sums = project.results, project.sums()
+        self.bytes, self.files = size_of(project.folder)
+        self.largest = max(path.stat().st_size for path in project.results.rglob("*"))
+
+    def ended(self, project: Project, case: Case) -> Case:
+        """Do what the doctor says, run again, and tell how it ended."""
+        began = time.monotonic()
+        found = project.doctor()
+        case["left"] = count(found)
+        if any("--unlock" in finding["safe"] for finding in found):
+            project.run("--unlock")
+        case["status"], said = project.run()
+        sums = project.sums()
+        differ = [n for n in sorted({*sums, *self.sums}) if sums.get(n) != self.sums.get(n)]
+        case["after"] = count(project.doctor())
+        case["differ"] = differ
+        case["same"] = not differ and case["status"] == 0
+        if not case["same"]:
+            case["said"] = said[-2000:]
+            kept = journal.KEPT / "kills" / f"{time.time():.0f}"
+            for name in differ:
+                for side, results in (("is", project.results), ("was", self.results)):
+                    (kept / side / name).parent.mkdir(parents=True, exist_ok=True)
+                    with suppress(FileNotFoundError):
+                        shutil.copy(results / name, kept / side / name)
+        case["rerun_s"] = round(time.monotonic() - began, 1)
+        return case
+
+
+def size_of(folder: Path) -> tuple[int, int]:
+    """Bytes, in blocks of 4096, and number of the files and folders."""
+    paths = list(folder.rglob("*"))
+    return sum(-(-path.lstat().st_size // 4096) * 4096 for path in paths), len(paths)
+
+
+def group(trial: Trial, project: Project, draw: random.Random) -> Case:
+    """Snakemake and all its jobs, killed with signal 9."""
+    process = project.start()
+    alive = project.wait(process, draw.random(), len(trial.sums))
+    kill_group(process)
+    case = {"disturbed": alive, "made": len(project.sums()), "alive": project.alive()}
+    return trial.ended(project, case)
+
+
+def job(trial: Trial, project: Project, draw: random.Random) -> Case:
+    """One job, killed with signal 9."""
+    process = project.start()
+    project.wait(process, draw.uniform(0.0, 0.9), len(trial.sums))
+    killed = False
+    while not killed and process.poll() is None:
+        if jobs := project.jobs():
+            time.sleep(draw.uniform(0.0, 0.3))
+            with suppress(ProcessLookupError):
+                os.kill(draw.choice(jobs), signal.SIGKILL)
+                killed = True
+        time.sleep(0.02)
+    first = process.wait(PATIENCE_S)
+    made = len(project.sums())
+    return trial.ended(project, {"disturbed": killed, "made": made, "first": first})
+
+
+@contextmanager
+def small_disk(folder: Path, options: str) -> Iterator[bool]:
+    """A file system of its own in a folder, if one may be mounted here; yields whether."""
+    folder.mkdir()
+    mounted = bool(shutil.which("mount")) and mount("-t", "tmpfs", "-o", options, "tmpfs", folder)
+    try:
+        yield mounted
+    finally:
+        if mounted:
+            subprocess.run(["umount", str(folder)], check=True)
+        shutil.rmtree(folder)
+
+
+def mount(*words: str | Path) -> bool:
+    """Call mount(8); return whether it did as it was told."""
+    return not subprocess.run(["mount", *map(str, words)], capture_output=True).returncode
+
+
+def starved(trial: Trial, draw: random.Random, what: str) -> Case | None:
+    """A run on a disk that gets full, in a project on a file system of its own."""
+    share = draw.uniform(0.05, 0.95)
+    files = trial.begun_files + 8 + round(share * (trial.files - trial.begun_files))
+    blocks = trial.begun_bytes + 65536 + round(share * (trial.bytes - trial.begun_bytes))
+    room = f"nr_inodes={files}" if what == "inodes" else f"size={blocks}"
+    with small_disk(trial.scratch / "small", room) as mounted:
+        if not mounted:
+            return None
+        project = Project(trial.scratch / "small")
+        first, said = project.run()
+        named = said_why(project, said)
+        mount("-o", "remount,size=1g,nr_inodes=100k", project.folder)
+        case = {"room": room, "disturbed": first != 0, "named": named}
+        return trial.ended(project, case)
+
+
+def full(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+    """A disk without bytes."""
+    return starved(trial, draw, "bytes")
+
+
+def inodes(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+    """A disk without inodes."""
+    return starved(trial, draw, "inodes")
+
+
+def limit(trial: Trial, project: Project, draw: random.Random) -> Case:
+    """A limit on the size of a file."""
+    room = draw.randrange(2000, trial.largest)
+    first, said = project.run(limit=room)
+    named = said_why(project, said)
+    return trial.ended(project, {"room": room, "disturbed": first != 0, "named": named})
+
+
+def said_why(project: Project, said: str) -> str:
+    """The line that names a full or forbidden disk, on the terminal or in a log."""
+    logs = "".join(
+        path.read_text(encoding="utf-8", errors="replace")
+        for path in project.results.glob("**/logs/*.log")
+    )
+    why = re.compile(r".*(?:No space left|too large|[Rr]ead-only|Permission denied).*")
+    found = why.search(logs) or why.search(said)
+    return found[0].strip()[:200].replace(str(project.folder), "") if found else ""
+
+
+def read_only(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+    """Half-made results that may not be written, or the whole project."""
+    whole = draw.random() < 0.5
+    with small_disk(trial.scratch / "small", "size=1g") as mounted:
+        if not mounted:
+            return None
+        project = Project(trial.scratch / "small")
+        place = project.folder
+        if not whole:
+            place = project.results
+            place.mkdir()
+            mount("--bind", place, place)
+        try:
+            process = project.start()
+            alive = project.wait(process, draw.uniform(0.3, 0.8), len(trial.sums))
+            kill_group(process)
+            project.run("--unlock")
+            before = project.sums()
+            bind = "" if whole else "bind,"
+            mount("-o", f"remount,{bind}ro", place)
+            first, said = project.run()
+            touched = project.sums() != before
+            mount("-o", f"remount,{bind}rw", place)
+            case = {"place": "project" if whole else "results", "first": first}
+            case |= {
+                "disturbed": alive and first != 0,
+                "touched": touched,
+                "named": said_why(project, said),
+            }
+            return trial.ended(project, case)
+        finally:
+            if not whole:
+                subprocess.run(["umount", str(place)], check=True)
+
+
+def two(trial: Trial, project: Project, draw: random.Random) -> Case:
+    """Two runs at once."""
+    begun = project.start()
+    project.wait(begun, draw.uniform(0.0, 0.9), len(trial.sums))
+    second, said = project.run()
+    statuses = [begun.wait(PATIENCE_S), second]
+    named = re.search("LockException|cannot be locked", said)
+    case = {"disturbed": 0 in statuses and statuses != [0, 0], "statuses": statuses}
+    return trial.ended(project, case | {"named": named[0] if named else ""})
+
+
+def order(trial: Trial, _project: Project, draw: random.Random) -> Case:
+    """Other cores, another order, folder, time zone, language and seed of hashes."""
+    project = Project(trial.scratch / f"another folder {draw.randrange(10**6)}")
+    cores = draw.choice((1, 2))
+    environment = {
+        "PYTHONHASHSEED": str(draw.randrange(1, 10**6)),
+        "TZ": draw.choice(("Asia/Kathmandu", "America/New_York", "UTC")),
+        "LC_ALL": draw.choice(("C", "C.UTF-8")),
+    }
+    names = [f"results/{record}/fit.json" for record in ("high", "low", "air", "file")]
+    for name in draw.sample(names, k=2):
+        project.run(name, cores=cores, **environment)
+    case = {"disturbed": True, "cores": cores, "environment": environment}
+    ended = trial.ended(project, case)
+    shutil.rmtree(project.folder)
+    return ended
+
+
+Part = Callable[[Trial, Project, random.Random], Case | None]
+PARTS: Final[dict[str, tuple[str, Part, int]]] = {
+    "group": ("kill -9 of the group", group, 100),
+    "job": ("kill -9 of a job", job, 50),
+    "full": ("disk full (bytes)", full, 10),
+    "inodes": ("disk full (inodes)", inodes, 10),
+    "limit": ("limit on a file's size", limit, 10),
+    "read-only": ("read-only folder", read_only, 4),
+    "two": ("two at once", two, 10),
+    "order": ("cores, order, folder", order, 10),
+}
+
+
+def row(what: str, cases: Sequence[Case], asked: int) -> str:
+    """A part's line of the table."""
+    tried = [case for case in cases if case]
+    if not tried:
+        return f"| {what} | 0 of {asked}: {'may not be tried here' if cases else '-'} ||||||||"
+    left = [case.get("left", {}) for case in tried]
+    unknown = [
+        kind for case in tried for kind in case["after"] if kind not in ("temporary", "set-aside")
+    ]
+    seconds = sorted(case["rerun_s"] for case in tried)
+    reasons = [bool(case["named"]) for case in tried if "named" in case]
+    return (
+        f"| {what} | {len(tried)} of {asked} | {sum(case['disturbed'] for case in tried)} |"
+        f" {sum('locked' in each for each in left)} |"
+        f" {sum('incomplete' in each for each in left)} |"
+        f" {sum(case['after'].get('temporary', 0) for case in tried)} |"
+        f" {sum(reasons) if reasons else '-'} |"
+        f" {sum(case['same'] for case in tried)} |"
+        f" {len(unknown)} | {seconds[len(seconds) // 2]:.0f} |"
+    )
+
+
+def table(done: dict[str, list[Case]]) -> str:
+    """All parts."""
+    head = "| what | cases | disturbed | locks left | cut results | temporary files left |"
+    lines = [
+        f"{head} reason named | ended as undisturbed | findings after it | rerun, s (median) |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    lines += [row(what, done.get(name, []), n) for name, (what, _, n) in PARTS.items()]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Try what is left to try; print the table and write it into the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; all, if none is named")
+    parser.add_argument("--number", type=int, help="how many cases of each part to run now")
+    parser.add_argument("--table", action="store_true", help="only print what was done")
+    arguments = parser.parse_args()
+    if unknown := {*arguments.parts} - {*PARTS}:
+        parser.error(f"no part is called {', '.join(unknown)}")
+    done: dict[str, list[Case]] = journal.read("kills", {}, GUARDS)
+    with tempfile.TemporaryDirectory(prefix="pendpipe-") as scratch:
+        trial = None if arguments.table else Trial(Path(scratch))
+        for name in arguments.parts or PARTS if trial else ():
+            what, disturb, asked = PARTS[name]
+            cases = done.setdefault(name, [])
+            stop = asked if arguments.number is None else len(cases) + arguments.number
+            for number in range(len(cases), stop):
+                project = Project(Path(scratch) / "project")
+                case = disturb(trial, project, random.Random(f"{name} {number}"))
+                shutil.rmtree(project.folder)
+                cases.append(case or {})
+                journal.keep("kills", done, GUARDS)
+                wrong = "" if not case or case["same"] else f": {case['differ']}"
+                print(f"{what} {number}{wrong}", file=sys.stderr, flush=True)
+    printed = f"{table(done)}\n\nMade by commit {journal.commit()}."
+    print(printed)
+    journal.put("integrity.md", "kills", printed)
+    return int(any(case and not case["same"] for cases in done.values() for case in cases))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
