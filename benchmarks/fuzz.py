@@ -1,6 +1,7 @@
 """Fuzzing of every reader and decoder: a million damaged inputs in fixed order.
 
     python -m benchmarks.fuzz                all of it; goes on where it was broken off
+    python -m benchmarks.fuzz --inputs 100000   the first so many, spread over all readers
     python -m benchmarks.fuzz --seconds 8    as much as fits, from the beginning (CI)
     python -m benchmarks.fuzz --case "WinDaq" 1234    one input again, with its traceback
 
@@ -652,7 +653,9 @@ def block(name: str, number: int, length: int = BLOCK) -> Tally:
 Blocks = dict[str, dict[str, Tally]]
 
 
-def run(seconds: float | None = None, only: str | None = None) -> dict[str, Tally]:
+def run(
+    seconds: float | None = None, only: str | None = None, inputs: int | None = None
+) -> dict[str, Tally]:
     """Run every block that is not done, or what fits; a worker that dies is a finding."""
     whole = seconds is None
     done: Blocks = journal.read(JOURNAL, {}) if whole else {}
@@ -662,6 +665,9 @@ def run(seconds: float | None = None, only: str | None = None) -> dict[str, Tall
         for name, target in _targets().items()
         if number * BLOCK < target.inputs and only in (None, name)
     ]
+    if inputs is not None:
+        lengths = np.cumsum([_length(name, whole) for name, _ in queue])
+        queue = queue[: int(np.searchsorted(lengths, inputs)) + 1]
     queue = [key for key in queue if str(key[1]) not in done.get(key[0], {})]
     until = time.monotonic() + (seconds or 1e9)
     while queue and time.monotonic() < until:
@@ -764,6 +770,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="fuzz every reader and decoder")
     parser.add_argument("--seconds", type=float, help="as much as fits, from the beginning")
     parser.add_argument("--only", help="one target")
+    parser.add_argument("--inputs", type=int, help="how many, of those that are in the journal too")
     parser.add_argument("--case", nargs=2, metavar=("TARGET", "NUMBER"), help="one input again")
     arguments = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -774,8 +781,11 @@ def main() -> int:
         print(f"{len(case.data)} bytes {case.suffix} {case.detail}: {case.data[:300]!r}")
         print("readable" if _targets()[name].run(case) else "refused")
         return 0
-    total = run(arguments.seconds, arguments.only)
-    print(table(total))
+    total = run(arguments.seconds, arguments.only, arguments.inputs)
+    made = f"{table(total)}\n\nMade by commit {journal.commit()}."
+    print(made)
+    if not (arguments.seconds or arguments.only):
+        journal.put("acquisition.md", "fuzz", made)
     _tell_wrong(total)
     return 1 if any(tally["wrong"] for tally in total.values()) else 0
 

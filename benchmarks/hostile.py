@@ -3,15 +3,19 @@
     python -m benchmarks.hostile             every row of the table
     python -m benchmarks.hostile pipe YAML   the rows with one of these words
 
-A row is right when its process ends within 10 s and 1 GB without a traceback, with the exit
-status that it should have and, where that is 2, one line of standard error that is the fault
-(notes on what was guessed may stand before it).
+A row is right when its process ends within 10 s (of the processor, since others may be at work)
+and 1 GB without a traceback, with the exit status that it should have and, where that is 2, one
+line of standard error that is the fault (notes on what was guessed may stand before it), and when
+what it left is as it should be. All rows together write the table in docs/integrity.md.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,10 +23,17 @@ import threading
 import time
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
+
+from benchmarks import journal
+from benchmarks.kills import Project
+from pendpipe.files import read_json, write_json
+from pendpipe.recording import read_plain
+from pendpipe.report.page import BUDGET_BYTES
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_SECONDS = 10.0
@@ -33,16 +44,33 @@ RIGHT = ((2,), (0, 2))
 
 @dataclass(frozen=True)
 class Row:
-    """A hostile input: what makes it in a folder and returns the words of the command."""
+    """A hostile input.
+
+    Parameters
+    ----------
+    name
+        What it is.
+    command
+        Makes it in a folder and returns the words of the command.
+    statuses
+        The exit statuses that are right.
+    left
+        Says what is wrong with what the command has left in the folder.
+    end
+        A signal that the process gets once it has recorded something.
+    """
 
     name: str
     command: Callable[[Path], list[str]]
     statuses: tuple[int, ...] = RIGHT[0]
+    left: Callable[[Path], str] = lambda _: ""
+    end: signal.Signals | None = None
 
 
 def rows() -> Iterator[Row]:
     """All hostile inputs."""
-    yield Row("workbook of 2 million cells", lambda f: _workbook(f, 20_000), RIGHT[1])
+    yield Row("workbook of 1 million cells", lambda f: _workbook(f, 10_000), RIGHT[1])
+    yield Row("workbook of 2 million cells", lambda f: _workbook(f, 20_000))
     yield Row("workbook of 8 million cells", lambda f: _workbook(f, 80_000))
     yield Row("CSV of 10^7 columns", lambda f: _file(f, [b"1," * 10**6] * 10 + [b"1\n2,3\n"]))
     yield Row("a line of 100 MB", lambda f: _file(f, [b"9" * 10**6] * 100))
@@ -57,7 +85,7 @@ def rows() -> Iterator[Row]:
         yield Row(f"all times x {name}", lambda f, s=scale: _swing(f, times=s), RIGHT[1])  # type: ignore[misc]
     yield Row("negative times", lambda f: _swing(f, start=-100.0), RIGHT[1])
     yield Row("output name of 300 letters", _long_output)
-    yield Row("calibration points 1e12", lambda f: _caliper(f, b"1e12,1e12\n"), RIGHT[1])
+    yield Row("calibration points 1e12", lambda f: _caliper(f, b"1e12,1e12\n"))
     yield Row("calibration not UTF-8", lambda f: _caliper(f, b"\xff,\xfe\n"))
     for content, name in (
         (b"[" * 5000, "YAML nested 5,000 deep"),
@@ -87,40 +115,68 @@ def rows() -> Iterator[Row]:
         name = "id " + " beside ".join(i if len(i) < 99 else f"of {len(i)} letters" for i in ids)
         lines = "".join(f"{i}\tsimulated\n" for i in ids).encode()
         yield Row(name, lambda f, t=lines: _table(f, b"record\tsource\n" + t))  # type: ignore[misc]
+    for odd in ODD_FOLDERS:
+        yield Row(f"refused, from {odd}/", lambda f, o=odd: _refused(f, o), (0,), _names_folder)  # type: ignore[misc]
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        yield Row(f"{number.name} while recording", _recorder, (0,), _no_recording, number)
+    for count in (100, 300):
+        yield Row(f"page of {count} records", lambda f, n=count: _page(f, n), (0,), _too_large)  # type: ignore[misc]
 
 
 def main() -> None:
     """Run the rows that are asked for and print the table; status 1 where one is wrong."""
     asked = sys.argv[1:]
     wrong = 0
-    print(f"{'input':<32} {'s':>5} {'MB':>5} {'exit':>4}  answer")
+    lines = ["| input | s | s of the processor | MB | exit | answer |", "|---|---|---|---|---|---|"]
+    print("\n".join(lines), flush=True)
     for row in rows():
         if asked and not any(word in row.name for word in asked):
             continue
         with tempfile.TemporaryDirectory() as folder:
-            seconds, megabytes, status, said, traced = _measured(row.command(Path(folder)))
-            said = said.replace(folder + os.sep, "")
-        said = re.sub(r"(\S{20})\S{80,}", r"\1...", said)
+            used = _measured(row.command(Path(folder)), Path(folder), row.end)
+            said = re.sub(r"(\S{20})\S{80,}", r"\1...", used.said.replace(folder + os.sep, ""))
+            left = row.left(Path(folder)) if used.status in row.statuses else ""
         right = (
-            seconds < MOST_SECONDS
-            and megabytes < MOST_MB
-            and status in row.statuses
-            and not traced
-            and (status != 2 or len(re.findall("^pendpipe: ", said, re.MULTILINE)) == 1)
+            used.cpu_s < MOST_SECONDS
+            and used.megabytes < MOST_MB
+            and used.status in row.statuses
+            and "Traceback" not in said
+            and (used.status != 2 or len(re.findall("^pendpipe: ", said, re.MULTILINE)) == 1)
+            and not left
         )
         wrong += not right
-        line = said.splitlines()[-1] if said else ""
-        mark = "" if right else "WRONG: "
-        print(
-            f"{row.name:<32} {seconds:5.1f} {megabytes:5.0f} {status:4d}  {mark}{line[:150]}",
-            flush=True,
+        line = left or (said.splitlines()[-1] if said else "")
+        mark = "" if right else "**wrong** "
+        cells = (
+            row.name,
+            f"{used.seconds:.1f}",
+            f"{used.cpu_s:.1f}",
+            f"{used.megabytes:.0f}",
+            str(used.status),
+            mark + line[:150].replace("|", "\\|"),
         )
-    print(f"{wrong} wrong")
+        lines.append(f"| {' | '.join(cells)} |")
+        print(lines[-1], flush=True)
+    lines.append(f"\n{wrong} wrong. Made by commit {journal.commit()}.")
+    print(lines[-1])
+    if not asked:
+        journal.put("integrity.md", "hostile", "\n".join(lines))
     sys.exit(wrong > 0)
 
 
-def _measured(words: list[str]) -> tuple[float, float, int, str, bool]:
-    """Seconds, peak memory in MB, status, and standard error of one call of pendpipe."""
+@dataclass(frozen=True)
+class Used:
+    """What a call took and said: seconds, of the processor too, peak memory, status, errors."""
+
+    seconds: float
+    cpu_s: float
+    megabytes: float
+    status: int
+    said: str
+
+
+def _measured(words: list[str], folder: Path, end: signal.Signals | None) -> Used:
+    """Call pendpipe."""
     with tempfile.TemporaryFile() as errors:
         began = time.monotonic()
         running = subprocess.Popen(
@@ -130,15 +186,22 @@ def _measured(words: list[str]) -> tuple[float, float, int, str, bool]:
             stdout=subprocess.DEVNULL,
             stderr=errors,
         )
-        stop = threading.Timer(2 * MOST_SECONDS, running.kill)
+        stop = threading.Timer(6 * MOST_SECONDS, running.kill)
         stop.start()
+        if end is not None:
+            while running.poll() is None and not any(
+                path.stat().st_size > 2000 for path in folder.glob("*.raw")
+            ):
+                time.sleep(0.05)
+            running.send_signal(end)
         _, state, used = os.wait4(running.pid, 0)
         stop.cancel()
         seconds = time.monotonic() - began
         running.returncode = os.waitstatus_to_exitcode(state)
         errors.seek(0)
         said = errors.read().decode(errors="replace").strip()
-    return seconds, used.ru_maxrss / 1024, running.returncode, said, "Traceback" in said
+    cpu_s = used.ru_utime + used.ru_stime
+    return Used(seconds, cpu_s, used.ru_maxrss / 1024, running.returncode, said)
 
 
 def _file(folder: Path, parts: list[bytes]) -> list[str]:
@@ -162,7 +225,7 @@ schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"/></Relat
 
 
 def _workbook(folder: Path, count: int) -> list[str]:
-    row = b"<row>" + b"<c><v>1</v></c>" * 100 + b"</row>"
+    row = b"<row>" + b'<c r="A1"><v>0.123456</v></c>' * 100 + b"</row>"
     path = folder / "a.xlsx"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in _BOOK.items():
@@ -230,6 +293,79 @@ def _changed(folder: Path, value: object, *keys: str) -> list[str]:
 def _table(folder: Path, content: bytes) -> list[str]:
     (folder / "records.tsv").write_bytes(content)
     return _changed(folder, str(folder / "records.tsv"), "records")
+
+
+ODD_FOLDERS = ("my data", "a, b", "c;d (1)", "e'f\"g", "two  blanks", "été")
+_REFUSED = """
+title: Odd
+records: {folder}/records.tsv
+results: {folder}/results
+apparatus: null
+calibration: null
+simulated: null
+typical_record: null
+"""
+
+
+def _refused(folder: Path, odd: str) -> list[str]:
+    """A record without numbers, of a file in a folder with an odd name."""
+    (folder / odd).mkdir()
+    (folder / odd / "run 7.csv").write_text("time_s,angle_rad\nno,number\n")
+    table = f"record\tsource\nx\t{folder / odd}/run 7.csv\n"
+    (folder / "records.tsv").write_text(table, encoding="utf-8")
+    (folder / "config.yaml").write_text(_REFUSED.format(folder=folder), encoding="utf-8")
+    home = folder / "results/x"
+    call = ["acquire", "--campaign", str(folder / "config.yaml"), "--record", "x"]
+    return [*call, "--out", f"{home}/recording.csv", "--refused", f"{home}/refused.json"]
+
+
+def _names_folder(folder: Path) -> str:
+    reason = str(read_json(folder / "results/x/refused.json")["reason"])
+    return "" if reason.startswith("run 7.csv") and str(folder) not in reason else reason
+
+
+def _recorder(folder: Path) -> list[str]:
+    call = "acquire --device simulated:di2108 --rate 100 --duration 600 --out"
+    return [*call.split(), str(folder / "a.csv")]
+
+
+def _no_recording(folder: Path) -> str:
+    with suppress(Exception):
+        return "" if len(read_plain(folder / "a.csv")) > 10 else "there are few samples"
+    return "there is no recording"
+
+
+def _page(folder: Path, count: int) -> list[str]:
+    """The page of a campaign in which four records, each under another name, are repeated."""
+    project = Project(folder / "project")
+    status, said = project.run()
+    if status:
+        raise SystemExit(said)
+    comparison = read_json(project.results / "comparison.json")
+    summary = read_json(project.results / "campaign.json")
+    (stored,) = (project.folder / ".snakemake/pendpipe").glob("*.json")
+    for content in (comparison, summary):
+        once = content["records"]
+        repeated = [{**once[n % len(once)], "record": f"r{n}"} for n in range(count)]
+        content["records"] = repeated
+    names = [entry["record"] for entry in read_json(project.results / "comparison.json")["records"]]
+    for n in range(count):
+        place = project.results / f"r{n}"
+        shutil.copytree(project.results / names[n % len(names)], place)
+        shutil.rmtree(place / "manifest")
+    write_json(folder / "comparison.json", comparison)
+    write_json(folder / "campaign.json", summary)
+    configuration = read_json(stored) | {"results": str(project.results)}
+    (folder / "config.json").write_text(json.dumps(configuration))
+    call = ["report", "--campaign", str(folder / "config.json")]
+    call += ["--comparison", str(folder / "comparison.json")]
+    call += ["--summary", str(folder / "campaign.json"), "--figures", f"{project.results}/figures"]
+    return [*call, "--out", str(folder / "page.html")]
+
+
+def _too_large(folder: Path) -> str:
+    size = (folder / "page.html").stat().st_size
+    return "" if size <= BUDGET_BYTES else f"{size} bytes"
 
 
 if __name__ == "__main__":

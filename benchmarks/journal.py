@@ -38,13 +38,13 @@ def code(sources: tuple[str, ...] = READERS) -> str:
 
 @cache
 def commit() -> str:
-    """The commit at work; ``-dirty`` behind it where files were changed since."""
-    return subprocess.run(
-        ["git", "-C", str(ROOT), "describe", "--always", "--dirty"],
-        capture_output=True,
-        text=True,
-        check=True,
+    """The commit at work; ``-dirty`` behind it where more than a page was changed since."""
+    git = ["git", "-C", str(ROOT)]
+    name = subprocess.run(
+        [*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
     ).stdout.strip()
+    changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", ".", ":!docs"], check=False)
+    return name + ("-dirty" if changed.returncode else "")
 
 
 def read(name: str, nothing: Any, sources: tuple[str, ...] = READERS) -> Any:

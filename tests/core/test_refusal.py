@@ -37,6 +37,21 @@ def test_a_refusal_names_no_folder_of_the_machine(tmp_path: Path) -> None:
     assert read_json(refused)["reason"] == "run7.csv, line 3: no number; fix the row"
 
 
+@pytest.mark.parametrize(
+    "folder", ["/home/my data", "/home/a,b/c  d (1)", "C:/Users/R. D. P", "/home/été/\u202eabc;"]
+)
+def test_a_refusal_names_no_folder_however_it_is_called(tmp_path: Path, folder: str) -> None:
+    source = Path(folder, "run 7.csv")
+
+    def fails_there() -> None:
+        raise InputError(f"{source}, line 3", "no number", f"fix {source}")
+
+    refused = tmp_path / "x/refused.json"
+    outputs = [tmp_path / "x/recording.csv"]
+    run_stage("acquire", "x", fails_there, outputs=outputs, refused=refused, sources=[source])
+    assert read_json(refused)["reason"] == "run 7.csv, line 3: no number; fix run 7.csv"
+
+
 def test_the_stages_after_a_refusal_pass_it_on(tmp_path: Path) -> None:
     refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
     run_stage("acquire", "x", fails, outputs=[tmp_path / "recording.csv"], refused=refused)

@@ -45,11 +45,9 @@ def read_configuration(path: str | Path) -> dict[str, Any]:
         text = place.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(place, "there is no such configuration", "see config/README.md") from None
-    except OSError as fault:
-        problem = f"it can't be read ({fault.strerror})"
-        raise InputError(place, problem, "give a YAML file") from None
-    except UnicodeDecodeError as fault:
-        raise InputError(place, f"it can't be read ({fault})", "give YAML in UTF-8") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        reason = getattr(fault, "strerror", fault)
+        raise InputError(place, f"it can't be read ({reason})", "give YAML in UTF-8") from None
     content = read_json(place) if place.suffix == ".json" else _yaml(place, text)
     if not isinstance(content, dict):
         raise InputError(place, "this is no mapping of keys to values", "see config/README.md")

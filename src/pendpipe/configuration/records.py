@@ -92,7 +92,8 @@ def read_records(path: str | Path) -> list[Record]:
     except FileNotFoundError:
         raise InputError(place, "there is no such table", "see config/README.md") from None
     except (OSError, UnicodeDecodeError) as fault:
-        raise InputError(place, f"it can't be read ({fault})", "give a table in UTF-8") from None
+        reason = getattr(fault, "strerror", fault)
+        raise InputError(place, f"it can't be read ({reason})", "give a table in UTF-8") from None
     rows = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

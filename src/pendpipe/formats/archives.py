@@ -21,7 +21,7 @@ from pendpipe.formats.text import table_of_text
 
 _MOST_ROWS: Final = 1 << 20
 """What a sheet has, and no more."""
-_MOST_CELLS: Final = 3_000_000
+_MOST_CELLS: Final = 1_000_000
 _WIDEST: Final = 1024
 
 

@@ -54,13 +54,13 @@ def run_stage(
         If a result that is read is not what its stage wrote. That refuses no record.
     """
     if record is None:
-        return _work_or_refuse(stage, str(outputs[0]), work, outputs, refused)
+        return _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
     if refused is not None:
         check([refused])
     home = outputs[0].parent
     given = [path for path in inputs if path is not None]
     with job(home, stage, inputs=given, sources=sources) as running:
-        status = _work_or_refuse(stage, record, work, outputs, refused)
+        status = _work_or_refuse(stage, record, work, outputs, refused, sources)
         running.outputs += outputs
         if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
             running.extras.append(refused)
@@ -73,6 +73,7 @@ def _work_or_refuse(
     work: Callable[[], None],
     outputs: Sequence[Path],
     refused: Path | None,
+    sources: Iterable[Path],
 ) -> int:
     if refused is None:
         work()
@@ -88,7 +89,7 @@ def _work_or_refuse(
     except DamagedError:
         raise
     except InputError as error:
-        reason = within_results(error, refused)
+        reason = within_results(error, refused, sources)
         write_json(
             refused, {"schema_version": 1, "record": record, "stage": stage, "reason": reason}
         )
@@ -97,14 +98,18 @@ def _work_or_refuse(
     return 0
 
 
-def within_results(error: InputError, refused: Path | None) -> str:
+def within_results(error: InputError, refused: Path | None, sources: Iterable[Path] = ()) -> str:
     """What is written of an error: a campaign's own files go by ``record/name``.
 
     Results name no path of the machine they were made on: others go by their name alone.
     """
     if refused is None:
         return str(error)
-    return without_folders(str(error).replace(f"{refused.parent.parent}/", ""))
+    text = str(error).replace(f"{refused.parent.parent}/", "")
+    for path in sources:
+        # In one line as in the message: a folder's name may hold anything.
+        text = text.replace(" ".join(str(path).split()), path.name)
+    return without_folders(text)
 
 
 def reason_of(refused: Path, *, before: str | None = None) -> str | None:
