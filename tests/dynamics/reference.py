@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import mul
 from typing import Any
 
@@ -18,7 +18,13 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from pendpipe.dynamics import Eq8
+from pendpipe.dynamics import (
+    Eq8,
+    Release,
+    sample_with_jacobian,
+    turning_points,
+    turning_points_with_jacobian,
+)
 
 DIGITS = 40
 NODES = 36
@@ -240,3 +246,44 @@ def heyoka_samples(model: Eq8, y: float, time_s: np.ndarray) -> np.ndarray:
             integrator.propagate_until(time_s[i] - begin)
             found[i] = math.copysign(unit, start) * integrator.state[0]
     return found
+
+
+STRETCH = 8
+"""Half cycles that are too few for the engine to tabulate: it solves them one by one."""
+
+
+def turning_points_in_stretches(
+    model: Eq8, release: Release, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return turning points, the motion taken up anew at every eighth of them."""
+    times, angles = np.array([release.time_s]), np.array([release.angle_rad])
+    while len(times) < count:
+        release = Release(float(times[-1]), float(angles[-1]))
+        points = turning_points(model, release, count=min(STRETCH + 1, count + 1 - len(times)))
+        times, angles = np.append(times, points.time_s[1:]), np.append(angles, points.angle_rad[1:])
+        if points.stopped:
+            break
+    return times, angles
+
+
+def samples_in_stretches(
+    model: Eq8, release: Release, time_s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return samples and Jacobian, the motion taken up anew at every eighth turning point."""
+    angle, jacobian = np.empty(len(time_s)), np.empty((len(time_s), 8))
+    first, carried = 0, np.eye(8)
+    while True:
+        points, times, angles = turning_points_with_jacobian(model, release, STRETCH + 1)
+        end = float(points.time_s[-1])
+        last = len(time_s) if points.stopped else int(np.searchsorted(time_s, end))
+        angle[first:last], own = sample_with_jacobian(model, release, time_s[first:last])
+        jacobian[first:last] = own @ carried
+        if last == len(time_s):
+            return angle, jacobian
+        # The next release, by the parameters of this stretch: its angle is without the offset.
+        step = np.eye(8)
+        step[5], step[6] = angles[-1], times[-1]
+        step[5, 7] -= 1.0
+        carried = step @ carried
+        release = replace(release, time_s=end, angle_rad=points.angle_rad[-1] - release.offset_rad)
+        first = last

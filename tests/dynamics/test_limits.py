@@ -9,49 +9,41 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.dynamics import Eq8, Method, Release, sample, turning_points
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
 
-METHODS: tuple[Method, ...] = ("map", "clock")
 W = 2.0 * math.pi * 0.516
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_without_losses_it_is_a_cosine(method: Method) -> None:
+def test_without_losses_it_is_a_cosine() -> None:
     time = np.linspace(3.0, 500.0, 10_001)
-    angle = sample(Eq8(W), Release(2.5, -0.1, 0.02), time, method=method)
+    angle = sample(Eq8(W), Release(2.5, -0.1, 0.02), time)
     np.testing.assert_allclose(angle, 0.02 - 0.1 * np.cos(W * (time - 2.5)), atol=2e-14)
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("q", [0.6, 2.0, 20.0, 136.0, 1e6])
-def test_viscous_decay_is_the_textbook_solution(method: Method, q: float) -> None:
+def test_viscous_decay_is_the_textbook_solution(q: float) -> None:
     b = W / (2 * q)
     damped = math.sqrt(W**2 - b**2)
     time = np.linspace(0.0, 40.0 if q < 10 else 200.0, 4001)
     expected = np.exp(-b * time) * (np.cos(damped * time) + b / damped * np.sin(damped * time))
-    angle = sample(Eq8(W, viscous=b), Release(0.0, 1.0), time, method=method)
+    angle = sample(Eq8(W, viscous=b), Release(0.0, 1.0), time)
     envelope = np.exp(-b * time)
     assert np.max(np.abs(angle - expected) / envelope) < 1e-9
-    points = turning_points(Eq8(W, viscous=b), Release(0.0, 1.0), count=20, method=method)
+    points = turning_points(Eq8(W, viscous=b), Release(0.0, 1.0), count=20)
     np.testing.assert_allclose(points.time_s, np.arange(20) * math.pi / damped, rtol=1e-11)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_coulomb_friction_takes_two_delta_a_half_cycle_and_stops_the_pendulum(
-    method: Method,
-) -> None:
+def test_coulomb_friction_takes_two_delta_a_half_cycle_and_stops_the_pendulum() -> None:
     c = 2e-3
     delta = math.pi * c / (2 * W)
     y0 = 140.3 * delta
-    points = turning_points(Eq8(W, coulomb=c), Release(1.0, y0, 0.5), method=method)
+    points = turning_points(Eq8(W, coulomb=c), Release(1.0, y0, 0.5))
     k = np.arange(71)
     expected = (-1.0) ** k * (y0 - 2 * k * delta)
     assert points.stopped
     np.testing.assert_allclose(points.angle_rad - 0.5, expected, atol=1e-14)
     np.testing.assert_allclose(points.time_s - 1.0, k * math.pi / W, rtol=1e-12)
-    later = sample(
-        Eq8(W, coulomb=c), Release(1.0, y0, 0.5), points.time_s[-1] + np.arange(9.0), method=method
-    )
+    later = sample(Eq8(W, coulomb=c), Release(1.0, y0, 0.5), points.time_s[-1] + np.arange(9.0))
     np.testing.assert_array_equal(later, points.rest_rad)
 
 
@@ -141,11 +133,10 @@ def test_the_motion_has_the_symmetries_of_equation_8(
 
 def test_an_amplitude_beyond_measure_does_no_harm() -> None:
     time = np.linspace(0.0, 3e4, 301)
-    for method in METHODS:
-        angle = sample(Eq8(W, viscous=W / 10), Release(0.0, 0.1), time, method=method)
-        # At the release it is 0.1 but for the last digit.
-        assert angle[0] == pytest.approx(0.1, rel=3e-16)
-        assert np.all(np.abs(angle[1:]) <= 0.1 * np.exp(-W / 10.1 * time[1:]) + 1e-119)
+    angle = sample(Eq8(W, viscous=W / 10), Release(0.0, 0.1), time)
+    # At the release it is 0.1 but for the last digit.
+    assert angle[0] == pytest.approx(0.1, rel=3e-16)
+    assert np.all(np.abs(angle[1:]) <= 0.1 * np.exp(-W / 10.1 * time[1:]) + 1e-119)
 
 
 def test_an_overdamped_pendulum_is_refused() -> None:
@@ -153,24 +144,23 @@ def test_an_overdamped_pendulum_is_refused() -> None:
         turning_points(Eq8(W, viscous=1.01 * W), Release(0.0, 0.1), count=3)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_uneven_times_give_the_same_as_even_ones(method: Method) -> None:
+def test_uneven_times_give_the_same_as_even_ones() -> None:
     model, release = Eq8(W, 0.45, 0.006, 0.006, 1e-4), Release(0.0, 0.07)
     time = np.linspace(0.0, 400.0, 8001)
     chosen = np.sort(np.random.default_rng(5).choice(time.size, 700, replace=False))
-    whole = sample(model, release, time, method=method)
+    whole = sample(model, release, time)
     np.testing.assert_allclose(
-        sample(model, release, time[chosen], method=method), whole[chosen], rtol=1e-13, atol=1e-17
+        sample(model, release, time[chosen]), whole[chosen], rtol=1e-13, atol=1e-17
     )
     # Also when several samples share an instant, and for none or one.
     twice = np.repeat(time[:50], 2)
     np.testing.assert_allclose(
-        sample(model, release, twice, method=method),
+        sample(model, release, twice),
         np.repeat(whole[:50], 2),
         atol=0.07 * 1e-11,  # another stretch of time has another table
     )
-    assert sample(model, release, np.empty(0), method=method).size == 0
-    assert sample(model, release, np.array([0.0]), method=method) == pytest.approx(0.07, rel=1e-13)
+    assert sample(model, release, np.empty(0)).size == 0
+    assert sample(model, release, np.array([0.0])) == pytest.approx(0.07, rel=1e-13)
 
 
 def test_turning_points_end_where_they_are_asked_to() -> None:

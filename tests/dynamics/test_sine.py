@@ -14,7 +14,6 @@ from scipy.special import ellipe, ellipj, ellipk
 from pendpipe.dynamics import (
     JACOBIAN_COLUMNS,
     Eq8,
-    Method,
     Release,
     compare,
     sample,
@@ -23,9 +22,8 @@ from pendpipe.dynamics import (
     turning_points_with_jacobian,
 )
 
-from .reference import heyoka_samples, heyoka_turning_points
+from .reference import heyoka_samples, heyoka_turning_points, samples_in_stretches
 
-METHODS: tuple[Method, ...] = ("map", "clock")
 W = 2.0 * math.pi * 0.516
 MODEL = Eq8(W, quadratic=0.02, hysteretic=0.004, viscous=0.006, coulomb=1e-4, restoring="sine")
 STENCIL = {2: -1.0, 1: 8.0, -1: -8.0, -2: 1.0}
@@ -41,14 +39,13 @@ def moves(model: Eq8, y: float) -> bool:
     return friction < w**2 * math.sin(y)
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("y", [0.01, 0.29, 0.31, 1.0, 2.0, 2.9, 3.1])
-def test_without_losses_it_is_jacobis_elliptic_function(y: float, method: Method) -> None:
+def test_without_losses_it_is_jacobis_elliptic_function(y: float) -> None:
     k = math.sin(0.5 * y)
     time = np.linspace(0.0, 100.0, 5001)
     sn, _, dn, _ = ellipj(W * time + ellipk(k * k), k * k)
     assert np.all(dn > 0.0)
-    angle = sample(Eq8(W, restoring="sine"), Release(0.0, y), time, method=method)
+    angle = sample(Eq8(W, restoring="sine"), Release(0.0, y), time)
     np.testing.assert_allclose(angle, 2.0 * np.arcsin(k * sn), rtol=0, atol=1e-9 * y)
 
 
@@ -70,35 +67,32 @@ def pendulums(draw: st.DrawFn) -> tuple[Eq8, float]:
 def test_turning_points_agree_with_heyoka(drawn: tuple[Eq8, float]) -> None:
     model, y = drawn
     times, angles = heyoka_turning_points(model, y, 60, lambda angle: moves(model, angle))
-    for method in METHODS:
-        points = turning_points(model, Release(0.0, y), count=60, method=method)
-        assert points.time_s.size == times.size
-        np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-10 * y)
-        # How long it takes from near the top hangs on the last digit of the amplitude.
-        late = np.abs(points.time_s - times) * model.angular_frequency
-        assert np.max(late) < 1e-9
+    points = turning_points(model, Release(0.0, y), count=60)
+    assert points.time_s.size == times.size
+    np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-10 * y)
+    # How long it takes from near the top hangs on the last digit of the amplitude.
+    late = np.abs(points.time_s - times) * model.angular_frequency
+    assert np.max(late) < 1e-9
 
 
 @pytest.mark.parametrize("y", [0.3, 1.0, 2.0, 2.9])
 def test_samples_agree_with_heyoka_to_a_billionth_of_the_amplitude(y: float) -> None:
     time = np.linspace(0.0, 200.0, 997)
     expected = heyoka_samples(MODEL, y, time)
-    for method in METHODS:
-        angle = sample(MODEL, Release(0.0, y), time, method=method)
-        np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-9 * y)
+    angle = sample(MODEL, Release(0.0, y), time)
+    np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-9 * y)
 
 
 def test_to_the_stop_from_any_amplitude() -> None:
     model = replace(MODEL, coulomb=0.03)
     for y in (0.2, 1.5, 2.8):
         times, angles = heyoka_turning_points(model, y, 999, lambda angle: moves(model, angle))
-        for method in METHODS:
-            points = turning_points(model, Release(0.0, y), method=method)
-            assert points.stopped
-            assert points.time_s.size == times.size
-            assert abs(points.rest_rad) < model.stop_rad
-            np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-11)
-            np.testing.assert_allclose(points.time_s, times, rtol=1e-9)
+        points = turning_points(model, Release(0.0, y))
+        assert points.stopped
+        assert points.time_s.size == times.size
+        assert abs(points.rest_rad) < model.stop_rad
+        np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(points.time_s, times, rtol=1e-9)
 
 
 def test_friction_holds_it_where_it_exceeds_the_torque_also_near_the_top() -> None:
@@ -146,24 +140,21 @@ def test_each_loss_takes_from_the_amplitude_what_its_documentation_states(
 def test_turning_points_change_as_differences_of_heyokas_do(y: float) -> None:
     model, count = replace(MODEL, coulomb=1e-3), 12
     values = {name: getattr(model, name) for name in JACOBIAN_COLUMNS[:5]} | {"angle": y}
-    for method in METHODS:
-        _, times, angles = turning_points_with_jacobian(
-            model, Release(0.0, y), count, method=method
-        )
-        for column, (name, value) in enumerate(values.items()):
-            step = 2e-4 * value * (0.1 if name == "angle" else 1.0)
-            moved = [
-                weight
-                * np.array(
-                    heyoka_turning_points(model, y + s * step, count)
-                    if name == "angle"
-                    else heyoka_turning_points(replace(model, **{name: value + s * step}), y, count)
-                )
-                for s, weight in STENCIL.items()
-            ]
-            by_time, by_angle = sum(moved) / (12.0 * step)
-            for own, other in ((times[:, column], by_time), (angles[:, column], by_angle)):
-                np.testing.assert_allclose(own, other, rtol=0, atol=2e-6 * np.abs(other).max())
+    _, times, angles = turning_points_with_jacobian(model, Release(0.0, y), count)
+    for column, (name, value) in enumerate(values.items()):
+        step = 2e-4 * value * (0.1 if name == "angle" else 1.0)
+        moved = [
+            weight
+            * np.array(
+                heyoka_turning_points(model, y + s * step, count)
+                if name == "angle"
+                else heyoka_turning_points(replace(model, **{name: value + s * step}), y, count)
+            )
+            for s, weight in STENCIL.items()
+        ]
+        by_time, by_angle = sum(moved) / (12.0 * step)
+        for own, other in ((times[:, column], by_time), (angles[:, column], by_angle)):
+            np.testing.assert_allclose(own, other, rtol=0, atol=2e-6 * np.abs(other).max())
 
 
 @pytest.mark.parametrize("y", [0.31, 1.0, 2.9])
@@ -171,9 +162,9 @@ def test_samples_change_as_their_differences_do(y: float) -> None:
     model, release = replace(MODEL, coulomb=1e-3), Release(0.5, -y, 0.02)
     time = np.linspace(1.0, 120.0, 2001)
     angle, jacobian = sample_with_jacobian(model, release, time)
-    by_clock = sample_with_jacobian(model, release, time, method="clock")[1]
-    scale = np.abs(by_clock).max(axis=0)
-    np.testing.assert_allclose(jacobian / scale, by_clock / scale, rtol=0, atol=1e-8)
+    anew = samples_in_stretches(model, release, time)[1]
+    scale = np.abs(anew).max(axis=0)
+    np.testing.assert_allclose(jacobian / scale, anew / scale, rtol=0, atol=1e-8)
     np.testing.assert_allclose(angle, sample(model, release, time), rtol=0, atol=1e-10)
     for column, name in enumerate(JACOBIAN_COLUMNS[:7]):
         rate = name in JACOBIAN_COLUMNS[:5]

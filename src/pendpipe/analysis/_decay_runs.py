@@ -76,7 +76,7 @@ def best_runs(cycles: HalfCycles) -> list[Run]:
 def _follows(cycles: HalfCycles) -> BoolArray:
     """Say for each half cycle but the last whether the next one may follow it freely."""
     swing, half = cycles.swing, np.diff(cycles.middle_s)
-    usual = np.array([np.median(half[max(0, i - 2) : i + 3]) for i in range(len(half))])
+    usual = _running_median(half)
     # A step of the converter moves the passage of the middle by this share of a half period.
     blur = 0.5 * cycles.step / np.minimum(swing[1:], swing[:-1])
     steady = np.abs(np.log(half / usual)) < _PERIOD + np.minimum(blur, 0.3)
@@ -85,6 +85,15 @@ def _follows(cycles: HalfCycles) -> BoolArray:
     # Coulomb friction takes the same from each half cycle, so the last ones shrink fast.
     drops = (swing[1:] < _FALL * swing[:-1]) & (swing[1:] < swing[:-1] - 1.6 * loss - cycles.step)
     return np.asarray(steady & ~rises & ~drops)
+
+
+def _running_median(values: FloatArray) -> FloatArray:
+    """The median of each value and its two neighbours to each side, fewer at the ends."""
+    padded = np.pad(values, 2, constant_values=np.nan)
+    ascending = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    last = 4 - np.count_nonzero(np.isnan(ascending), axis=1)
+    row = np.arange(len(values))
+    return np.asarray(0.5 * (ascending[row, last // 2] + ascending[row, (last + 1) // 2]))
 
 
 def _trimmed(cycles: HalfCycles, first: int, last: int) -> Run:

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.turning_points.loops import find_extremes
 from pendpipe.arrays import FloatArray, IntArray
 
 _PER_HALF_CYCLE: Final = 40
@@ -61,52 +62,15 @@ def noise_of(values: FloatArray, resolution: float | None) -> float:
     return float(max(floor, min(float(np.median(part)) for part in parts) / 0.6745 / np.sqrt(20.0)))
 
 
-def turning_samples(values: FloatArray, least: float) -> IntArray:
-    """Find the samples at which the motion turns by more than `least`, alternately up and down.
-
-    The first and the last sample are included where they are extremes of their own swing.
-    """
-    if len(values) < 2:
-        return np.zeros(0, dtype=np.int64)
-    # Only where the slope changes sign can be an extreme: this shortens the loop.
-    slope = np.sign(np.diff(values))
-    moving = np.flatnonzero(slope)
-    if not len(moving):
-        return np.zeros(0, dtype=np.int64)
-    changes = moving[1:][slope[moving[1:]] != slope[moving[:-1]]]
-    before = moving[:-1][slope[moving[1:]] != slope[moving[:-1]]] + 1
-    candidates = np.unique(np.concatenate(([0], before, changes, [len(values) - 1])))
-    turns: list[int] = []
-    low = high = int(candidates[0])
-    direction = 0
-    readings = values.tolist()
-    for at in candidates.tolist():
-        reading = readings[at]
-        if reading > readings[high]:
-            high = at
-        if reading < readings[low]:
-            low = at
-        if direction >= 0 and readings[high] - reading > least:
-            if direction or low != high:
-                turns.append(high)
-            direction, low = -1, at
-        elif direction <= 0 and reading - readings[low] > least:
-            if direction or low != high:
-                turns.append(low)
-            direction, high = 1, at
-        if direction > 0:
-            low = at if reading < readings[low] else low
-    if direction:
-        turns.append(high if direction > 0 else low)
-    return np.array(turns, dtype=np.int64)
-
-
 def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) -> IntArray:
     """Take out swings that are small beside both neighbours.
 
     In a free decay each swing is at least as large as the next, so none is small beside
     both; a wiggle within a swing is.
     """
+    swing = np.abs(np.diff(values[turns]))
+    if np.all(swing[1:-1] >= share * np.minimum(swing[:-2], swing[2:])):
+        return turns
     kept: list[int] = []
     for turn in turns.tolist():
         kept.append(turn)
@@ -124,7 +88,7 @@ def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     low, high = np.percentile(values, (0.5, 99.5))
     span = float(high - low) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
-        turns = without_ripples(values, turning_samples(values, share * span))
+        turns = without_ripples(values, find_extremes(values, share * span)[0])
         if len(turns) >= 4:
             return float(np.median(np.diff(time_s[turns])))
     return None
@@ -203,33 +167,36 @@ def half_cycles(
 ) -> HalfCycles:
     """Read off the half cycles whose swing exceeds `least`."""
     time, smooth = thinned(time_s, values, half_period_s)
-    turns = without_ripples(smooth, turning_samples(smooth, least))
+    turns = without_ripples(smooth, find_extremes(smooth, least)[0])
     # The last one found is where the record happens to end, or any point of the final rest.
     ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())
     turns = turns[:-1]
     extremes = _crests(time, smooth, turns)
-    middle = [
-        _passage(time[a : b + 1], smooth[a : b + 1])
-        for a, b in zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True)
-    ]
     return HalfCycles(
         turn_time_s=time[turns],
         turn=extremes,
         swing=np.abs(np.diff(extremes)),
-        middle_s=np.array(middle, dtype=np.float64),
+        middle_s=_passages(time, smooth, turns),
         step=least,
         ending=ending,
     )
 
 
-def _passage(time: FloatArray, values: FloatArray) -> float:
-    """Find when a swing passes the middle between its ends, for the last time."""
-    above = values > 0.5 * (values[0] + values[-1])
-    passages = np.flatnonzero(above[1:] != above[:-1])
-    if not len(passages):
-        # Noise alone: it ends where it began.
-        return 0.5 * float(time[0] + time[-1])
-    at = int(passages[-1])
-    middle = 0.5 * (values[0] + values[-1])
-    share = (middle - values[at]) / (values[at + 1] - values[at])
-    return float(time[at] + share * (time[at + 1] - time[at]))
+def _passages(time: FloatArray, values: FloatArray, turns: IntArray) -> FloatArray:
+    """Find when each swing passes the middle between its ends, for the last time."""
+    if len(turns) < 2:
+        return np.empty(0)
+    start, stop = turns[:-1], turns[1:]
+    middle = 0.5 * (values[start] + values[stop])
+    swing = np.repeat(np.arange(len(middle)), stop - start)
+    inside = slice(turns[0], turns[-1] + 1)
+    reading = values[inside]
+    above = reading[:-1] > middle[swing]
+    passed = np.flatnonzero(above != (reading[1:] > middle[swing]))
+    # Noise alone ends where it began, and passes nothing.
+    found = 0.5 * (time[start] + time[stop])
+    # Of several the last is written last.
+    at, swing = passed + turns[0], swing[passed]
+    share = (middle[swing] - values[at]) / (values[at + 1] - values[at])
+    found[swing] = time[at] + share * (time[at + 1] - time[at])
+    return found

@@ -10,6 +10,8 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 
 _ORDER: Final = 4
+_GAIN: Final = float(math.comb(2 * _ORDER, _ORDER))
+"""Sum of the squared weights of the fourth difference: what white noise is multiplied by."""
 _BLOCK: Final = 64
 _BLOCKS: Final = 256
 _LATTICE: Final = 2048
@@ -80,12 +82,12 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
     floor = quantisation_rms(step)
     if len(values) < 2 * _ORDER:
         return floor
-    from pendpipe.analysis.turning_points.plain import block_squares
-
     length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else len(values)
     number = min(_BLOCKS, len(values) // length)
-    squares = block_squares(np.ascontiguousarray(values), number, length)
-    return max(floor, math.sqrt(_middle(squares) / _gain()))
+    starts = (len(values) - length) * np.arange(number) // max(number - 1, 1)
+    blocks = values[starts[:, None] + np.arange(length)]
+    squares = np.mean(_fourth_differences(blocks) ** 2, axis=1)
+    return max(floor, math.sqrt(float(np.median(squares)) / _GAIN))
 
 
 def white_rms(residual: FloatArray) -> float:
@@ -95,15 +97,15 @@ def white_rms(residual: FloatArray) -> float:
     """
     if len(residual) < 2 * _ORDER:
         return float(np.sqrt(np.mean(residual**2)))
-    from pendpipe.analysis.turning_points.plain import fourth_square
-
-    square = float(fourth_square(np.ascontiguousarray(residual)))
-    return math.sqrt(square / ((len(residual) - _ORDER) * _gain()))
+    fourth = _fourth_differences(residual)
+    return math.sqrt(float(fourth @ fourth) / (len(fourth) * _GAIN))
 
 
-def _gain() -> float:
-    """Sum of the squared binomial weights: what white noise is multiplied by."""
-    return float(math.comb(2 * _ORDER, _ORDER))
+def _fourth_differences(values: FloatArray) -> FloatArray:
+    """Differences of the differences, four times, along the last axis."""
+    outer = values[..., :-4] + values[..., 4:]
+    inner = values[..., 1:-3] + values[..., 3:-1]
+    return outer - 4.0 * inner + 6.0 * values[..., 2:-2]
 
 
 def undithered_rms(amplitude: FloatArray, step: float | None, noise: float) -> FloatArray:

@@ -5,7 +5,6 @@ Eq. 8 goes through the compiled engine (`eq8`); any other law through `any_law`.
 
 from pendpipe.dynamics.eq8 import (
     Comparison,
-    Method,
     TurningPoints,
     compare,
     residuals,
@@ -14,14 +13,12 @@ from pendpipe.dynamics.eq8 import (
     turning_points,
     turning_points_with_jacobian,
 )
-from pendpipe.dynamics.model import JACOBIAN_COLUMNS, JOINT_JACOBIAN_COLUMNS, Eq8, Release
+from pendpipe.dynamics.model import JACOBIAN_COLUMNS, Eq8, Release
 
 __all__ = [
     "JACOBIAN_COLUMNS",
-    "JOINT_JACOBIAN_COLUMNS",
     "Comparison",
     "Eq8",
-    "Method",
     "Release",
     "TurningPoints",
     "compare",

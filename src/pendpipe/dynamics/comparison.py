@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import MOMENTS, NODE_COUNT, PLACES
-from pendpipe.dynamics.panel import adder, horner_few, kernel
+from pendpipe.dynamics.panel import horner_few
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -23,14 +24,14 @@ if TYPE_CHECKING:
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(PLACES)
 
 
-@adder
+@kernel(any_order=True)
 def subtract(readings: FloatArray, angle_rad: FloatArray) -> None:
     """Put readings less angles in the place of the angles."""
     for i in range(angle_rad.size):
         angle_rad[i] = readings[i] - angle_rad[i]
 
 
-@adder
+@kernel(any_order=True)
 def take_moments(
     residual: FloatArray, theta: FloatArray, power: FloatArray, moments: FloatArray
 ) -> float:
@@ -59,7 +60,7 @@ def take_moments(
     return square
 
 
-@adder
+@kernel(any_order=True)
 def product(first: FloatArray, second: FloatArray) -> float:
     """Return the sum of products."""
     total = 0.0
@@ -98,7 +99,7 @@ def compare(work: Work, residual: FloatArray, start: float, duration: float) -> 
     _take_places(work, theta, middle, half)
 
 
-@adder
+@kernel(any_order=True)
 def add_scaled(
     columns: FloatArray, weights: FloatArray, scaled: FloatArray, normal: FloatArray
 ) -> None:

@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import NODE_COUNT
-from pendpipe.dynamics.panel import angle_of, curve, horner, inlined, kernel
+from pendpipe.dynamics.panel import angle_of, curve, horner
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 _BLOCK = 16
 
 
-@inlined
+@kernel(inline=True)
 def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> int:
     """Return the index of the first sample from `first` on that is not before `end_s`."""
     i = min(first + guess, time_s.size)
@@ -27,7 +28,7 @@ def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> 
     return i
 
 
-@inlined
+@kernel(inline=True)
 def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> None:
     """Turn a half cycle's own derivatives into those by the parameters of the whole motion.
 

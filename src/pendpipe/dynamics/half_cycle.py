@@ -19,6 +19,7 @@ import math
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS
 from pendpipe.dynamics.panel import (
     COS,
@@ -28,7 +29,6 @@ from pendpipe.dynamics.panel import (
     angle_of,
     complement_for,
     curve,
-    kernel,
     log_amplitude,
     panel_width,
     place,

@@ -1,7 +1,8 @@
 """What the engine and its callers must agree on, free of Numba: sizes, and where what lies.
 
-A call hands over one array of integers (`REQUEST`) and one of numbers, the workspace: the engine
-allocates nothing. `FIELDS` declares where in the workspace each array of the engine lies.
+A call hands over integers: the addresses of arrays (`ADDRESSES`) and numbers of things (`COUNTS`).
+One of the arrays is the workspace: the engine allocates nothing. `FIELDS` declares where in it
+each array of the engine lies.
 """
 
 from __future__ import annotations
@@ -28,25 +29,10 @@ PLACES: Final = 8
 BATCH: Final = 8 * PLACES
 """Places that are multiplied in one go."""
 
-RUNNING, STOPPED, OVERDAMPED = 0, 1, 2
+RUNNING, STOPPED, OVERDAMPED = range(3)
+ENDINGS: Final = 3
 """How a march ends."""
 
-REQUEST: Final = (
-    "workspace",
-    "rates",
-    "tabulate",
-    "most",
-    "time_s",
-    "samples",
-    "angle_rad",
-    "jacobian",
-    "turning",
-    "room",
-    "readings",
-    "compared",
-    "sums",
-)
-"""A call's integers: addresses of arrays; numbers of rates, samples, turning points, readings."""
 COUNTS: Final = (
     "rates",
     "sensitivities",
@@ -59,11 +45,12 @@ COUNTS: Final = (
     "summed",
     "polynomials",
     "width",
+    "most",
 )
 """Numbers of rates; of sensitivities (to the amplitude and those); of columns of the Jacobian; of
 samples, and of those of which the Jacobian is written; of what is recorded of a turning point, and
 of how many; of readings to compare with, and of the sums that this gives; of the polynomials of a
-panel; the width of a row."""
+panel; the width of a row; how many turning points are wanted at most."""
 Work = Any
 """What the engine works on: the arrays of `FIELDS` and the numbers of `COUNTS`, as attributes."""
 
@@ -74,7 +61,7 @@ class Field(NamedTuple):
     Parameters
     ----------
     owner
-        The name in `REQUEST` of the array of which it is a part.
+        The array of which it is a part.
     offset, widths
         Where it begins: so many numbers, and widths of a row, behind the owner's first.
     rows, columns
@@ -161,9 +148,7 @@ def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
 
 def work_size(rates: int, samples: int) -> int:
     """Return how many numbers the workspace has."""
-    sensitivities = rates + 1 if rates else 0
-    polynomials = sensitivities + 1 if samples else 0
-    width = row_width(sensitivities, polynomials, MOST_PANELS)
+    width = counts(rates, samples, 0, 0, 0)[COUNTS.index("width")]
     return _FIXED + (2 * MOST_POINTS + 2) * width
 
 
@@ -172,5 +157,25 @@ def sums_size(columns: int) -> int:
     return 1 + columns * (1 + columns)
 
 
+def counts(rates: int, samples: int, compared: int, room: int, most: int) -> tuple[int, ...]:
+    """Return the integers of a call, in the order of `COUNTS`."""
+    sensitivities, parameters = (rates + 1, rates + 4) if rates else (0, 0)
+    polynomials = sensitivities + 1 if samples else 0
+    return (
+        rates,
+        sensitivities,
+        parameters,
+        samples,
+        samples - compared,
+        2 + 2 * parameters,
+        room,
+        compared,
+        sums_size(parameters) if compared else 0,
+        polynomials,
+        row_width(sensitivities, polynomials, MOST_PANELS),
+        most,
+    )
+
+
 ADDRESSES: Final = tuple({field.owner: None for field in FIELDS.values()})
-"""The names in `REQUEST` of arrays."""
+"""The arrays of a call."""

@@ -1,8 +1,4 @@
-"""Keeping the engine's machine code, so that a process need not import Numba to run it.
-
-A job of the workflow is short: importing Numba (and what it imports) would take most of it. The
-code that Numba made is therefore written to a file and loaded by llvmlite alone.
-"""
+"""Keeping machine code that Numba has made: a file is written, and loaded by llvmlite alone."""
 
 from __future__ import annotations
 
@@ -17,7 +13,6 @@ import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
 # What LLVM itself may call for, besides what the code declares.
@@ -55,22 +50,18 @@ def _target_machine(portable: bool = False) -> Any:
     )
 
 
-def keep(path: Path, parts: Sequence[tuple[str, str]], portable: bool = False) -> None:
-    """Write the machine code of modules, each with the function that will be called, to `path`."""
-    machine = _target_machine(portable)
-    heads, codes = [], []
-    for assembly, name in parts:
-        module = llvm.parse_assembly(assembly)
-        declared = [
-            function.name
-            for function in module.functions
-            if function.is_declaration and not function.name.startswith("llvm.")
-        ]
-        codes.append(machine.emit_object(module))
-        heads.append({"name": name, "needs": declared, "size": len(codes[-1])})
-    code = b"".join(codes)
+def keep(path: Path, assembly: str, name: str, portable: bool = False) -> None:
+    """Write the machine code of a module, with its function that will be called, to `path`."""
+    module = llvm.parse_assembly(assembly)
+    declared = [
+        function.name
+        for function in module.functions
+        if function.is_declaration and not function.name.startswith("llvm.")
+    ]
+    code = _target_machine(portable).emit_object(module)
     head = {
-        "parts": heads,
+        "name": name,
+        "needs": declared,
         "digest": hashlib.blake2b(code).hexdigest(),
         "triple": llvm.get_default_triple(),
         "features": _portable_features() if portable else [],
@@ -86,15 +77,15 @@ def _portable_features() -> list[str]:
     return list(PORTABLE[llvm.get_default_triple().partition("-")[0]][1])
 
 
-def load(path: Path) -> tuple[list[int], Any] | None:
-    """Return the addresses of the functions kept in `path`, and what must stay alive with them.
+def load(path: Path) -> tuple[int, Any] | None:
+    """Return the address of the function kept in `path`, and what must stay alive with it.
 
     None if there is no such file, or it is damaged, or this process lacks what it needs.
     """
     try:
         line, code = path.read_bytes().split(b"\n", 1)
         head = json.loads(line)
-        parts = head["parts"]
+        needed, name = {*_LIBRARY, *head["needs"]}, head["name"]
         sound = hashlib.blake2b(code).hexdigest() == head["digest"]
         host = llvm.get_host_cpu_features()
         sound = sound and head["triple"] == llvm.get_default_triple()
@@ -105,16 +96,12 @@ def load(path: Path) -> tuple[list[int], Any] | None:
         return None
     machine = _target_machine()
     with contextlib.suppress(AttributeError):
-        for name in {*_LIBRARY, *(need for part in parts for need in part["needs"])}:
-            _provide(name)
+        for each in needed:
+            _provide(each)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-        start = 0
-        for part in parts:
-            stop = start + part["size"]
-            engine.add_object_file(llvm.ObjectFileRef.from_data(code[start:stop]))
-            start = stop
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        return [engine.get_function_address(part["name"]) for part in parts], engine
+        return engine.get_function_address(name), engine
     return None
 
 

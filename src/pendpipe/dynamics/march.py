@@ -7,14 +7,22 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.emission import emit, rest
 from pendpipe.dynamics.half_cycle import direct_half_cycle
-from pendpipe.dynamics.layout import HEAD, MOST_PANELS, OVERDAMPED, RUNNING, SLOTS, STOPPED
+from pendpipe.dynamics.kernel import kernel
+from pendpipe.dynamics.layout import (
+    ENDINGS,
+    HEAD,
+    MOST_PANELS,
+    OVERDAMPED,
+    RUNNING,
+    SLOTS,
+    STOPPED,
+)
 from pendpipe.dynamics.panel import (
     CURVATURE,
     PLACED,
     amplitude_at,
     angle_of,
     curve,
-    kernel,
     log_amplitude,
     panel_width,
     row_width,
@@ -147,7 +155,7 @@ def _begin(work: Work) -> float:
 
 
 @kernel
-def march(work: Work, tabulate: bool, most: int) -> tuple[int, int]:
+def march(work: Work) -> int:
     """Follow the pendulum from its release.
 
     With samples the residuals or they themselves are written to `work.angle_rad`, with rates
@@ -160,14 +168,12 @@ def march(work: Work, tabulate: bool, most: int) -> tuple[int, int]:
     work
         The arrays, see `layout.FIELDS`; in `work.limits` the release's angle, positive, and the
         time after which no turning point is wanted (with samples, that of the last of these).
-    tabulate
-        Whether to tabulate the half-cycle map where that pays.
-    most
-        At most so many turning points.
+        Python gives the call's integers instead: `layout.ADDRESSES`, `layout.counts`.
 
     Returns
     -------
-    The number of turning points, and RUNNING, STOPPED or OVERDAMPED.
+    int
+        The number of turning points times ENDINGS, plus RUNNING, STOPPED or OVERDAMPED.
     """
     shape, motion, until_s, samples = work.shape, work.motion, work.limits[1], work.samples
     y = _begin(work)
@@ -176,19 +182,19 @@ def march(work: Work, tabulate: bool, most: int) -> tuple[int, int]:
         tau = math.pi * k + excess
         now_s = motion[1] + tau / motion[0]
         if now_s > until_s and samples == 0:
-            return k, RUNNING
+            return ENDINGS * k + RUNNING
         if k < work.room:
             _record(work, k, tau, y)
         k += 1
         if sticks(shape, y):
             rest(work, y, first)
-            return k, STOPPED
-        if k >= most or (samples > 0 and first >= samples):
-            return k, RUNNING
+            return ENDINGS * k + STOPPED
+        if k >= work.most or (samples > 0 and first >= samples):
+            return ENDINGS * k + RUNNING
         listed = work.segment[LOW] <= log_y <= work.segment[HIGH]
         untried = log_y < work.wanted[1] and y > SMOOTH_FROM * shape[0]
-        if tabulate and not listed and untried:
-            ahead = min(float(most - k), (until_s - now_s) * motion[0] / math.pi) + 2.0
+        if not listed and untried:
+            ahead = min(float(work.most - k), (until_s - now_s) * motion[0] / math.pi) + 2.0
             listed = _lay_out(work, log_y, ahead)
         if listed and work.sensitivities == 0 and samples == 0:
             loss, more = look_up_turning_point(work.segment, work.table, log_y)
@@ -209,7 +215,7 @@ def march(work: Work, tabulate: bool, most: int) -> tuple[int, int]:
                 level -= 1  # the damping may have eased
             after, more, first, level = direct_half_cycle(work, y, tau, level, first, guess)
             if level < 0:
-                return k, OVERDAMPED
+                return ENDINGS * k + OVERDAMPED
             _advance(work, y)
             y = after
             log_y = log_amplitude(shape, y)

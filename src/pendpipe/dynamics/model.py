@@ -11,28 +11,10 @@ import numpy as np
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
 
-JACOBIAN_COLUMNS = (
-    "quadratic",
-    "hysteretic",
-    "viscous",
-    "coulomb",
-    "angular_frequency",
-    "angle",
-    "time",
-    "offset",
-)
-"""The columns of every Jacobian, in this order, with b in its two parts."""
-
-JOINT_JACOBIAN_COLUMNS = (
-    "quadratic",
-    "linear",
-    "coulomb",
-    "angular_frequency",
-    "angle",
-    "time",
-    "offset",
-)
-"""The columns with b as one, its hysteretic share given."""
+RATES = ("quadratic", "hysteretic", "viscous", "coulomb")
+"""The losses of Eq. 8, in the order of Eq. 13: a, the two parts of b, c."""
+JACOBIAN_COLUMNS = (*RATES, "angular_frequency", "angle", "time", "offset")
+"""The columns of every Jacobian."""
 
 
 @dataclass(frozen=True)
@@ -111,10 +93,14 @@ class Eq8:
         if not 0.0 < self.angular_frequency < math.inf:
             message = f"angular_frequency must be positive and finite, not {self.angular_frequency}"
             raise ValueError(message)
-        for name in ("quadratic", "hysteretic", "viscous", "coulomb"):
+        for name in RATES:
             if not 0.0 <= getattr(self, name) < math.inf:
                 message = f"{name} must be finite and not negative, not {getattr(self, name)}"
                 raise ValueError(message)
+
+    def rates(self) -> tuple[float, float, float, float]:
+        """Return the losses in the order of `RATES`."""
+        return self.quadratic, self.hysteretic, self.viscous, self.coulomb
 
     @property
     def stop_rad(self) -> float:

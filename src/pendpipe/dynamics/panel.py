@@ -32,19 +32,15 @@ functions); w = psi for the linear torque, and at small amplitudes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
-
-from numba import njit
+from typing import TYPE_CHECKING
 
 from pendpipe.dynamics import layout
 from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
-
-_F = TypeVar("_F", bound=Callable[..., Any])
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
@@ -59,37 +55,11 @@ PHASE_BELOW = -1.2
 CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE = range(5)
 """m, h, q, g and k in the array `shape`."""
 
-# No exceptions, no reference counts (which forbids to allocate), and no entry from Python: each
-# costs more than it is worth here. Multiplications and additions may be fused.
-_OPTIONS: dict[str, Any] = {
-    "_nrt": False,
-    "error_model": "numpy",
-    "fastmath": {"contract"},
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
-
-
-def kernel(function: _F) -> _F:
-    """Compile a function of the engine."""
-    return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
-
-
-def inlined(function: _F) -> _F:
-    """Compile a function into its callers, where it knows what does not overlap."""
-    return njit(**_OPTIONS, forceinline=True)(function)  # type: ignore[no-any-return]
-
-
-def adder(function: _F) -> _F:
-    """Compile a function whose sums may be taken in any order."""
-    return njit(**(_OPTIONS | {"fastmath": {"contract", "reassoc", "nsz"}}))(function)  # type: ignore[no-any-return]
-
-
 panel_width = kernel(layout.panel_width)
 row_width = kernel(layout.row_width)
 
 
-@inlined
+@kernel(inline=True)
 def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to: int) -> None:
     """Write the product of a matrix, given transposed, and the 17 values x[p:] to out[to:].
 
@@ -110,7 +80,7 @@ def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to:
         )
 
 
-@inlined
+@kernel(inline=True)
 def unresolved(values: FloatArray, at: int) -> float:
     """Return the estimated size of the Chebyshev coefficients left out, extrapolated."""
     c13, c14, c15, c16 = 0.0, 0.0, 0.0, 0.0
@@ -125,14 +95,14 @@ def unresolved(values: FloatArray, at: int) -> float:
     return last * min(1.0, last / before)
 
 
-@inlined
+@kernel(inline=True)
 def curve(shape: FloatArray, s: float) -> float:
     """Return C at s."""
     # |.| because rounding can make the square negative at the top
     return math.sqrt(abs(1.0 - 0.25 * shape[CURVATURE] * s * s))
 
 
-@inlined
+@kernel(inline=True)
 def angle_of(shape: FloatArray, s: float) -> float:
     """Return x at s."""
     return 2.0 * math.asin(0.5 * s) if shape[CURVATURE] > 0.0 else s
@@ -192,7 +162,7 @@ def complement_for(shape: FloatArray, log_y: float) -> float:
     return 1.0 / math.sqrt(1.0 + tangent * tangent)
 
 
-@inlined
+@kernel(inline=True)
 def _bend(node: FloatArray, shape: FloatArray, radius: float) -> None:
     """Write 1/C, and what the sine adds to C nu about a shifted centre."""
     if shape[CURVATURE] == 0.0:
@@ -206,7 +176,7 @@ def _bend(node: FloatArray, shape: FloatArray, radius: float) -> None:
         node[LEAN + j] = 0.25 * m * cos * (s + m) / (c + centre)
 
 
-@inlined
+@kernel(inline=True)
 def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
     """Take over the iterate; return the sums of its changes and of its values.
 
@@ -371,7 +341,7 @@ def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
         out[i] = (((lower + c3) * z + c2) * z + c1) * z + c0
 
 
-@inlined
+@kernel(inline=True)
 def horner_few(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
     """As `horner`, at a few places: even and odd powers apart, so that each step waits less."""
     for i in range(theta.size):

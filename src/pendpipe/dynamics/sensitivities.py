@@ -15,6 +15,7 @@ import math
 from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.chebyshev import INTEGRATION_T
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
 from pendpipe.dynamics.panel import (
     BEND,
@@ -38,7 +39,6 @@ from pendpipe.dynamics.panel import (
     VISCOUS,
     WEIGHT,
     curve,
-    kernel,
     multiply,
 )
 

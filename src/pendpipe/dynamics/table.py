@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS
 from pendpipe.dynamics.panel import (
     CURVATURE,
     amplitude_at,
     complement_for,
     curve,
-    kernel,
     panel_width,
     row_width,
 )

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.analysis.turning_points.plain import half_cycle_scatter
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 
@@ -48,12 +49,21 @@ def judge_noise(
 
 
 def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
-    """Scatter of the residual's amplitude in each half cycle against white noise's."""
+    """Scatter of the residual's amplitude in each half cycle against white noise's.
+
+    Each is the residual's product with a parabola that vanishes at the middles between
+    turning points (a half wave, near enough), over the root of the parabola's square.
+    """
     middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
-    if len(middles) < 10:
+    edges = np.searchsorted(time, middles)
+    readings = np.diff(edges)
+    if len(middles) < 10 or readings.min() < 3:
         return 1.0
-    ratio, half_cycles = half_cycle_scatter(middles, time, residual)
-    if half_cycles == 0:
-        return 1.0
-    ratio /= rms**2
-    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / half_cycles) else 1.0
+    inside, starts = slice(edges[0], edges[-1]), edges[:-1] - edges[0]
+    since = time[inside] - np.repeat(middles[:-1], readings)
+    share = since / np.repeat(np.diff(middles), readings)
+    parabola = share * (1.0 - share)
+    product = np.add.reduceat(residual[inside] * parabola, starts)
+    square = np.add.reduceat(parabola**2, starts)
+    ratio = float(np.mean(product**2 / square)) / rms**2
+    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(square)) else 1.0

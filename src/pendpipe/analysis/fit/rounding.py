@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.kernel import kernel
 
 ROOT_HALF = math.sqrt(0.5)
 DENSITY = 1.0 / math.sqrt(2.0 * math.pi)
@@ -21,7 +21,7 @@ _FAR = 25.0
 """Standard deviations beyond which the tail's probability is taken from its series."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rounded(
     residual: FloatArray, half_step: float, noise: float, score: FloatArray, weight: FloatArray
 ) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from pendpipe.analysis.fit.minimise import Quadratic
 from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.fit.result import Restoring
+from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, compare, residuals, sample_with_jacobian
 
@@ -120,9 +121,6 @@ class Waveform:
         if self.step == 0.0:
             weight = self.noise_rms**-2
             return float(residual @ residual) * weight, residual * weight, weight
-        # Few recordings are so coarse; the others need no numba.
-        from pendpipe.analysis.fit.rounding import rounded
-
         score, weights = np.empty_like(residual), np.empty_like(residual)
         return (
             float(rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)),

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.turning_points.plain import track
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import LEVEL_BLOCK, LossRates, loss_rates
+from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
+from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import compiled
+from pendpipe.analysis.turning_points.loops import smooth_times
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.rough import Rough
 from pendpipe.analysis.turning_points.samples import Samples
@@ -26,9 +26,7 @@ def first_places(rough: Rough) -> Places:
     """
     at = np.arange(rough.number[0] - 1, rough.number[-1] + 1)
     weight = np.ones(len(rough.number))
-    centre, half_period = compiled.smooth_times(
-        rough.number.astype(np.float64), rough.time_s, weight, 5.0, at.astype(np.float64)
-    )
+    centre, half_period = smooth_times(rough.number, rough.time_s, weight, 5.0, at)
     return _places(at, centre, half_period, -int(rough.side[0]))
 
 
@@ -57,10 +55,9 @@ def resmoothed(places: Places, measured: Measured, noise: float) -> Places:
     time, weight = times_and_weights(places, measured, noise)
     known = weight > 0.0
     wanted = float(np.median(places.angular_frequency) / _PHASE_WANTED) ** 2
-    centre, half_period = compiled.smooth_times(
-        places.number[known].astype(np.float64), time[known], weight[known], wanted,
-        places.number.astype(np.float64),
-    )  # fmt: skip
+    centre, half_period = smooth_times(
+        places.number[known], time[known], weight[known], wanted, places.number
+    )
     return places._replace(centre_s=centre, half_period_s=half_period)
 
 

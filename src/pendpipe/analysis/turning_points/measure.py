@@ -6,8 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import compiled
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.shape import HARMONICS
+from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums, solve_half_cycles
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 _ONE_SIDED: Final = 0.3
@@ -128,18 +129,33 @@ def measure(
         Known before; it holds the phase of a half cycle of which only a side is there.
     """
     number = len(places.number)
-    arguments = (
-        samples.time_s, samples.values, stride, edges(samples, places, window),
-        places.centre_s, places.angular_frequency, level, shape,
-    )  # fmt: skip
-    gram, right, square = compiled.half_cycle_sums(*arguments, free)
+    size = 2 + free
+    gram, right = np.zeros((number, 1 + size, 1 + size)), np.zeros((number, 1 + size))
+    square = np.zeros(number)
+    half_cycle_sums(
+        samples.time_s,
+        samples.values,
+        stride,
+        edges(samples, places, window),
+        places.centre_s,
+        places.angular_frequency,
+        level,
+        shape,
+        HARMONICS if free or shape[:, 4:].any() else 0,
+        gram,
+        right,
+        square,
+        np.empty((ROWS, BLOCK)),
+    )
     prior = np.zeros(number)
     one_sided = gram[:, 1, 2] ** 2 > _ONE_SIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
     if amplitude is not None:
-        size = np.maximum(smoothed(amplitude), 1e-12)
-        held = (samples.noise_rms / (size * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
+        known = np.maximum(smoothed(amplitude), 1e-12)
+        held = (samples.noise_rms / (known * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(one_sided, held, 0.0)
-    solution, inverse = compiled.solve_half_cycles(gram, right, prior)
+    solution = np.full((number, size, 2), np.nan)
+    inverse = np.full((number, size, size), np.nan)
+    solve_half_cycles(gram, right, prior, solution, inverse, np.empty((size, size)), np.empty(size))
     flat = gram[:, 1:, 0]
     best = solution[:, :, 0]
     return Measured(

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points import compiled
+from pendpipe.analysis.turning_points.loops import count_half_cycles, find_extremes
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 
@@ -40,18 +40,19 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     start = 0.15 * float(piece.max() - piece.min())
     stride = 1
     if not samples.counts:
-        index, _ = compiled.extremes(piece[: len(piece) // 8], 1, start, least)
+        index, _ = find_extremes(piece[: len(piece) // 8], least, start=start)
         if len(index) > 3:
             stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
-    index, first = compiled.extremes(samples.values, stride, start, least)
+    index, first = find_extremes(samples.values, least, start=start, stride=stride)
     time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
     if len(index) < 3:
         return Rough(np.arange(len(index)), time, side, value, float(np.median(piece))), stride
     whole, gap_before = _beside_gaps(samples.time_s, index)
     time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
-    number, good = compiled.count_half_cycles(time, side, gap_before)
-    cut = slice(0, good)
+    number = np.zeros(len(time), dtype=np.int64)
+    usual = float(np.median(np.diff(time[:6])))
+    cut = slice(0, count_half_cycles(time, side, gap_before, usual, number))
     return Rough(number[cut], time[cut], side[cut], value[cut], _level(value[cut])), stride
 
 

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import find_step, noise_rms
-from pendpipe.analysis.turning_points.plain import extent, stays
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -69,10 +68,10 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     if recording.quantity == "volts":
         recording = recording.as_motion(place=place)
     time, values = recording.time_s, recording.values
-    finite, low, high = extent(values)
-    if recording.quality is not None or not finite:
+    low, high = _range(values)
+    if recording.quality is not None or not math.isfinite(high - low):
         time, values = time[recording.usable], values[recording.usable]
-        _, low, high = extent(values)
+        low, high = _range(values)
     if len(values) < _FEWEST:
         raise NotAnalysableError(
             place, f"{len(values)} readings are too few", "record at least three half cycles"
@@ -88,6 +87,11 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     return Samples(time, values, recording.unit, step, noise_rms(values, step))
 
 
+def _range(values: FloatArray) -> tuple[float, float]:
+    """The least and the greatest reading; not finite where one of them isn't."""
+    return (float(values.min()), float(values.max())) if len(values) else (math.nan, math.nan)
+
+
 def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | Path) -> None:
     """Refuse a channel that spends its turning points at the end of its range.
 
@@ -97,10 +101,12 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
     """
     piece = values[: 1 << 18]
     for extreme in (low, high):
-        share = np.count_nonzero(piece == extreme) / len(piece)
+        at = piece == extreme
+        count = np.count_nonzero(at)
+        share = count / len(piece)
         if share <= _SATURATED:
             continue
-        count, runs = stays(piece, extreme)
+        runs = int(at[0]) + np.count_nonzero(at[1:] & ~at[:-1])
         levels = np.unique(piece)
         step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
         expected = math.sqrt(max(step, 1e-12) / (high - low))

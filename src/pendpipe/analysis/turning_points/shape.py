@@ -24,10 +24,6 @@ from pendpipe.arrays import FloatArray
 HALF_PI = 0.5 * np.pi
 HARMONICS = 3
 """How many odd harmonics above the first the shape may hold (3, 5, 7)."""
-LEVEL_BLOCK = 256
-"""Half cycles of a long record over which level and period are one number each."""
-LANES = 16
-"""Tables are filled up with zeros to a multiple of this: the compiler's loop has no rest."""
 
 
 class LossRates(NamedTuple):

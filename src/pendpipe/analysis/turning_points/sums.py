@@ -1,22 +1,22 @@
-"""The sums over the readings of every half cycle, and the small systems they make.
-
-Compiled to be kept, as `kernels.py`. Matrices of all half cycles stand one below the other:
-row p of half cycle k is row ``k * size + p``.
-"""
+"""The sums over the readings of every half cycle, and the small systems they make."""
 
 from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from pendpipe.analysis.turning_points.kernels import kernel, solve_in_place
+from pendpipe.analysis.turning_points.loops import solve_in_place
 from pendpipe.analysis.turning_points.shape import HARMONICS
-from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.dynamics.views import matrix
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
+
+BLOCK = 256
+"""Readings that are worked on at a time."""
+ROWS = 5 + HARMONICS
+"""Of a block: 1, the shape, the sine, the odd harmonics; the cosine; and the readings."""
+_COSINE, _READING = ROWS - 2, ROWS - 1
 
 
-@njit(inline="always", _nrt=False)  # type: ignore[call-overload]
+@kernel(inline=True)
 def cosine_sine(phase: float) -> tuple[float, float]:
     """Cosine and sine for |phase| < 2, to 1e-9: fast, since no range is reduced."""
     square = phase * phase
@@ -40,57 +40,52 @@ def cosine_sine(phase: float) -> tuple[float, float]:
     return cosine, sine
 
 
-def _plain_sums(
+@kernel(any_order=True)
+def _fill(
     time_s: FloatArray,
     values: FloatArray,
     stride: int,
-    edges: IntArray,
-    centre_s: FloatArray,
-    rate: FloatArray,
+    rate: float,
+    centre_s: float,
     level: float,
     shape: FloatArray,
-    gram: FloatArray,
-    right: FloatArray,
-    square: FloatArray,
-) -> None:
-    """As `half_cycle_sums` without harmonics: a loop that compilers turn into vectors."""
-    for k in range(len(centre_s)):
-        friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
-        w, centre = rate[k], centre_s[k]
-        n, f1, s1, ff, fs, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        x0, xf, xs, xx = 0.0, 0.0, 0.0, 0.0
-        for i in range(edges[2 * k], edges[2 * k + 1], stride):
-            phase = w * (time_s[i] - centre)
-            cosine, sine = cosine_sine(phase)
-            lack = 1.0 - cosine
-            side = 1.0 if phase > 0.0 else -1.0
-            form = (
-                cosine
-                + (side * friction - friction2) * lack
-                + viscous * (sine - phase * cosine)
-                + viscous2 * phase * (0.5 * phase * cosine - sine)
-            )
-            x = values[i] - level
-            n += 1.0
-            f1 += form
-            s1 += sine
-            ff += form * form
-            fs += form * sine
-            ss += sine * sine
-            x0 += x
-            xf += x * form
-            xs += x * sine
-            xx += x * x
-        j = 3 * k
-        gram[j, 0], gram[j + 1, 1], gram[j + 2, 2] = n, ff, ss
-        gram[j, 1] = gram[j + 1, 0] = f1
-        gram[j, 2] = gram[j + 2, 0] = s1
-        gram[j + 1, 2] = gram[j + 2, 1] = fs
-        right[k, 0], right[k, 1], right[k, 2] = x0, xf, xs
-        square[k] = xx
+    harmonics: int,
+    block: Matrix,
+) -> int:
+    """Fill the rows of a block of readings; return how many there are."""
+    friction, viscous, friction2, viscous2 = shape[0], shape[1], shape[2], shape[3]
+    ones, forms, sines = block[0], block[1], block[2]
+    cosines, readings = block[_COSINE], block[_READING]
+    count: int = min((time_s.size + stride - 1) // stride, block.shape[1])
+    for i in range(count):
+        phase = rate * (time_s[i * stride] - centre_s)
+        cosine, sine = cosine_sine(phase)
+        lack = 1.0 - cosine
+        ones[i], sines[i], cosines[i] = 1.0, sine, cosine
+        forms[i] = (
+            cosine
+            + (math.copysign(friction, phase) - friction2) * lack
+            + viscous * (sine - phase * cosine)
+            + viscous2 * phase * (0.5 * phase * cosine - sine)
+        )
+        readings[i] = values[i * stride] - level
+    for m in range(harmonics):
+        # cos(n + 2) = 2 cos(2) cos(n) - cos(n - 2), n times the phase
+        before, now = block[1 + m if m > 1 else _COSINE], block[2 + m if m > 0 else _COSINE]
+        new, share = block[3 + m], shape[4 + m]
+        for i in range(count):
+            new[i] = (4.0 * cosines[i] * cosines[i] - 2.0) * now[i] - before[i]
+            forms[i] += share * new[i]
+    return count
 
 
-plain_sums = kernel(_plain_sums, fastmath=True)
+@kernel(any_order=True)
+def _product(one: FloatArray, other: FloatArray, count: int) -> float:
+    """Return the sum of products of the first `count`."""
+    total = 0.0
+    for i in range(count):
+        total += one[i] * other[i]
+    return total
 
 
 @kernel
@@ -98,97 +93,113 @@ def half_cycle_sums(
     time_s: FloatArray,
     values: FloatArray,
     stride: int,
-    edges: IntArray,
+    edges: IntMatrix,
     centre_s: FloatArray,
     rate: FloatArray,
     level: float,
-    shape: FloatArray,
-    free: int,
-    gram: FloatArray,
-    right: FloatArray,
+    shape: Matrix,
+    harmonics: int,
+    gram: Stack,
+    right: Matrix,
     square: FloatArray,
-    basis: FloatArray,
+    block: Matrix,
 ) -> None:
     """Normal equations of every half cycle: level, amplitude, sine, free odd harmonics.
 
     Parameters
     ----------
-    time_s, values, stride, edges, centre_s, rate, level, shape, free
-        See `compiled.half_cycle_sums`; the edges one after the other.
+    time_s, values, stride
+        Readings, shape (n,), of which every `stride`-th is used.
+    edges
+        First sample and the one after the last of each half cycle, shape (k, 2).
+    centre_s, rate
+        Time of the turning point and phase per second, shape (k,).
+    level
+        What is taken off the readings first.
+    shape
+        Coefficients of the half cycle's shape (see `shape.py`), shape (k, 4 + HARMONICS).
+    harmonics
+        How many odd harmonics the shape has; the first of them are fitted besides, where `gram`
+        has room for more than three terms.
     gram, right, square
-        To be added to: sums of products, with the readings, and of the readings' squares.
-    basis
-        Room for 3 + `free` numbers.
+        To be added to: sums of products, shape (k, terms, terms), with the readings, (k, terms),
+        and of the readings' squares, (k,).
+    block
+        Room, shape (ROWS, BLOCK).
     """
-    number, size = len(centre_s), 3 + free
-    for k in range(number):
-        friction, viscous, friction2, viscous2 = shape[k, 0], shape[k, 1], shape[k, 2], shape[k, 3]
-        for i in range(edges[2 * k], edges[2 * k + 1], stride):
-            phase = rate[k] * (time_s[i] - centre_s[k])
-            cosine, sine = cosine_sine(phase)
-            lack = 1.0 - cosine
-            form = cosine - friction2 * lack + viscous * (sine - phase * cosine)
-            form += math.copysign(friction, phase) * lack
-            form += viscous2 * phase * (0.5 * phase * cosine - sine)
-            before, now = cosine, cosine
-            twice = 2.0 * (2.0 * cosine * cosine - 1.0)
-            for m in range(HARMONICS):
-                before, now = now, twice * now - before
-                form += shape[k, 4 + m] * now
-                if m < free:
-                    basis[3 + m] = now
-            basis[0] = 1.0
-            basis[1] = form
-            basis[2] = sine
-            x = values[i] - level
-            square[k] += x * x
-            for p in range(size):
-                right[k, p] += basis[p] * x
+    terms = right.shape[1]
+    for k in range(centre_s.size):
+        first, last = edges[k, 0], edges[k, 1]
+        while first < last:
+            count = _fill(
+                time_s[first:last],
+                values[first:last],
+                stride,
+                rate[k],
+                centre_s[k],
+                level,
+                shape[k],
+                harmonics,
+                block,
+            )
+            readings = block[_READING]
+            for p in range(terms):
+                right[k, p] += _product(block[p], readings, count)
                 for q in range(p + 1):
-                    gram[k * size + p, q] += basis[p] * basis[q]
-        for p in range(size):
+                    gram[k, p, q] += _product(block[p], block[q], count)
+            square[k] += _product(readings, readings, count)
+            first += count * stride
+        for p in range(terms):
             for q in range(p):
-                gram[k * size + q, p] = gram[k * size + p, q]
+                gram[k, q, p] = gram[k, p, q]
 
 
 @kernel
 def solve_half_cycles(
-    gram: FloatArray, right: FloatArray, prior: FloatArray,
-    solution: FloatArray, inverse: FloatArray, work: FloatArray,
-) -> None:  # fmt: skip
+    gram: Stack,
+    right: Matrix,
+    prior: FloatArray,
+    solution: Stack,
+    inverse: Stack,
+    system: Matrix,
+    column: FloatArray,
+) -> None:
     """Solve each half cycle for amplitude, sine and harmonics at a given level.
 
     Parameters
     ----------
-    gram, right, prior
-        See `compiled.solve_half_cycles`.
-    solution, inverse
-        To be filled, but for half cycles without samples.
-    work
+    gram, right
+        From `half_cycle_sums`; row 0 is the level.
+    prior
+        Added to the sine's diagonal (an inverse variance about zero, over the noise's).
+    solution
+        To be filled, but for half cycles without samples: shape (k, size, 2), for a level that
+        is right, and minus the change per unit of level.
+    inverse
+        Likewise: the inverse of the reduced Gram matrix, (k, size, size).
+    system, column
         Room for a matrix and a column.
     """
-    size = right.shape[1] - 1
-    system, column = matrix(work, size, size), work[size * size : size * size + size]
-    for k in range(len(prior)):
-        first = k * (size + 1)
-        if gram[first, 0] == 0.0:
+    size = column.size
+    for k in range(prior.size):
+        if gram[k, 0, 0] == 0.0:
             continue
         for job in range(size + 2):
             for p in range(size):
                 for q in range(size):
-                    system[p, q] = gram[first + 1 + p, 1 + q]
+                    system[p, q] = gram[k, 1 + p, 1 + q]
                 if job == 0:
                     column[p] = right[k, 1 + p]
                 elif job == 1:
-                    column[p] = gram[first + 1 + p, 0]
+                    column[p] = gram[k, 1 + p, 0]
                 else:
                     column[p] = 1.0 if p == job - 2 else 0.0
                 # A hair of regularisation: few samples can't tell harmonics apart.
                 system[p, p] *= 1.0 + 1e-9
             system[1, 1] += prior[k] + 1e-12
-            solve_in_place(system, column)
+            solve_in_place(system, column, size)
             for p in range(size):
                 if job < 2:
-                    solution[k * size + p, job] = column[p]
+                    solution[k, p, job] = column[p]
                 else:
-                    inverse[k * size + p, job - 2] = column[p]
+                    inverse[k, p, job - 2] = column[p]

@@ -9,14 +9,16 @@ turning is made up for by turning the result, cos(p + q) = cos p cos q - sin p s
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from numba import njit
+import numpy as np
 
-from pendpipe.analysis.turning_points.shape import LANES, LEVEL_BLOCK
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.views import matrix
+from pendpipe.dynamics.kernel import Matrix, kernel
 
+LEVEL_BLOCK = 256
+"""Half cycles over which level and period are one number each."""
+_LANES = 16
+"""Tables are filled up with zeros to a multiple of this."""
 _BATCH = 8
 """Half cycles that are measured where the loop expects them, before it looks where they were.
 
@@ -29,11 +31,10 @@ _CLEAR = 8.0
 """Standard deviations by which an amplitude must stand out for its phase to be used."""
 _SAMPLED = 16
 """Every how many-th half cycle tells the noise."""
-_KEPT: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 
 
-@njit(**_KEPT, fastmath=True)
-def _products(piece: FloatArray, tables: FloatArray, level: float) -> tuple[float, float, float]:
+@kernel(any_order=True)
+def _products(piece: FloatArray, tables: Matrix, level: float) -> tuple[float, float, float]:
     """Sums of readings less level times each of the tables."""
     even, odd, rest = 0.0, 0.0, 0.0
     cosine, sine, rests = tables[0], tables[1], tables[2]
@@ -45,7 +46,7 @@ def _products(piece: FloatArray, tables: FloatArray, level: float) -> tuple[floa
     return even, odd, rest
 
 
-@njit(**_KEPT, fastmath=True)
+@kernel(any_order=True)
 def _squares(piece: FloatArray, level: float) -> float:
     """Sum of the squares of readings less level."""
     total = 0.0
@@ -54,27 +55,32 @@ def _squares(piece: FloatArray, level: float) -> float:
     return total
 
 
-@njit(**_KEPT, fastmath=True)
+@kernel(any_order=True)
 def _fit_batch(
-    values: FloatArray, first: float, period: float, reach: int, step: float,
-    tables: FloatArray, level: float, found: FloatArray,
-) -> int:  # fmt: skip
+    values: FloatArray,
+    first: float,
+    period: float,
+    reach: int,
+    step: float,
+    tables: Matrix,
+    level: float,
+    count: int,
+    found: Matrix,
+) -> int:
     """Fit the half cycles expected at the readings `first`, `first` + `period`, ...
 
-    Fills `found` with factors of cosine and sine about the expected turning, and the sum of
-    what they leave, a column each; returns how many lie among the readings.
+    Fills `count` columns of `found` with factors of cosine and sine about the expected turning,
+    and the sum of what they leave; returns how many lie among the readings.
     """
-    number, length = 2 * reach + 1, tables.shape[1]
-    for j in range(found.shape[1]):
+    number, length = 2 * reach + 1, _length(reach)
+    for j in range(count):
         at = first + j * period
         middle = math.floor(at + 0.5)
         lo = middle - reach
         if lo < 0 or lo + number > values.size:
             return j
-        if lo + length <= values.size:
-            even, odd, rest = _products(values[lo : lo + length], tables, level)
-        else:
-            even, odd, rest = _products(values[lo : lo + number], tables[:, :number], level)
+        last = lo + length if lo + length <= values.size else lo + number
+        even, odd, rest = _products(values[lo:last], tables, level)
         phase = (middle - at) * step
         square = phase * phase
         cosine = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
@@ -82,11 +88,17 @@ def _fit_batch(
         found[0, j] = even * cosine - odd * sine
         found[1, j] = even * sine + odd * cosine
         found[2, j] = rest
-    return int(found.shape[1])
+    return count
 
 
-@njit(**_KEPT)
-def _fill_tables(reach: int, step: float, tables: FloatArray) -> tuple[float, float, float]:
+@kernel
+def _length(reach: int) -> int:
+    """Return how many numbers of a table are used: a loop over them has no rest."""
+    return (2 * reach + _LANES) // _LANES * _LANES
+
+
+@kernel
+def _fill_tables(reach: int, step: float, tables: Matrix) -> tuple[float, float, float]:
     """Write the weights of the readings from -reach to reach about a turning, `step` apart.
 
     Rows of `tables`: for the cosine's factor, the sine's, and the sum of what they leave.
@@ -98,12 +110,12 @@ def _fill_tables(reach: int, step: float, tables: FloatArray) -> tuple[float, fl
     """
     number = 2 * reach + 1
     flat, even, odd = 0.0, 0.0, 0.0
-    for i in range(tables.shape[1]):
+    for i in range(_length(reach)):
         cosine = math.cos((i - reach) * step) if i < number else 0.0
         sine = math.sin((i - reach) * step) if i < number else 0.0
         tables[0, i], tables[1, i] = cosine, sine
         flat, even, odd = flat + cosine, even + cosine * cosine, odd + sine * sine
-    for i in range(tables.shape[1]):
+    for i in range(_length(reach)):
         cosine = tables[0, i]
         tables[2, i] = 1.0 - cosine * (flat / even) if i < number else 0.0
         tables[0, i] = cosine / even
@@ -111,58 +123,78 @@ def _fill_tables(reach: int, step: float, tables: FloatArray) -> tuple[float, fl
     return flat, even, odd
 
 
-@njit(**_KEPT)
 def track(
-    values: FloatArray, start: FloatArray, columns: FloatArray, first: int, room: int,
-    result: FloatArray, work: FloatArray,
-) -> int:  # fmt: skip
-    """Fit half cycle after half cycle, each placed by those before it.
+    values: FloatArray, start: FloatArray, columns: Matrix, first: int, room: int
+) -> tuple[int, float, float]:
+    """Fit half cycle after half cycle of evenly spaced readings, each placed by those before it.
 
     Parameters
     ----------
     values
-        Readings, evenly spaced.
+        The readings.
     start
-        See `plain.track`: the time of the first reading and the interval; time of turning,
-        half period, side and level of the first half cycle; the noise; a, b, c.
+        Time of the first reading, interval; time of turning, half period, side (+1 above the
+        level) and level of the first half cycle; rms of one reading; a, b, c of Eq. 13, so
+        small that they shift times only (see `shape.py`).
     columns
         To be filled from column `first` on, `room` columns at most: time, its sd, signed
-        angle, its sd, level.
-    result
-        To be filled: sum of squares about some of the fits, and its degrees of freedom.
-    work
-        Room for the tables and a batch; the loop ends if the half period outgrows it.
+        angle, its sd, level; shape (5, n). The level is estimated anew every
+        `LEVEL_BLOCK` half cycles.
 
     Returns
     -------
-    int
+    count
         Half cycles measured: up to the end, or to where the lock is lost.
+    residual_square, freedom
+        Sum of squares about some of the fits, and its degrees of freedom.
     """
+    result = np.empty(2)
+    tables = np.empty((3, int(1.5 * start[3] / start[1]) + 2 * _LANES))
+    values = np.ascontiguousarray(values, dtype=np.float64)
+    count = _track(values, start, columns, first, room, result, np.empty((3, _BATCH)), tables)
+    return count, float(result[0]), float(result[1])
+
+
+@kernel
+def _track(
+    values: FloatArray,
+    start: FloatArray,
+    table: Matrix,
+    first: int,
+    room: int,
+    result: FloatArray,
+    found: Matrix,
+    tables: Matrix,
+) -> int:
+    """Do what `track` does; the loop ends if the half period outgrows its `tables`."""
     start_s, interval_s, centre_s, half_period_s = start[0], start[1], start[2], start[3]
     side, level, noise, rates = start[4], start[5], start[6], start[7:10]
-    table = columns[:, first : first + room]
-    count, residual, freedom = 0, 0.0, 0.0
+    end, count, residual, freedom = first + room, first, 0.0, 0.0
     period, locked = half_period_s, True
-    batch, rest = matrix(work, 3, _BATCH), work[3 * _BATCH :]
-    while locked and count < room:
+    while locked and count < end:
         w = math.pi / half_period_s
         reach = int(0.5 * (half_period_s / interval_s - 1.0))
         number = 2 * reach + 1
-        length = (number + LANES - 1) // LANES * LANES
-        if 3 * length > rest.size:
+        if _length(reach) > tables.shape[1]:
             break
-        tables = matrix(rest, 3, length)
         flat, even, odd = _fill_tables(reach, w * interval_s, tables)
         sd, late_sd = noise / math.sqrt(even), noise / (math.sqrt(odd) * w)
         second, in_time = noise * noise / odd, 1.0 / w
         score, block = 0.0, count
-        while locked and count < room and count - block < LEVEL_BLOCK:
-            found = batch[:, : min(_BATCH, room - count)]
+        while locked and count < end and count - block < LEVEL_BLOCK:
             at = (centre_s - start_s) / interval_s
             size = _fit_batch(
-                values, at, period / interval_s, reach, w * interval_s, tables, level, found
+                values,
+                at,
+                period / interval_s,
+                reach,
+                w * interval_s,
+                tables,
+                level,
+                min(_BATCH, end - count),
+                found,
             )
-            if size > 0 and count % _SAMPLED == 0:
+            if size > 0 and (count - first) % _SAMPLED == 0:
                 lo = math.floor(at + 0.5) - reach
                 residual += _squares(values[lo : lo + number], level)
                 # About the reading, where cosine and sine are orthogonal: turned back.
@@ -201,4 +233,4 @@ def track(
                 table[4, k] = level
         half_period_s = period
     result[0], result[1] = residual, freedom
-    return count
+    return count - first

@@ -1,14 +1,15 @@
-"""Numba's internals: arrays made of bare memory, and the engine's arrays as one value.
+"""All that is Numba's: how a kernel is compiled, and the engine's arrays as one value.
 
-Numba's own ways to them count references, and a tuple of two dozen arrays, each of seven
-numbers, takes the compiler most of a minute.
+A tuple of two dozen arrays, each of seven numbers, would take the compiler most of a minute.
 """
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
-from numba import types
+import numpy as np
+from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
@@ -20,7 +21,8 @@ from numba.extending import (
 )
 from numba.np import arrayobj
 
-from pendpipe.dynamics.layout import ADDRESSES, COUNTS, FIELDS, REQUEST
+from pendpipe.dynamics.kernel import KINDS, Kernel
+from pendpipe.dynamics.layout import ADDRESSES, COUNTS, FIELDS
 
 # Numba gives these no types.
 make_array: Any = arrayobj.make_array
@@ -30,44 +32,72 @@ unpacked: Any = cgutils.unpack_tuple
 lower_attributes: Any = lower_getattr_generic
 
 _ITEM = 8
-_INTEGERS = types.Array(types.int64, 1, "C")
+_OPTIONS: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
+"""No reference counts (which forbids to allocate), and no exceptions of division."""
 _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
+_NUMBERS: dict[Any, Any] = {
+    ctypes.c_int64: types.int64,
+    ctypes.c_double: types.float64,
+    None: types.void,
+}
+
+
+def dispatcher(kernel: Kernel) -> Any:
+    """Return a kernel as Numba's function, for other kernels: Python needs no entry to it."""
+    make: Any = njit
+    return make(**_OPTIONS, **kernel.options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(
+        kernel.function
+    )
+
+
+def compiled(kernel: Kernel) -> Any:
+    """Compile a kernel as a function of C: each array as its address and its shape."""
+    names, given, kinds = [], [], []
+    for number, annotation in enumerate(kernel.kinds):
+        kind, axes = KINDS[annotation]
+        if axes == 0:
+            names.append(f"x{number}")
+            given.append(f"x{number}")
+            kinds.append(_NUMBERS[kind])
+            continue
+        shape = [f"n{number}_{axis}" for axis in range(axes)]
+        names += [f"x{number}", *shape]
+        array = f"array_at(x{number}, ({', '.join(shape)},))"
+        given.append(f"gather(x{number})" if annotation == "Work" else array)
+        item: Any = types.float64 if kind == np.float64 else types.int64
+        kinds += [types.CPointer(item), *axes * [types.int64]]  # type: ignore[no-untyped-call]
+    scope = {"kernel": kernel, "array_at": array_at, "gather": gather}
+    text = f"def entry({', '.join(names)}):\n    return kernel({', '.join(given)})"
+    exec(text, scope)
+    make: Any = cfunc(_NUMBERS[kernel.returns](*kinds), **_OPTIONS)
+    return make(scope["entry"])
 
 
 def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
     """Make the array of a kind and shape whose numbers begin at `data`."""
     result = make_array(kind)(context, builder)
     item = context.get_constant(types.intp, _ITEM)
-    strides = [builder.mul(shape[1], item), item] if len(shape) == 2 else [item]
+    strides = [item]
+    for count in reversed(shape[1:]):
+        strides.insert(0, builder.mul(count, strides[0]))
     populate_array(
         result, data=data, shape=list(shape), strides=strides, itemsize=item, meminfo=None
     )
     return result._getvalue()
 
 
-def _vector(_typing: Any, pointer: Any, size: Any) -> Any:
-    """Return the array of `size` numbers at `pointer`."""
-    kind = _INTEGERS if pointer.dtype == types.int64 else _VECTOR
+def _array_at(_typing: Any, pointer: Any, shape: Any) -> Any:
+    """Return the array of a shape at `pointer` (`numba.carray` needs reference counts)."""
+    kind = types.Array(pointer.dtype, shape.count, "C")
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return _array(context, builder, kind, arguments[0], arguments[1:])
+        return _array(context, builder, kind, arguments[0], unpacked(builder, arguments[1]))
 
-    return kind(pointer, size), generate
-
-
-def _matrix(_typing: Any, numbers: Any, rows: Any, columns: Any) -> Any:
-    """Return the (rows, columns) array that begins where the array `numbers` begins."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        source = make_array(signature.args[0])(context, builder, arguments[0])
-        return _array(context, builder, _MATRIX, source.data, arguments[1:])
-
-    return _MATRIX(numbers, rows, columns), generate
+    return kind(pointer, shape), generate
 
 
-vector: Any = intrinsic(_vector)
-matrix: Any = intrinsic(_matrix)
+array_at: Any = intrinsic(_array_at)
 
 
 class _Work(types.Type):
@@ -123,20 +153,20 @@ def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
     return _array(context, builder, _VECTOR if field.rows is None else _MATRIX, data, shape)
 
 
-def _gather(_typing: Any, request: Any, counts: Any) -> Any:
-    """Return the `layout.Work` of a request and the counts that follow from it."""
+def _gather(_typing: Any, request: Any) -> Any:
+    """Return the `layout.Work` of a request: addresses of arrays, and counts."""
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         work = struct_proxy(_WORK)(context, builder)
-        for name in ADDRESSES:
-            place = context.get_constant(types.intp, REQUEST.index(name))
-            address = builder.load(builder.gep(arguments[0], [place]))
-            setattr(work, name, builder.inttoptr(address, context.get_value_type(_ADDRESS)))
-        for name, count in zip(COUNTS, unpacked(builder, arguments[1]), strict=True):
-            setattr(work, name, count)
+        for place, name in enumerate((*ADDRESSES, *COUNTS)):
+            offset = context.get_constant(types.intp, place)
+            number = builder.load(builder.gep(arguments[0], [offset]))
+            if name in ADDRESSES:
+                number = builder.inttoptr(number, context.get_value_type(_ADDRESS))
+            setattr(work, name, number)
         return work._getvalue()
 
-    return _WORK(request, counts), generate
+    return _WORK(request), generate
 
 
 gather: Any = intrinsic(_gather)

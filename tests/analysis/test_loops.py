@@ -1,21 +1,23 @@
-"""The kernels of the turning points: kept as machine code, and the same as plain Python's."""
+"""The loops of the turning points: kept as machine code, and right."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.analysis.turning_points import compiled, plain
+from pendpipe.analysis.turning_points.loops import (
+    count_half_cycles,
+    find_extremes,
+    smooth_times,
+)
 from pendpipe.analysis.turning_points.shape import HARMONICS
-
-FOLDER = Path(compiled.__file__).parent
+from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums, solve_half_cycles
 
 FIT = """
 import sys
@@ -43,7 +45,7 @@ print(len(points) > 30, "numba" in sys.modules, "scipy" in sys.modules)
 
 @pytest.mark.parametrize("code", [MEASURE, FIT], ids=["turning points", "waveform"])
 def test_a_new_process_measures_and_fits_without_numba(code: str) -> None:
-    compiled.count_half_cycles(np.arange(3.0), np.array([1, -1, 1]), np.zeros(3, dtype=np.int64))
+    exec(code, {})  # what it needs is compiled and kept
     run = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         capture_output=True, text=True, check=True,
@@ -51,23 +53,16 @@ def test_a_new_process_measures_and_fits_without_numba(code: str) -> None:
     assert run.stdout.split() == ["True", "False", "False"]
 
 
-def test_every_kept_source_is_watched() -> None:
-    """A source left out would keep its old code after a change."""
-    made_from = {
-        path.name
-        for path in FOLDER.glob("*.py")
-        if "@kernel" in path.read_text(encoding="utf-8") or path.name == "entries.py"
-    }
-    assert made_from <= set(compiled.SOURCES)
-    assert all((FOLDER / name).is_file() for name in compiled.SOURCES)
-
-
 @given(
-    st.integers(1, 12), st.integers(0, HARMONICS), st.booleans(), st.integers(1, 3),
+    st.integers(1, 12),
+    st.integers(0, HARMONICS),
+    st.booleans(),
+    st.integers(1, 3),
+    st.sampled_from([7, BLOCK]),
     st.integers(0, 2**32 - 1),
-)  # fmt: skip
+)
 def test_sums_and_solutions_are_those_of_least_squares(
-    half_cycles: int, free: int, shaped: bool, stride: int, seed: int
+    half_cycles: int, free: int, shaped: bool, stride: int, block_size: int, seed: int
 ) -> None:
     """Each half cycle's amplitude and sine are those of numpy's least squares."""
     random = np.random.default_rng(seed)
@@ -81,10 +76,25 @@ def test_sums_and_solutions_are_those_of_least_squares(
     bounds = np.searchsorted(time_s, np.arange(half_cycles + 1) - 0.5)
     edges = np.stack([bounds[:-1], bounds[1:]], axis=1)
     level = 0.2
-    gram, right, square = compiled.half_cycle_sums(
-        time_s, values, stride, edges, centre_s, rate, level, shape, free
+    gram, right = np.zeros((half_cycles, 3 + free, 3 + free)), np.zeros((half_cycles, 3 + free))
+    square, block = np.zeros(half_cycles), np.empty((ROWS, block_size))
+    harmonics = HARMONICS if shaped else free
+    half_cycle_sums(
+        time_s,
+        values,
+        stride,
+        edges,
+        centre_s,
+        rate,
+        level,
+        shape,
+        harmonics,
+        gram,
+        right,
+        square,
+        block,
     )
-    solution, _ = compiled.solve_half_cycles(gram, right, np.zeros(half_cycles))
+    solution, _ = solved(gram, right)
     for k in range(half_cycles):
         used = slice(edges[k, 0], edges[k, 1], stride)
         phase = rate[k] * (time_s[used] - centre_s[k])
@@ -105,9 +115,17 @@ def test_sums_and_solutions_are_those_of_least_squares(
             np.testing.assert_allclose(solution[k, :, 0], expected, rtol=1e-4, atol=1e-4)
 
 
+def solved(gram: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the normal equations of each half cycle, without prior knowledge."""
+    count, size = len(gram), right.shape[1] - 1
+    solution, inverse = np.full((count, size, 2), np.nan), np.full((count, size, size), np.nan)
+    room = np.empty((size, size)), np.empty(size)
+    solve_half_cycles(gram, right, np.zeros(count), solution, inverse, *room)
+    return solution, inverse
+
+
 def test_a_half_cycle_without_readings_has_no_solution() -> None:
-    gram, right = np.zeros((1, 3, 3)), np.zeros((1, 3))
-    solution, inverse = compiled.solve_half_cycles(gram, right, np.zeros(1))
+    solution, inverse = solved(np.zeros((1, 3, 3)), np.zeros((1, 3)))
     assert np.isnan(solution).all()
     assert np.isnan(inverse).all()
 
@@ -118,7 +136,7 @@ def test_extremes_of_a_cosine_are_where_it_turns(turns: int, stride: int, upside
     readings = 240
     phase = np.arange(turns * readings) * np.pi / readings
     values = np.cos(phase) if upside else -np.cos(phase)
-    index, first = compiled.extremes(values, stride, 0.3, 0.01)
+    index, first = find_extremes(values, 0.01, start=0.3, stride=stride)
     assert first == (1 if upside else -1)
     turning = np.arange(len(index)) * readings
     assert len(index) == turns
@@ -132,7 +150,8 @@ def test_half_cycles_lost_in_gaps_are_counted(steps: list[int], period: float) -
     number = np.concatenate([[0], np.cumsum(steps)])
     sign = 1 - 2 * (number % 2)
     gap = np.concatenate([[0], (np.array(steps) > 1).astype(int)])
-    counted, good = compiled.count_half_cycles(period * number, sign, gap)
+    counted = np.zeros(len(number), dtype=np.int64)
+    good = count_half_cycles(period * number, sign, gap, period, counted)
     assert good == len(number)
     assert counted.tolist() == number.tolist()
 
@@ -140,33 +159,27 @@ def test_half_cycles_lost_in_gaps_are_counted(steps: list[int], period: float) -
 @given(st.integers(8, 100), st.floats(0.1, 10.0), st.floats(-1e-4, 1e-4))
 def test_smoothing_leaves_a_parabola_alone(count: int, period: float, drift: float) -> None:
     """Times that are a parabola of their number are their own local parabola."""
-    number = np.arange(count, dtype=float)
+    number = np.arange(count)
     time_s = period * (number + drift * number**2)
-    centre, half_period = compiled.smooth_times(number, time_s, np.ones(count), 9.0, number)
+    centre, half_period = smooth_times(number, time_s, np.ones(count), 9.0, number)
     np.testing.assert_allclose(centre, time_s, rtol=1e-9, atol=1e-9 * period)
     np.testing.assert_allclose(half_period, period * (1.0 + 2.0 * drift * number), rtol=1e-7)
 
 
-def test_what_is_said_of_readings_is_what_numpy_says() -> None:
-    values = np.random.default_rng(3).standard_normal(5000)
-    assert plain.fourth_square(values) == pytest.approx(np.sum(np.diff(values, n=4) ** 2))
-    blocks = plain.block_squares(values, 7, 100)
-    starts = (len(values) - 100) * np.arange(7) // 6
-    expected = [np.mean(np.diff(values[s : s + 100], n=4) ** 2) for s in starts]
-    np.testing.assert_allclose(blocks, np.sort(expected))
-    assert plain.extent(values) == (True, values.min(), values.max())
-    for bad in (np.nan, np.inf, -np.inf):
-        assert plain.extent(np.append(values, bad)) == (False, values.min(), values.max())
-    clipped = np.clip(np.sin(np.arange(1000) * 0.05), -0.9, 0.9)
-    high = clipped == 0.9
-    runs = np.count_nonzero(np.diff(high.astype(int)) == 1) + int(high[0])
-    assert plain.stays(clipped, 0.9) == (np.count_nonzero(high), runs)
-
-
-def test_half_cycles_of_white_noise_scatter_as_it() -> None:
-    time_s = np.arange(60_000) * 0.01
-    noise = 0.3 * np.random.default_rng(4).standard_normal(len(time_s))
-    ratio, count = plain.half_cycle_scatter(np.arange(1.0, 599.0), time_s, noise)
-    assert count == 597
-    assert ratio == pytest.approx(0.3**2, rel=4.0 * np.sqrt(2.0 / 597))
-    assert plain.half_cycle_scatter(np.array([1.0, 2.0, 2.01, 3.0]), time_s, noise)[1] == 0
+@given(st.lists(st.integers(-6, 6), min_size=2, max_size=60))
+def test_extremes_by_a_fixed_threshold_are_those_of_the_definition(steps: list[int]) -> None:
+    """Between neighbours the readings go from one to the other, and no return exceeds it."""
+    values, least = np.cumsum(np.array(steps, dtype=float)), 3.0
+    index, first = find_extremes(values, least)
+    if len(index) == 0:
+        assert np.ptp(values) <= least
+        return
+    assert np.all(np.diff(index) > 0)
+    side = first * (1.0 - 2.0 * (np.arange(len(index)) % 2))
+    swing = -np.diff(values[index]) * side[:-1]
+    assert np.all(swing > least)
+    for start, stop, sign in zip(index[:-1], index[1:], -side[:-1], strict=True):
+        path = sign * values[start : stop + 1]
+        assert path.min() == path[0]
+        assert path.max() == path[-1]
+        assert np.max(np.maximum.accumulate(path) - path) <= least

@@ -1,0 +1,269 @@
+"""Loops as machine code: ``@kernel`` is all that a function needs.
+
+Numba compiles a kernel with those that it calls when it is first called from Python. The machine
+code is kept in a file and loaded by llvmlite alone in later processes: a job of the workflow is
+short, and importing Numba would take most of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import hashlib
+import os
+import sys
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar, overload
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_F = TypeVar("_F", bound="Callable[..., Any]")
+
+Matrix: TypeAlias = FloatArray
+Stack: TypeAlias = FloatArray
+IntMatrix: TypeAlias = IntArray
+
+KINDS: Final[dict[str, tuple[Any, int]]] = {
+    "FloatArray": (np.dtype(np.float64), 1),
+    "Matrix": (np.dtype(np.float64), 2),
+    "Stack": (np.dtype(np.float64), 3),
+    "IntArray": (np.dtype(np.int64), 1),
+    "IntMatrix": (np.dtype(np.int64), 2),
+    "Work": (np.dtype(np.int64), 1),
+    "float": (ctypes.c_double, 0),
+    "int": (ctypes.c_int64, 0),
+    "None": (None, 0),
+}
+"""What annotations mean: the type of an array's numbers and how many axes it has, or a number's."""
+
+SHIPPED: Final = Path(__file__).parent / "shipped"
+"""Machine code for many machines, made while the package is built (`setup.py`)."""
+
+
+@overload
+def kernel(function: _F) -> _F: ...
+@overload
+def kernel(*, any_order: bool = ..., inline: bool = ...) -> Callable[[_F], _F]: ...
+def kernel(function: Any = None, *, any_order: bool = False, inline: bool = False) -> Any:
+    """Declare a function of numbers and arrays that runs as machine code.
+
+    It allocates nothing and raises nothing: what it fills is given to it. Other kernels may
+    call it, and so may Python, if its annotations are among ``float``, ``int``, `FloatArray`
+    (one axis), `Matrix` (two), `Stack` (three), `IntArray` and `IntMatrix`. Arrays must be
+    contiguous.
+
+    Parameters
+    ----------
+    any_order
+        Its sums may be taken in any order; so the compiler can vectorise them.
+    inline
+        Compile it into its callers, where it is known what does not overlap.
+    """
+    if function is None:
+        return functools.partial(kernel, any_order=any_order, inline=inline)
+    # Multiplications and additions may be fused.
+    fastmath = {"contract", "reassoc", "nsz"} if any_order else {"contract"}
+    return Kernel(function, {"fastmath": fastmath, "forceinline": inline})
+
+
+class Kernel:
+    """A function that runs as machine code; made by `kernel`."""
+
+    __name__: str
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        self.function, self.options = function, options
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the machine code."""
+        words: list[Any] = []
+        for argument, name in zip(arguments, self.kinds, strict=True):
+            kind, axes = KINDS[name]
+            if axes == 0:
+                words.append(argument)
+                continue
+            if argument.dtype != kind or argument.ndim != axes or not argument.flags.c_contiguous:
+                message = f"{self.__name__} needs a contiguous array of {kind}, {axes} axes"
+                raise TypeError(message)
+            words.append(address(argument))
+            words += argument.shape
+        return self.machine_code(*words)
+
+    @cached_property
+    def kinds(self) -> list[str]:
+        """The arguments' annotations."""
+        noted = self.function.__annotations__
+        return [kind for name, kind in noted.items() if name != "return"]
+
+    @property
+    def returns(self) -> Any:
+        """The type of what is returned, None for nothing."""
+        return KINDS[self.function.__annotations__["return"]][0]
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Numba's own function, for the kernels that call this one."""
+        from pendpipe.dynamics import numba_side
+
+        return numba_side.dispatcher(self)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba takes this for where it stands in another kernel."""
+        return self.dispatcher._numba_type_
+
+    @cached_property
+    def machine_code(self) -> Any:
+        """The kept or newly compiled code, as a function of addresses and numbers."""
+        # It brings llvmlite, which who calls nothing compiled can do without.
+        from pendpipe.dynamics import machine_code
+
+        words = [
+            word
+            for kind, axes in (KINDS[name] for name in self.kinds)
+            for word in ((ctypes.c_void_p, *axes * [ctypes.c_int64]) if axes else (kind,))
+        ]
+        name = self.file_name()
+        for path in (*(folder / name for folder in folders()), SHIPPED / shipped_name(name)):
+            loaded = machine_code.load(path)
+            if loaded is not None:
+                break
+        else:
+            loaded = self._compiled(name)
+        found, self._owner = loaded
+        return ctypes.CFUNCTYPE(self.returns, *words)(found)
+
+    def _compiled(self, name: str) -> tuple[int, Any]:
+        """Compile, and keep the machine code."""
+        from pendpipe.dynamics import machine_code, numba_side
+
+        with _progress(self.__name__, len(self.parts())):
+            made = numba_side.compiled(self)
+        for folder in folders():
+            try:
+                machine_code.keep(folder / name, made.inspect_llvm(), made.native_name)
+            except OSError:
+                continue
+            self._remove_older(folder, name)
+            break
+        return made.address, made
+
+    def ship(self) -> None:
+        """Make the code for many machines, unless it is there."""
+        from pendpipe.dynamics import machine_code, numba_side
+
+        path = SHIPPED / shipped_name(self.file_name())
+        if path.exists() or not machine_code.can_be_portable():
+            return
+        made = numba_side.compiled(self)
+        machine_code.keep(path, made.inspect_llvm(), made.native_name, portable=True)
+        self._remove_older(SHIPPED, path.name)
+
+    def _remove_older(self, folder: Path, name: str) -> None:
+        """Remove the code of other sources."""
+        for old in folder.glob(f"{self.__name__}-*.bin"):
+            if old.name != name:
+                old.unlink(missing_ok=True)
+
+    def file_name(self) -> str:
+        """Return a name that changes with the sources, the constants and the machine."""
+        from pendpipe.dynamics import machine_code
+
+        paths = {Path(__file__).with_name(name) for name in ("layout.py", "numba_side.py")}
+        constants = []
+        for part in self.parts():
+            code, values = part.function.__code__, part.function.__globals__
+            paths.add(Path(code.co_filename))
+            for name in code.co_names:
+                if isinstance(values.get(name), int | float | tuple):
+                    constants.append(f"{name} {values[name]!r}")
+                elif isinstance(values.get(name), np.ndarray):
+                    # Their last digits are the processor's.
+                    rounded = np.round(1e6 * values[name]).astype(np.int64)
+                    constants.append(f"{name} {rounded.tolist()}")
+        text = b"".join(path.read_bytes() for path in sorted(paths))
+        machine = _digest(machine_code.platform().encode())
+        return f"{self.__name__}-{machine}-{_digest(text + ' '.join(constants).encode())}.bin"
+
+    def parts(self) -> list[Kernel]:
+        """Return this and all kernels that it calls."""
+        found = [self]
+        for part in found:
+            called = (
+                part.function.__globals__.get(name) for name in part.function.__code__.co_names
+            )
+            found += [each for each in called if isinstance(each, Kernel) and each not in found]
+        return found
+
+
+def address(array: FloatArray | IntArray) -> int:
+    """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
+    if array.size == 0:
+        return 0
+    if not array.flags.writeable:
+        return array.ctypes.data
+    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
+
+
+def folders() -> Iterator[Path]:
+    """Yield where the machine code may lie: as Numba's own cache, beside the source or at home."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        yield Path(os.environ["NUMBA_CACHE_DIR"])
+        return
+    yield Path(__file__).parent / "__pycache__"
+    with contextlib.suppress(RuntimeError):  # there is no home
+        home = Path.home() / ".cache"
+        yield (
+            Path(os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or home)
+            / "pendpipe"
+        )
+
+
+def _digest(text: bytes) -> str:
+    return hashlib.blake2b(text, digest_size=8).hexdigest()
+
+
+def shipped_name(name: str) -> str:
+    """Return the name of the code for many machines that belongs to one for this machine."""
+    stem, _, sources = name.rsplit("-", 2)
+    return f"{stem}-{sources}"
+
+
+@contextlib.contextmanager
+def _progress(name: str, functions: int) -> Iterator[None]:
+    """Show on a terminal how far the compiler is; elsewhere nothing."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from numba.core import event
+
+    register: Any = event.register
+    unregister: Any = event.unregister
+
+    class Listener(event.Listener):
+        done = 0
+
+        def on_start(self, event: Any) -> None:
+            pass
+
+        def on_end(self, event: Any) -> None:  # noqa: ARG002
+            self.done += 1
+            part = min(self.done / functions, 1.0)
+            bar = ("#" * round(20 * part)).ljust(20)
+            print(f"\rcompiling, once: [{bar}] {name}", end="", file=sys.stderr, flush=True)
+
+    listener = Listener()
+    register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        unregister("numba:compile", listener)
+        print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)

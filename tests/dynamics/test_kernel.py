@@ -1,0 +1,233 @@
+"""Machine code: kept, found again, renewed, and never trusted when damaged."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, machine_code
+from pendpipe.dynamics.kernel import SHIPPED, Kernel, Matrix, folders, kernel, shipped_name
+from pendpipe.dynamics.layout import ADDRESSES, FIELDS, counts, sums_size, work_size
+from pendpipe.dynamics.march import march
+
+FIRST_CALL = """
+import sys
+from pendpipe.dynamics import Eq8, Release, turning_points
+points = turning_points(Eq8(3.0, coulomb=1e-3), Release(0.0, 0.01))
+print(points.time_s.size, "numba" in sys.modules, "scipy" in sys.modules)
+"""
+
+NUMBA_AFTERWARDS = """
+import numpy as np
+from numba import njit
+
+@njit
+def third(x):
+    if x[0] == 0.0:
+        raise ValueError("zero")
+    return x[2]
+
+print(third(np.arange(1.0, 4.0)))
+try:
+    third(np.zeros(3))
+except ValueError as fault:
+    print(fault)
+"""
+
+
+def first_call(folder: Path, more: str = "") -> list[str]:
+    """Call the engine in a new process that keeps its code in `folder`."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder), "OPENBLAS_NUM_THREADS": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", FIRST_CALL + more],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return run.stdout.split()
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Path:
+    """Return a folder with the engine's machine code, compiled if need be."""
+    assert callable(march.machine_code)
+    name = march.file_name()
+    for path in (*(folder / name for folder in folders()), SHIPPED / shipped_name(name)):
+        if path.exists():
+            (tmp_path / name).write_bytes(path.read_bytes())
+            return tmp_path
+    pytest.skip("no folder to keep compiled code in")
+
+
+FACTOR = 3.0
+
+
+@kernel(inline=True)
+def scaled(x: float) -> float:
+    return FACTOR * math.sqrt(x)
+
+
+@kernel
+def fill(values: FloatArray, table: Matrix, offset: float, row: int) -> int:
+    for i in range(values.size):
+        table[row, i] = scaled(values[i]) + offset
+    return values.size
+
+
+def test_a_kernel_computes_what_its_python_would(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "new folder"))
+    table = np.zeros((3, 4))
+    assert anew(fill)(np.arange(4.0), table, 0.5, 1) == 4
+    np.testing.assert_array_equal(table[1], 3.0 * np.sqrt(np.arange(4.0)) + 0.5)
+    np.testing.assert_array_equal(table[[0, 2]], 0.0)
+    # The code that was kept, by a kernel that knows of no other.
+    monkeypatch.setattr(Kernel, "_compiled", lambda *_: pytest.fail("compiled"))
+    assert anew(fill)(np.full(4, 4.0), table, 0.0, 0) == 4
+    np.testing.assert_array_equal(table[0], 6.0)
+
+
+def anew(one: Kernel) -> Kernel:
+    """Return a kernel as a new process finds it."""
+    return Kernel(one.function, one.options)
+
+
+@pytest.mark.parametrize(
+    ("values", "table"),
+    [
+        (np.arange(4), np.zeros((3, 4))),
+        (np.arange(8.0)[::2], np.zeros((3, 4))),
+        (np.arange(4.0), np.zeros(4)),
+    ],
+    ids=["integers", "every second", "one axis for two"],
+)
+def test_an_array_of_another_kind_is_refused(values: np.ndarray, table: np.ndarray) -> None:
+    with pytest.raises(TypeError, match="contiguous array"):
+        fill(values, table, 0.0, 0)
+
+
+def test_a_new_process_runs_the_kept_code_without_numba(kept: Path) -> None:
+    assert first_call(kept) == ["11", "False", "False"]
+
+
+def test_numba_works_in_a_process_that_has_loaded_the_kept_code(kept: Path) -> None:
+    """What the kept code is linked with is named for the whole process; Numba finds it sound."""
+    assert first_call(kept, NUMBA_AFTERWARDS) == ["11", "False", "False", "3.0", "zero"]
+
+
+def test_damaged_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert callable(anew(fill).machine_code)
+    path = tmp_path / fill.file_name()
+    code = path.read_bytes()
+    assert machine_code.load(path) is not None
+    path.write_bytes(code[:-1] + bytes([code[-1] ^ 1]))
+    assert machine_code.load(path) is None
+    assert anew(fill)(np.arange(4.0), np.zeros((3, 4)), 0.0, 0) == 4
+    assert machine_code.load(path) is not None
+
+
+def test_shipped_code_runs_on_processors_that_can_and_is_left_alone_by_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not machine_code.can_be_portable():
+        pytest.skip("no code is shipped for this processor")
+    monkeypatch.setattr("pendpipe.dynamics.kernel.SHIPPED", tmp_path)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "empty"))
+    (tmp_path / "fill-older.bin").write_bytes(b"")
+    fill.ship()
+    assert [path.name for path in tmp_path.iterdir()] == [shipped_name(fill.file_name())]
+    with monkeypatch.context() as without:
+        without.setattr("pendpipe.dynamics.numba_side.compiled", lambda _: pytest.fail("compiled"))
+        fill.ship()
+        table = np.zeros((1, 1))
+        assert anew(fill)(np.array([4.0]), table, 0.0, 0) == 1
+        assert table[0, 0] == pytest.approx(6.0, rel=1e-15)
+    path = tmp_path / shipped_name(fill.file_name())
+    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_features", dict)
+    assert machine_code.load(path) is None
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{}", b"{}\n", b"\n\n", b"\xff\xfe\n", b'{"digest": 1}\nx']
+)
+def test_a_file_that_is_no_code_is_not_loaded(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "code").write_bytes(content)
+    assert machine_code.load(tmp_path / "code") is None
+
+
+def test_other_sources_and_constants_have_other_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = fill.file_name()
+    assert fill.parts() == [fill, scaled]
+    assert anew(fill).file_name() == before
+    with monkeypatch.context() as other:
+        other.setitem(globals(), "FACTOR", 4.0)
+        assert fill.file_name() != before
+    changed = tmp_path / "changed.py"
+    changed.write_bytes(Path(__file__).read_bytes() + b"\n")
+    code = scaled.function.__code__.replace(co_filename=str(changed))
+    monkeypatch.setattr(scaled.function, "__code__", code)
+    assert fill.file_name() != before
+
+
+def test_the_engine_is_made_of_the_kernels_that_it_calls() -> None:
+    """All of the engine's files but those that Python runs."""
+    files = {Path(part.function.__code__.co_filename).name for part in march.parts()}
+    assert {"panel.py", "table.py", "sensitivities.py", "comparison.py", "emission.py"} < files
+
+
+@pytest.mark.parametrize("directions", [0, 4])
+@pytest.mark.parametrize("samples", [0, 1, 1000])
+@pytest.mark.parametrize("end_s", [5.0, 100.0], ids=["half cycle by half cycle", "by a table"])
+@pytest.mark.parametrize("compared", [True, False])
+def test_the_engine_writes_only_where_it_may(
+    directions: int, samples: int, end_s: float, compared: bool
+) -> None:
+    # The engine works on bare memory: everything it gets is embedded in guards here.
+    guard = 100
+
+    def guarded(size: int) -> tuple[np.ndarray, int]:
+        array = np.full(size + 2 * guard, np.pi)
+        return array, array.ctypes.data + 8 * guard
+
+    model = Eq8(3.2, 0.4, 0.01, 0.02, 1e-4)
+    columns = directions + 4 if directions else 0
+    buffer, buffer_at = guarded(work_size(directions, samples))
+    inside = buffer[guard:]
+    inside[:12] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0, 0.1, end_s)
+    inside[FIELDS["rate"].offset :][:directions] = 0.1
+    derivatives = model.shape_derivatives()[:directions].ravel()
+    inside[FIELDS["directions"].offset :][: 4 * directions] = derivatives
+    time_s = np.linspace(0.0, end_s, samples)
+    angle, angle_at = guarded(samples)
+    jacobian, jacobian_at = guarded(0 if compared else columns * samples)
+    sums, sums_at = guarded(sums_size(columns))
+    readings = np.zeros(samples)
+    turning, turning_at = guarded((2 + 2 * columns) * 50)
+    places = {
+        "workspace": buffer_at,
+        "time_s": time_s.ctypes.data,
+        "angle_rad": angle_at,
+        "jacobian": jacobian_at,
+        "turning": turning_at,
+        "readings": readings.ctypes.data,
+        "sums": sums_at,
+    }
+    most = 50 if samples == 0 else 2**60
+    request = [places[name] for name in ADDRESSES]
+    request += counts(directions, samples, samples if compared else 0, 50, most)
+    march(np.array(request))
+    for array in (buffer, angle, jacobian, turning, sums):
+        np.testing.assert_array_equal(array[:guard], np.pi)
+        np.testing.assert_array_equal(array[-guard:], np.pi)
