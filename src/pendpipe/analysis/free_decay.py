@@ -16,7 +16,8 @@ import numpy as np
 
 from pendpipe.analysis._decay_runs import Run, best_runs
 from pendpipe.analysis._stretches import Cut, stretches
-from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, noise_of, usual_half_period
+from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -77,12 +78,14 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     NotAnalysableError
         When there is no free decay of at least three half cycles: one line that says why.
     """
-    time, values = recording.time_s[recording.usable], recording.values[recording.usable]
+    usable = recording.usable
+    time, values = recording.time_s[usable], recording.values[usable]
     span = float(np.ptp(values)) if len(values) else 0.0
     if len(values) < 8 or span == 0:
         why = "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only"
         raise NotAnalysableError(place, why, "is this the right channel?")
-    least = max(6.0 * noise_of(values, recording.resolution), 1.6 * (recording.resolution or 0.0))
+    step = recording.resolution
+    least = max(6.5 * noise_rms(values, step, quieter=0.1), 1.6 * (step or 0.0))
     half_period = usual_half_period(time, values)
     if half_period is None or span < 3.0 * least:
         why = (

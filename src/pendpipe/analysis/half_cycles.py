@@ -48,20 +48,6 @@ class HalfCycles:
         return len(self.swing)
 
 
-def noise_of(values: FloatArray, resolution: float | None) -> float:
-    """Estimate the readings' noise from the quietest of twenty parts of the record.
-
-    The third difference of neighbours (which a smooth motion passes by) over sqrt(20), by
-    its median; never below the step over sqrt(12).
-    """
-    floor = (resolution or 0.0) / np.sqrt(12.0)
-    if len(values) < 80:
-        return float(floor)
-    third = np.abs(np.diff(values, 3))
-    parts = np.array_split(third, 20)
-    return float(max(floor, min(float(np.median(part)) for part in parts) / 0.6745 / np.sqrt(20.0)))
-
-
 def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) -> IntArray:
     """Take out swings that are small beside both neighbours.
 

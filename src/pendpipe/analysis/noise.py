@@ -59,13 +59,14 @@ def _middle(ascending: FloatArray) -> float:
     return 0.5 * float(ascending[half] + ascending[-1 - half])
 
 
-def noise_rms(values: FloatArray, step: float | None = None) -> float:
+def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float = 0.5) -> float:
     """Estimate the noise of evenly spaced readings, never below step/sqrt(12).
 
     Fourth differences: a motion with n samples in a half cycle leaks into them by
     (pi/n)^4 of its amplitude, white noise keeps its size. The median over blocks leaves
-    glitches out. Where the readings rest on one step the differences vanish, so the
-    rounding error bounds the estimate from below.
+    glitches out; the quietest tenth also what shakes the sensor for most of the time. Where
+    the readings rest on one step the differences vanish, so the rounding error bounds the
+    estimate from below.
 
     Parameters
     ----------
@@ -73,6 +74,8 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
         Readings, shape (n,), or what a fitted model leaves of them.
     step
         The step between neighbouring readings, where known.
+    quieter
+        The share of blocks that are quieter than the estimate.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def noise_rms(values: FloatArray, step: float | None = None) -> float:
     starts = (len(values) - length) * np.arange(number) // max(number - 1, 1)
     blocks = values[starts[:, None] + np.arange(length)]
     squares = np.mean(_fourth_differences(blocks) ** 2, axis=1)
-    return max(floor, math.sqrt(float(np.median(squares)) / _GAIN))
+    return max(floor, math.sqrt(float(np.quantile(squares, quieter)) / _GAIN))
 
 
 def white_rms(residual: FloatArray) -> float:
