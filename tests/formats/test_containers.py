@@ -49,7 +49,7 @@ def test_a_matrix_with_time_in_front_and_a_rate_beside_no_time(tmp_path: Path) -
 def test_matlab_73_and_junk_are_refused_clearly(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     path.write_bytes(b"MATLAB 7.3 MAT-file, Platform" + b" " * 200)
-    with pytest.raises(InputError, match="-v7"):
+    with pytest.raises(InputError, match="hdf5 file can't be read"):
         read(path)
     savemat(path, {"t": TIME, "theta": ANGLE})
     path.write_bytes(path.read_bytes()[:1000])
@@ -111,5 +111,5 @@ def test_a_broken_archive_and_an_old_workbook_are_refused(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="archive can't be read"):
         read(path)
     path.write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600)
-    with pytest.raises(InputError, match="old Excel file"):
+    with pytest.raises(InputError, match="archive can't be read"):
         read(path, ReadOptions())

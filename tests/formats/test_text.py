@@ -240,7 +240,7 @@ def spoil(row: int, text: str) -> Callable[[list[str]], list[str]]:
         (spoil(1, "oops,0.4"), "line 2: 'oops' is no number"),
         (spoil(2, "restarted here"), "line 3: 'restarted here' is no number"),
         (spoil(7, "0.01,0.4"), "line 8: the time falls"),
-        (spoil(7, "0.12,inf"), "line 8: 1 reading(s) that are NaN or infinite"),
+        (spoil(7, "0.12,inf"), "line 8: 1 reading(s) that are infinite"),
         (spoil(7, "nan,0.4"), "line 8: the time is missing or NaN"),
         (spoil(800, "15.98,abc"), "line 801: 'abc' is no number"),
         (lambda lines: lines[:1], "no block of rows with numbers"),

@@ -23,6 +23,7 @@ _MOST_ROWS: Final = 1 << 20
 """What a sheet has, and no more."""
 _MOST_CELLS: Final = 1_000_000
 _WIDEST: Final = 1024
+_OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -35,8 +36,8 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     InputError
         When it is one that can't be read, or holds no table.
     """
-    if data[:8] == b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1":
-        raise InputError(place, "this is an old Excel file (.xls)", "save it as .xlsx or CSV")
+    if data.startswith(_OLD_EXCEL):
+        return _of_workbook(place, data, options)
     if not data.startswith(b"PK"):
         raise NotThisFormatError("the file is no zip archive")
     with _one_line_errors(place), zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -109,16 +110,8 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
 
 def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the sheet with most numbers as the text that it would export."""
-    import warnings
-
-    from openpyxl import load_workbook
-
     with _one_line_errors(place):
-        _refuse_too_many_cells(data)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            book = load_workbook(io.BytesIO(data), read_only=True, data_only=True)
-            sheets = {sheet.title: _rows(sheet) for sheet in book if hasattr(sheet, "values")}
+        sheets = dict(_old_sheets(data) if data.startswith(_OLD_EXCEL) else _sheets(data))
     numbers = {
         title: sum(_is_number(cell) for row in rows for cell in row)
         for title, rows in sheets.items()
@@ -139,6 +132,42 @@ def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
     others = [title for title, count in numbers.items() if title != best and count]
     note = f"sheet '{best}'" + (f" (not {', '.join(others)})" if others else "")
     return replace(table, notes=(note, *table.notes[1:]))
+
+
+def _sheets(data: bytes) -> Iterator[tuple[str, list[Any]]]:
+    """Give the rows of each sheet of a workbook."""
+    import warnings
+
+    from openpyxl import load_workbook
+
+    _refuse_too_many_cells(data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for sheet in load_workbook(io.BytesIO(data), read_only=True, data_only=True):
+            if hasattr(sheet, "values"):
+                yield sheet.title, _rows(sheet)
+
+
+def _old_sheets(data: bytes) -> Iterator[tuple[str, list[Any]]]:
+    """Give the rows of each sheet of an old workbook (.xls), as phyphox writes it."""
+    import xlrd
+
+    with xlrd.open_workbook(file_contents=data, logfile=io.StringIO()) as book:
+        for sheet in book.sheets():
+            yield (
+                sheet.name,
+                [
+                    [
+                        xlrd.xldate_as_datetime(cell.value, book.datemode)
+                        if cell.ctype == xlrd.XL_CELL_DATE
+                        else cell.value
+                        if cell.value != ""
+                        else None
+                        for cell in row
+                    ]
+                    for row in sheet.get_rows()
+                ],
+            )
 
 
 def _refuse_too_many_cells(data: bytes) -> None:

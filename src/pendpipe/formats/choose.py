@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -73,6 +73,10 @@ def listed(names: Sequence[str], most: int = 12) -> str:
 def meaning(column: Column) -> Role:
     """Say what a column holds, by its name and, where that is silent, by its unit."""
     role: Role = role_of(column.name) if column.name else "unknown"
+    # Of "field.header.stamp" the last part counts, unless it is one letter ("acc.x").
+    last = column.name.rpartition(".")[2]
+    if len(last) > 2 and last != column.name and role_of(last) != "unknown":
+        role = role_of(last)
     unit = unit_of(column.unit) if column.unit else None
     if unit is None or role == "none":
         return role
@@ -259,7 +263,7 @@ def _of_one_run(
     if end is None:
         return channels, ""
     mine = [c for c in channels if time.number < c.number < end]
-    if not mine:
+    if not any(_WORTH[roles[c.number]] > 0.5 for c in mine):
         return channels, ""
     wanted = [c.number - time.number for c in mine]
     others = [c.label for c in channels if any(c.number - number in wanted for number in clocks)]
@@ -382,8 +386,7 @@ def _like_units(slope: float | None) -> bool:
 def _moves(column: Column) -> bool:
     """Leave out columns that stand still, or are mostly empty."""
     finite = column.values[np.isfinite(column.values)]
-    filled = len(column.values) - (0 if column.blank is None else int(column.blank.sum()))
-    enough = max(2, filled // 2, min(50, len(column.values) // 2))
+    enough = max(2, min(50, len(column.values) // 2))
     return len(finite) >= enough and bool(finite.max() > finite.min())
 
 
@@ -394,12 +397,37 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
         (named[a], named[b]) for a, b in (("x", "y"), ("px", "py")) if a in named and b in named
     ]
     silent = [column for column in columns if not column.name]
+    if not pairs:
+        pairs = _bob_from_pivot(columns)
     if not pairs and len(silent) >= 2:
         pairs = [(silent[0], silent[1])]
     for x, y in pairs:
         if _on_a_circle(x.values, y.values, named=bool(x.name)):
             return x, y
     return None
+
+
+def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
+    """Of two tracked points give the place of the one that moves, seen from the other."""
+    points: dict[str, dict[str, Column]] = {}
+    for column in columns:
+        axis = re.fullmatch(r"([xy])[\s_]*(.+)|(.+?)[\s_.]*([xy])", column.name.lower())
+        if axis is not None:
+            point = points.setdefault(axis[2] or axis[3], {})
+            point[axis[1] or axis[4]] = column
+    both = [point for point in points.values() if len(point) == 2]
+    if len(both) != 2:
+        return []
+    pivot, bob = sorted(both, key=lambda point: float(np.nanstd(point["x"].values)))
+    x, y = (
+        replace(
+            bob[axis],
+            name=f"{bob[axis].name} - {pivot[axis].name}",
+            values=bob[axis].values - pivot[axis].values,
+        )
+        for axis in "xy"
+    )
+    return [(x, y)]
 
 
 def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:

@@ -19,9 +19,15 @@ _RATE_WORD: Final = re.compile(
 )
 _INTERVAL_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(interval|period|time|step)|\bdt\b|delta[\s_]*t\b|time[\s_]*step"
-    r"|abtast(zeit|intervall)|\bts\b|\bdelta_x\b",
+    r"|abtast(zeit|intervall)|\bts\b|\bdelta_x\b|\binterval|increment|\btinc\b",
     re.I,
 )
+_SAMPLING: Final = re.compile(
+    r"\b(sampl\w*|abtastung|aufzeichnung|acquisition|logging|échantillonnage|muestreo"
+    r"|campionamento)\s*[:=@]",
+    re.I,
+)
+"""``Sampling: 50 Hz``, ``sampling: 20 ms``: the unit alone tells which it is."""
 _VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]*)", re.I)
 
 
@@ -72,7 +78,8 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     bare = line.strip().lstrip("".join(COMMENT)).strip()
     own = [layout.split(line), layout.split(bare)]
     yield from (cells for cells in own if len(cells) == layout.width)
-    if layout.width > 1 and not any(map(layout.is_number, layout.split(bare))):
+    told = ": " in bare  # a remark, unless the rows' own sign splits it
+    if layout.width > 1 and not told and not any(map(layout.is_number, layout.split(bare))):
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
         joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
         for cells in (
@@ -163,7 +170,7 @@ def _refuse_damaged_rows(
 def _interval(lines: Sequence[str]) -> float | None:
     """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
     for line, follower in zip(lines, [*lines, ""][1:], strict=True):
-        for words, inverse in ((_RATE_WORD, True), (_INTERVAL_WORD, False)):
+        for words, inverse in ((_RATE_WORD, True), (_INTERVAL_WORD, False), (_SAMPLING, None)):
             found = words.search(line)
             if found is None:
                 continue
@@ -176,7 +183,11 @@ def _interval(lines: Sequence[str]) -> float | None:
             if value is None:
                 continue
             number = float(value[1].replace(",", "."))
-            unit = (value[2] or "").lower() or line[found.end() : found.end() + 8].lower()
+            unit = value[2].lower() or line[found.end() : found.end() + 8].lower()
+            if inverse is None:
+                inverse = any(word in unit for word in ("hz", "s/s", "sps", "fps"))
+                if not inverse and unit not in ("s", "ms", "us", "µs"):
+                    continue
             if not 1e-9 < number < 1e12:
                 continue
             if inverse:

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError
@@ -29,12 +29,27 @@ _NAMES: Final = {
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DELIMITERS: Final = ("\t", ";", "|", ",", " ")
 COMMENT: Final = ("#", "%", "//", "!")
+_IN_A_ROW: Final = 4
+"""So many rows follow one another where the samples begin; a header has fewer."""
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
-BLANK_CELLS: Final = frozenset(
-    ("", "-", "--", "na", "n/a", "#n/a", "#nv", "null", "none", "nan", "#value!", '""', "?", "*")
+_BLANK: Final = re.compile(
+    r'|""|[-*]{1,4}|--[.:]--|n/?a|#n/a|#nv|null|none|nan|#value!|\?|ol|over(load|flow|range)?'
+    r"|missing|invalid|err|error",
+    re.I,
 )
+"""What programs write where they have no reading."""
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+
+
+_GROUPED: Final = {
+    decimal: re.compile(
+        rf"[+-]?\d{{1,3}}(([{group}]\d{{3}})+[{decimal}]\d*|([{group}]\d{{3}}){{2,}}"
+        rf"|(['’ ]\d{{3}})+([{decimal}]\d*)?)"
+    )
+    for decimal, group in ((".", ","), (",", "."))
+}
+"""Numbers with signs between their thousands; ``1,234`` alone is none, it may be 1.234."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +81,16 @@ class Layout:
 
     def is_number(self, cell: str) -> bool:
         """Say whether a cell is a number in this layout."""
+        cell = self.ungrouped(cell)
         if self.decimal == ",":
             cell = "x" if "." in cell else cell.replace(",", ".")
         return _NUMBER.fullmatch(cell) is not None
+
+    def ungrouped(self, cell: str) -> str:
+        """Take the signs between thousands out of ``1,234.5``, ``1.234,5`` and ``1'234``."""
+        if _GROUPED[self.decimal].fullmatch(cell) is None:
+            return cell
+        return re.sub(r"['’ ,]" if self.decimal == "." else r"['’ .]", "", cell)
 
     @property
     def description(self) -> str:
@@ -76,6 +98,11 @@ class Layout:
         between = _SIGN_WORDS.get(self.delimiter, repr(self.delimiter))
         cells = f"columns separated by {between}" if self.width > 1 else "one column"
         return cells + (", decimal commas" if self.decimal == "," else "")
+
+
+def is_blank(cell: str) -> bool:
+    """Say whether a cell stands for no reading."""
+    return _BLANK.fullmatch(cell) is not None
 
 
 def is_comment(line: str) -> bool:
@@ -140,7 +167,7 @@ def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
             elif _DATE.fullmatch(cell) or (":" in cell and _CLOCK.fullmatch(cell.lstrip("'"))):
                 found += 1
             else:
-                blank += cell.lower() in BLANK_CELLS
+                blank += is_blank(cell)
         total += found / max(width - blank, 1)
     return total / len(rows), width, sum(count > len(rows) / 2 for count in numbers)
 
@@ -172,35 +199,42 @@ def _wanted_decimals(options: ReadOptions) -> tuple[str, ...]:
     return (sign,)
 
 
+def is_text(cell: str, layout: Layout) -> bool:
+    """Say whether a cell is neither a number, nor a time, nor empty."""
+    known = layout.is_number(cell) or is_blank(cell)
+    return not known and not _DATE.fullmatch(cell) and not _CLOCK.fullmatch(cell)
+
+
 def first_row(lines: Sequence[str], layout: Layout) -> int:
     """Find the first line of the block of numbers.
 
-    It has the usual width and at least half of its filled cells are numbers; the next row
-    has numbers in the same cells (a lone row of numbers, or a title that ends in one, belongs
-    to the header).
+    It has the usual width and at least half of its filled cells are numbers; so have the next
+    rows, in the same cells (a few rows of numbers, or a title that ends in one, belong to the
+    header).
     """
-    held: int | None = None
-    above: list[str] = []
+    above: list[tuple[int, list[str]]] = []
     first: int | None = None
     for place, line in enumerate(lines):
         if not line.strip() or is_comment(line):
             continue
-        fits = _is_row(line, layout)
-        cells = layout.split(line) if fits else []
-        if fits and first is None:
+        cells = layout.split(line) if _is_row(line, layout) else []
+        if cells and first is None:
             first = place
-        if fits and held is not None and not _is_title(above, cells, layout):
-            return held
-        held, above = (place, cells) if fits else (None, [])
+        if not cells or (above and _is_title(above[-1][1], cells, layout)):
+            above = []
+        if cells:
+            above.append((place, cells))
+        if len(above) == _IN_A_ROW:
+            return above[0][0]
     if first is None:
         raise NotThisFormatError("no row of numbers was found")
-    return first
+    return above[0][0] if above else first
 
 
 def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> bool:
     """Say whether a row has words where the next one has a number or a time of day."""
     return any(
-        not any(map(str.isdigit, word)) and word.lower() not in BLANK_CELLS
+        not any(map(str.isdigit, word)) and not is_blank(word)
         for word, cell in zip(above, cells, strict=True)
         if any(map(str.isdigit, cell)) and not layout.is_number(word)
     )
@@ -210,7 +244,7 @@ def _is_row(line: str, layout: Layout) -> bool:
     cells = layout.split(line)
     if len(cells) != layout.width:
         return False
-    filled = [cell for cell in cells if cell.lower() not in BLANK_CELLS]
+    filled = [cell for cell in cells if not is_blank(cell)]
     numbers = sum(map(layout.is_number, filled))
     dates = sum(bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in filled)
     return numbers > 0 and 2 * (numbers + dates) >= len(filled)
@@ -230,7 +264,10 @@ def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
 
 
 _DATE: Final = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
-_WITH_UNIT: Final = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]\S{0,5})")
+_WITH_UNIT: Final = re.compile(
+    r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(?![eEdD][+-]?\d)([^\d\s.+-]\S{0,5})"
+)
+"""``12.3°``; but ``5.9E-01`` is a number, not 5.9 of the unit E-01."""
 
 
 @dataclass(frozen=True)
@@ -239,8 +276,8 @@ class Numbers:
 
     Parameters
     ----------
-    values, blank
-        The numbers (NaN where there is none), and which cells are empty; shape (n,).
+    values
+        Shape (n,); NaN where a cell is empty or no number.
     fault
         Row and text of the first cell that is neither empty nor a number.
     unit
@@ -248,27 +285,21 @@ class Numbers:
     """
 
     values: FloatArray
-    blank: BoolArray
     fault: tuple[int, str] | None = None
     unit: str = ""
 
 
 def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
     """Turn one column into numbers."""
+    cells = [layout.ungrouped(cell) for cell in cells]
     if layout.decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]
-    blank = np.array([cell.lower() in BLANK_CELLS for cell in cells], dtype=bool)
-    if not blank.any():
-        try:
-            return Numbers(np.array(cells, dtype=np.float64), blank)
-        except ValueError:
-            pass
-    filled = np.flatnonzero(~blank).tolist()
+    filled = [row for row, cell in enumerate(cells) if not is_blank(cell)]
     matches = [_WITH_UNIT.fullmatch(cells[row]) for row in filled[:2]]
     if matches and all(matches):
         bare = _without_unit(cells, filled)
         if bare is not None:
-            return Numbers(bare[0], blank, None, bare[1])
+            return Numbers(bare[0], None, bare[1])
     values = np.full(len(cells), np.nan)
     fault = None
     for row in filled:
@@ -277,7 +308,7 @@ def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
         except ValueError:
             if fault is None:
                 fault = (row, cells[row])
-    return Numbers(values, blank, fault)
+    return Numbers(values, fault)
 
 
 def _without_unit(cells: Sequence[str], filled: Sequence[int]) -> tuple[FloatArray, str] | None:

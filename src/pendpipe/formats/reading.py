@@ -28,6 +28,18 @@ _ANYTHING: Final = ReadOptions()
 _LARGEST: Final = 1 << 30
 """Bytes of a file; a day at 1 kHz is 1.7e8 of WinDaq's."""
 
+_OTHERS: Final = (
+    (b"TDSm", "a TDMS file of LabVIEW", "export it as text or .xlsx"),
+    (b"%PDF", "a PDF", "give the table as CSV or .xlsx"),
+    (b"\x89PNG", "a picture", "give the table as CSV or .xlsx"),
+    (b"\xff\xd8\xff", "a picture", "give the table as CSV or .xlsx"),
+    (b"\x1f\x8b", "a file packed with gzip", "unpack it"),
+    (b"7z\xbc\xaf", "a 7z archive", "unpack it"),
+    (b"Rar!", "a RAR archive", "unpack it"),
+    (b"SQLite format 3", "a database", "export its table as CSV"),
+)
+"""What some give that holds no table, or none that is read; by its first bytes."""
+
 Reader = Callable[[Path, bytes, ReadOptions], Table]
 
 
@@ -43,6 +55,9 @@ def readers() -> Iterator[tuple[str, Reader]]:
     from pendpipe.formats import matlab
 
     yield "MATLAB", matlab.read_table
+    from pendpipe.formats import trees
+
+    yield "named arrays", trees.read_table
     from pendpipe.formats import archives
 
     yield "zip archive", archives.read_table
@@ -147,6 +162,9 @@ def _refuse_size(place: Path, size: int) -> None:
 
 def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Try the readers in turn."""
+    for mark, what, remedy in _OTHERS:
+        if data.startswith(mark):
+            raise InputError(place, f"this is {what}", remedy)
     reason: NotThisFormatError | None = None
     for _, reader in readers():
         try:
@@ -168,7 +186,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     base = time_base(table, choice, options)
     found = converted(table, choice, base, options)
     values = found.values[base.rows]
-    quality = _quality(table, choice, values, base)
+    quality = _quality(table, values, base)
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
     if quality is not None:
         notes.append(f"{np.sum(quality == MISSING)} row(s) without a reading, marked missing")
@@ -225,27 +243,17 @@ def _refuse_text(table: Table, choice: Choice) -> None:
             )
 
 
-def _quality(
-    table: Table,
-    choice: Choice,
-    values: np.ndarray[tuple[int], np.dtype[np.float64]],
-    base: TimeBase,
-) -> ByteArray | None:
-    """Mark rows with an empty cell as missing; a written NaN is a fault."""
-    blank: BoolArray = np.zeros(len(values), dtype=bool)
-    for column in choice.readings:
-        if column.blank is not None:
-            blank |= column.blank[base.rows]
-    odd = np.flatnonzero(~np.isfinite(values) & ~blank)
+def _quality(table: Table, values: FloatArray, base: TimeBase) -> ByteArray | None:
+    """Mark rows without a reading as missing; infinity is a fault."""
+    odd = np.flatnonzero(np.isinf(values))
     if odd.size:
         raise InputError(
             table.where(int(base.rows[odd[0]])),
-            f"{odd.size} reading(s) that are NaN or infinite",
+            f"{odd.size} reading(s) that are infinite",
             "drop the rows, or leave the cells blank",
         )
-    if not blank.any():
-        return None
-    return np.where(blank, MISSING, GOOD).astype(np.uint8)
+    missing = np.isnan(values)
+    return np.where(missing, MISSING, GOOD).astype(np.uint8) if missing.any() else None
 
 
 def _kept(table: Table) -> dict[str, str]:

@@ -89,7 +89,8 @@ def _unit(
                 "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
             )
         return _Guess(given)
-    written = unit_of(column.unit) if column.unit else None
+    # "second,Volt,Volt": some programs print the unit for a name.
+    written = unit_of(column.unit or (column.name if len(column.name) > 2 else ""))
     role = choice.roles.get(column.number, "unknown")
     if written is not None and written.kind in _QUANTITIES:
         if role == "velocity" and written.kind in ("angle", "length"):
@@ -116,6 +117,10 @@ def _unit(
         )
     if role == "volts":
         return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
+    names = {other.name.lower() for other in choice.channels if not other.unit}
+    if role == "length" and {"x", "y", "z"} <= names:
+        # A phone's sensor: of a position it knows nothing.
+        return _Guess(_UNKNOWN, "(one of x, y, z) has no unit: analysed in its own", weak=True)
     if role == "length":
         if reach <= 2.0:
             return _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.arrays import FloatArray, IntArray
 
 
 class NotThisFormatError(Exception):
@@ -31,9 +31,7 @@ class Column:
     name, unit
         As the file gives them; ``""`` where it does not.
     values
-        The numbers, shape (n,); NaN where there is none.
-    blank
-        Which cells are empty, shape (n,); ``None`` when none is.
+        The numbers, shape (n,); NaN where the file has none.
     fault
         Row and text of the first cell that should be a number and is not.
     number
@@ -50,7 +48,6 @@ class Column:
     unit: str
     values: FloatArray
     number: int
-    blank: BoolArray | None = None
     fault: tuple[int, str] | None = None
     time_s: FloatArray | None = None
     resolution: float | None = None

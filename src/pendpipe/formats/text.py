@@ -21,6 +21,7 @@ from pendpipe.formats.layout import (
     first_row,
     guess_layout,
     is_comment,
+    is_text,
 )
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
@@ -74,7 +75,10 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
-    lines = _without_labels(_without_arrows(_without_cassy_limits(text.split("\n"))))
+    lines = text.split("\n")
+    for form_of in (_without_cassy_limits, _without_arrows, _without_brackets, _without_panel):
+        lines = form_of(lines)
+    lines = _without_labels(lines)
     _refuse_long(place, lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
@@ -130,6 +134,31 @@ def _without_arrows(lines: list[str]) -> list[str]:
         return lines
     sign = next((sign for sign in "\t;," if sign in marked[len(marked) // 2]), " ")
     return [_ARROW.sub(lambda match: match[1] + sign, line, count=1) for line in lines]
+
+
+def _without_brackets(lines: list[str]) -> list[str]:
+    """Take off the brackets of rows that a program printed as lists: ``[0.02, 0.43]``."""
+    some = [line.strip() for line in lines[:100] if line.strip()]
+    if sum(bool(_LISTED.fullmatch(line)) for line in some) < 0.9 * len(some):
+        return lines
+    return [line.strip("[](){}, \t") for line in lines]
+
+
+_LISTED: Final = re.compile(r"[\[({][^\[\](){}]*\d[^\[\](){}]*[\])}],?")
+_PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
+
+
+def _without_panel(lines: list[str]) -> list[str]:
+    """Put above what Tektronix writes in three columns to the left of its first readings."""
+    if not lines[0].startswith(("Record Length,", '"Record Length",')):
+        return lines
+    rows = [_PANEL.fullmatch(line) for line in lines]
+    if any(row is None for row, line in zip(rows, lines, strict=True) if line.strip()):
+        return lines
+    told = {row[1].strip(): row[2].strip() for row in rows[:30] if row is not None}
+    across, up = told.get("Horizontal Units", "s"), told.get("Vertical Units", "V")
+    names = f"time ({across}),{told.get('Source', 'CH1')} ({up}),"
+    return [names, *(row[4] if row is not None else "" for row in rows)]
 
 
 def _without_labels(lines: list[str]) -> list[str]:
@@ -221,26 +250,41 @@ def _rows(
     lines: Sequence[str], first: int, layout: Layout
 ) -> tuple[list[str], IntArray, list[str]]:
     """Pick the rows of the block, with their line numbers; report what is left out."""
-    rows: list[str] = []
-    numbers: list[int] = []
-    remarks = 0
-    for number, line in enumerate(lines[first:], start=first + 1):
-        if not line or line.isspace():
-            continue
-        if is_comment(line):
-            remarks += 1
-            continue
-        rows.append(line)
-        numbers.append(number)
-    footer = 0
-    while rows and not any(map(layout.is_number, layout.split(rows[-1]))):
-        rows.pop()
-        numbers.pop()
-        footer += 1
-    notes = [f"{footer} line(s) of text after the last row left out"] if footer else []
-    if remarks:
-        notes.append(f"{remarks} comment line(s) between the rows left out")
-    return rows, np.array(numbers, dtype=np.int64), notes
+    kept = [
+        (number, line)
+        for number, line in enumerate(lines[first:], start=first + 1)
+        if line and not line.isspace()
+    ]
+    texts = [_text_of(line, layout) for _, line in kept]
+    # A line that begins with a word, beside one of words alone, belongs to a header.
+    remarks = [
+        whole or (begins and any(text[0] for text in texts[max(0, at - 1) : at + 2]))
+        for at, (whole, begins) in enumerate(texts)
+    ]
+    rows = [entry for entry, remark in zip(kept, remarks, strict=True) if not remark]
+    left = len(kept) - len(rows)
+    notes = [f"{left} line(s) of text below the first row left out"] if left else []
+    numbers = np.array([number for number, _ in rows], dtype=np.int64)
+    return [line for _, line in rows], numbers, notes
+
+
+def _text_of(line: str, layout: Layout) -> tuple[bool, bool]:
+    """Say whether a line is text, as loggers print between the rows; and whether it begins so.
+
+    A row with one cell that is no number is a row with a fault.
+    """
+    if _NO_TEXT.fullmatch(line):
+        return False, False
+    if is_comment(line):
+        return True, True
+    cells = [cell for cell in layout.split(line) if cell]
+    texts = [is_text(cell, layout) for cell in cells]
+    begins = bool(texts) and texts[0]
+    whole = begins and (all(texts) or len(layout.split(line)) != layout.width)
+    return whole, begins
+
+
+_NO_TEXT: Final = re.compile(r"[\s\d.,;:+\-eE|/\"']*")
 
 
 def _columns(
@@ -279,6 +323,5 @@ def _column(header: Header, place: int, values: FloatArray, found: Numbers | Non
         unit=unit or (found.unit if found is not None else ""),
         values=np.ascontiguousarray(values),
         number=place + 1,
-        blank=np.isnan(values) if np.isnan(values).any() else None,
         fault=found.fault if found is not None else None,
     )

@@ -21,6 +21,8 @@ _EPOCHS: Final = ((3e17, 1e-9, "nanoseconds"), (3e14, 1e-6, "microseconds"),
                   (3e11, 1e-3, "milliseconds"), (_EPOCH, 1.0, "seconds"))  # fmt: skip
 _LONGEST_S: Final = 300.0
 """Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
+_SHORTEST_S: Final = 5e-4
+"""Period below which it is hardly in seconds either."""
 
 
 @dataclass
@@ -87,10 +89,9 @@ def _from_column(
 ) -> TimeBase:
     """Read the times off a column."""
     filled = np.ones(len(column.values), dtype=bool)
-    if column.blank is not None and len(reading.values) == len(filled):
+    if len(reading.values) == len(filled):
         # Of runs side by side one is shorter.
-        empty = np.zeros(len(filled), dtype=bool) if reading.blank is None else reading.blank
-        filled &= ~(column.blank & (empty | ~np.isfinite(reading.values)))
+        filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
     _refuse_missing_times(table, column, filled)
     factor, note, weak = _unit(column, reading, options)
     rows = np.flatnonzero(filled)
@@ -154,6 +155,10 @@ def _unit_by_size(column: Column, reading: Column, values: FloatArray) -> tuple[
         seen = f"a period of {period:.4g}" if period else f"steps of {step:.4g}"
         note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
         return factor, note, True
+    if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
+        dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
+        note = f"'{column.label}' is taken to be in days, as spreadsheets count (--unit s: for s)"
+        return 86400.0, note, not dated
     note = f"'{column.label}' is taken to be in seconds"
     weak = whole or not 0.02 < period < 60.0
     if weak and period:
@@ -191,6 +196,7 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
         return base
     _drop_repeats(choice, base)
     _first_of_stacked(base)
+    _sorted(choice, base)
     steps = np.diff(base.time_s)
     if not len(steps) or steps.min() > 0:
         return base
@@ -239,6 +245,24 @@ def _first_of_stacked(base: TimeBase) -> None:
         " put each into a file of its own for the others"
     )
     base.time_s, base.rows = base.time_s[: starts[0]], base.rows[: starts[0]]
+
+
+def _sorted(choice: Choice, base: TimeBase) -> None:
+    """Sort rows that came out of order (threads, radio), where that makes the motion smooth."""
+    order = np.argsort(base.time_s, kind="stable")
+    steps = np.diff(base.time_s[order])
+    values = choice.readings[0].values if choice.readings else np.empty(0)
+    if np.all(np.diff(order) == 1) or len(values) <= base.rows.max(initial=0):
+        return
+    even = float(np.mean(np.abs(steps - np.median(steps)) <= 0.2 * np.median(steps)))
+    before, after = (
+        float(np.nansum(np.abs(np.diff(values[rows])))) for rows in (base.rows, base.rows[order])
+    )
+    if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
+        return
+    moved = int(np.sum(order != np.arange(len(order))))
+    base.notes.append(f"{moved} row(s) out of order: sorted by time")
+    base.time_s, base.rows = base.time_s[order], base.rows[order]
 
 
 def _rounded(time: FloatArray) -> FloatArray | None:

@@ -172,15 +172,16 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         r"|battery|duty|event|events|torque|moment|drive|driver|driving|motor|exciter|erreger"
         r"|anregung|forzante|forcing|excitation|excitador|func\s?gen\w*|generator|amplitude"
         r"|ampiezza|amplitud|einhüllende|envelope|phase|phasen\w*|fase|func|window|smooth\w*"
-        r"|filter(ed)?|covariance|correlation",
+        r"|filter(ed)?|covariance|correlation|tg ?f|magnitude|betrag|absolute(?! (ang|pos|win))",
     ),
-    ("acceleration", r"acc(el\w*)?|\w*acceleration|a(x|y|z)?|\w*beschleunigung|accelerazione"
+    ("acceleration", r"acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
+                     r"|\w*beschleunigung|accelerazione"
                      r"|aceleraci[oó]n|accélération|\w*_?ddot|ускорение|加速度|alpha_?dd"),
     (
         "velocity",
         r"angular (velocity|speed|rate)|winkelgeschw\w*|gyro\w*|omega\d?|ω\d?|\w*theta_?dot"
         r"|th_?dot|\w*phi_?dot|\w*alpha_?dot|d\s?theta|dphi|dth|vitesse angulaire"
-        r"|velocidad angular|velocit[aà] angolare|hoeksnelheid|w|rotation rate|\w*velocity"
+        r"|velocidad angular|velocit[aà] angolare|hoeksnelheid|w[xyz]?|rotation rate|\w*velocity"
         r"|\w*velocities|vel\w*|v(x|y|z)?|speed|\w*geschw\w*|vitesse|velocidad|velocit[aà]"
         r"|snelheid|\w*dot|derivative|\w*ableitung|deriv\w*|d\w+/dt|скорость|速度",
     ),
@@ -193,7 +194,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
     ),
     (
         "index",
-        r"frames?|bild|index|idx|samples?|n|no|nr|num|number|#|row|point|points|pt#|counter|trial"
+        r"frames?|seq|sequence|bild|index|idx|samples?|n|no|nr|num|number|#|row|point|points|pt#|counter|trial"
         r"|run|scan|id|record|zeile|schritt|step|campione|riga",
     ),
     (

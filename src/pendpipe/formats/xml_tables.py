@@ -60,7 +60,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa
         raise InputError(place, "the project holds no samples", "export the data as CSV")
     longest = max(len(values) for _, _, values in found)
     columns = tuple(
-        Column(title, unit, _filled(values, longest), number, _blank(values, longest))
+        Column(title, unit, _filled(values, longest), number)
         for number, (title, unit, values) in enumerate(found, start=1)
     )
     return Table(place=place, format=name, columns=columns)
@@ -69,11 +69,6 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa
 def _filled(values: FloatArray, length: int) -> FloatArray:
     """Runs side by side are of unlike length: the shorter end in empty cells."""
     return np.concatenate((values, np.full(length - len(values), np.nan)))
-
-
-def _blank(values: FloatArray, length: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]] | None:
-    missing = np.isnan(_filled(values, length))
-    return missing if missing.any() else None
 
 
 def _number(text: str | None) -> float:

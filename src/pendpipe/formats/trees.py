@@ -1,0 +1,270 @@
+"""Files of named arrays: HDF5 (and MATLAB 7.3), NumPy, JSON, sound; and MATLAB's own."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.formats.layout import column_of_clock_times
+from pendpipe.formats.options import ReadOptions
+from pendpipe.formats.swing import swing_of
+from pendpipe.formats.table import Column, NotThisFormatError, Table
+from pendpipe.formats.words import role_of, split_header
+
+_SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
+"""What a rate or an interval may be."""
+_RATES = ("fs", "samplerate", "sample_rate", "srate", "rate", "sampling_rate", "samplingrate")
+_INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat")
+_MOST: Final = 1 << 27
+"""Numbers that an array may hold."""
+_LARGEST_JSON: Final = 64 << 20
+_HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_AUDIO_HZ: Final = 4000.0
+"""Rate from which on a file of sound may hold a tone that the swing modulates."""
+_STRETCH_S: Final = 5e-3
+
+
+def table_of_tree(
+    place: Path, tree: Any, form: str, options: ReadOptions, units: Mapping[str, str] | None = None
+) -> Table:
+    """Make a table of the arrays of one length, with the names of what they are in.
+
+    Of several lengths the one is taken that the array the user named has, else the longest
+    that comes with a time.
+
+    Parameters
+    ----------
+    tree
+        Arrays in dictionaries, lists, and NumPy's records and arrays of objects.
+    form
+        The name that ``inspect`` prints.
+    units
+        What the file says of an array's unit, by the array's name.
+    """
+    arrays = dict(_numbers(tree))
+    columns = {name: values for name, values in arrays.items() if values.size > 3}
+    if not columns:
+        raise InputError(place, "there is no array of numbers in it", "save the time and the angle")
+    length = _length(columns, options)
+    left = [name for name, values in columns.items() if len(values) != length]
+    chosen = _one_clock({name: values for name, values in columns.items() if name not in left})
+    return Table(
+        place=place,
+        format=form,
+        columns=tuple(
+            Column(name, (units or {}).get(name) or split_header(_last(name))[1], values, number)
+            for number, (name, values) in enumerate(chosen.items(), start=1)
+        ),
+        interval_s=_interval(arrays),
+        notes=(f"arrays of another length left out: {', '.join(left[:8])}",) if left else (),
+    )
+
+
+def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, FloatArray]]:
+    """Walk through dictionaries, lists and structures; give every real array as columns."""
+    if depth > 12:
+        return
+    if isinstance(tree, dict):
+        for name, value in tree.items():
+            yield from _numbers(value, f"{path}.{name}" if path else str(name), depth + 1)
+        return
+    if isinstance(tree, list):
+        tree = _array_of_list(tree)
+    array = np.asarray(tree)
+    if array.dtype.names and array.size > 64:  # a table of records
+        yield from _numbers({name: array[name] for name in array.dtype.names}, path, depth + 1)
+        return
+    if array.dtype.names:
+        for number, record in enumerate(array.reshape(-1), start=1):
+            fields = {name: record[name] for name in array.dtype.names}
+            name = path if array.size == 1 else f"{path}({number})"
+            # Simulink's "structure with time" names a signal in its label.
+            label = fields.get("label")
+            if isinstance(label, str) and label.strip() and "values" in fields:
+                name, fields = label.strip(), {"values": fields["values"]}
+            yield from _numbers(fields, name, depth + 1)
+        return
+    if array.dtype == object:
+        for number, entry in enumerate(array.reshape(-1)[:64], start=1):
+            name = path if array.size == 1 else f"{path}({number})"
+            yield from _numbers(entry, name, depth + 1)
+        return
+    if array.dtype.kind not in "fiub" or array.ndim > 2 or not array.size:
+        return
+    # Simulink's "structure with time" keeps the readings in NAME.signals.values.
+    path = path.removesuffix(".signals.values").removesuffix(".values").removesuffix(".Data")
+    if array.ndim < 2:
+        yield path, np.atleast_1d(array).astype(np.float64)
+        return
+    tall = array if array.shape[0] >= array.shape[1] else array.T
+    if tall.shape[1] == 1:
+        yield path, np.ascontiguousarray(tall[:, 0], dtype=np.float64)
+    elif tall.shape[1] <= 64:
+        for number in range(tall.shape[1]):
+            yield f"{path}({number + 1})", np.ascontiguousarray(tall[:, number], dtype=np.float64)
+
+
+def _array_of_list(entries: list[Any]) -> Any:
+    """Turn JSON's list of records, of numbers with gaps, or of times of day into arrays."""
+    if entries and all(isinstance(entry, dict) for entry in entries):
+        return {name: [entry.get(name) for entry in entries] for name in entries[0]}
+    if entries and all(isinstance(entry, str) for entry in entries):
+        clock = column_of_clock_times(entries)
+        return np.empty(0) if clock is None else clock
+    try:
+        return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
+    except (ValueError, TypeError):
+        return np.array([*entries, None], dtype=object)[:-1]
+
+
+def _last(name: str) -> str:
+    """The last part of a dotted name, without a column's number."""
+    return name.rsplit(".", 1)[-1].split("(")[0]
+
+
+def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
+    for name, values in columns.items():
+        if options.reading_column in (name, _last(name)) or options.channel == name:
+            return len(values)
+    timed = [len(values) for name, values in columns.items() if role_of(_last(name)) == "time"]
+    paired = [n for n in timed if sum(len(values) == n for values in columns.values()) > 1]
+    return max(paired or [len(values) for values in columns.values()])
+
+
+def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Keep one of several equal time columns, and put it first."""
+    clocks: list[FloatArray] = []
+    first: dict[str, FloatArray] = {}
+    rest: dict[str, FloatArray] = {}
+    for name, values in columns.items():
+        if role_of(_last(name)) != "time":
+            rest[name] = values
+        elif not any(np.array_equal(values, clock) for clock in clocks):
+            clocks.append(values)
+            first[name] = values
+    return first | rest
+
+
+def _interval(arrays: dict[str, FloatArray]) -> float | None:
+    for name, values in arrays.items():
+        word = _last(name).lower()
+        if values.size != 1 or not _SLOWEST_HZ < values[0] < _FASTEST_HZ:
+            continue
+        if word in _RATES:
+            return float(1.0 / values[0])
+        if word in _INTERVALS:
+            return float(values[0])
+    return None
+
+
+def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read a file of HDF5, NumPy, JSON or sound (.wav).
+
+    Raises
+    ------
+    NotThisFormatError
+        When it is none of these.
+    InputError
+        When it is damaged, or holds no numbers.
+    """
+    for form, begins, reader in _FORMS:
+        if not begins(data):
+            continue
+        try:
+            return reader(place, data, form, options)
+        except (InputError, NotThisFormatError):
+            raise
+        except Exception as fault:  # each library raises whatever it stumbles on
+            reason = " ".join(str(fault).split())[:200]
+            raise InputError(
+                place, f"the {form} file can't be read ({reason})", "save it again, or export CSV"
+            ) from None
+    raise NotThisFormatError("the file is none of HDF5, NumPy, JSON, sound")
+
+
+def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    """Read the data sets of all groups, with the units among their attributes."""
+    import h5py
+
+    tree: dict[str, Any] = {}
+    units: dict[str, str] = {}
+
+    def gather(name: str, node: Any) -> None:
+        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.size > _MOST:
+            return
+        if node.dtype.kind in "fiub" or node.dtype.names:
+            path = name.replace("/", ".")
+            tree[path] = node[()]
+            unit = node.attrs.get("units", node.attrs.get("unit", ""))
+            units[path] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        file.visititems(gather)  # follows no link to another file
+    return table_of_tree(place, tree, form, options, units)
+
+
+def _of_numpy(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    loaded = np.load(io.BytesIO(data), allow_pickle=False)
+    tree = dict(loaded) if hasattr(loaded, "files") else loaded
+    return table_of_tree(place, tree, form, options)
+
+
+def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    """Read a document, or one record a line."""
+    if len(data) > _LARGEST_JSON:
+        raise InputError(place, f"the JSON holds more than {_LARGEST_JSON >> 20} MB", "export CSV")
+    text = data.decode("utf-8-sig", errors="replace")
+    try:
+        tree = json.loads(text)
+    except ValueError:
+        try:
+            tree = [json.loads(line) for line in text.splitlines() if line.strip()]
+        except (ValueError, RecursionError):
+            raise NotThisFormatError("it is no JSON") from None
+    return table_of_tree(place, tree, form, options)
+
+
+def _of_sound(place: Path, data: bytes, form: str, _options: ReadOptions) -> Table:
+    """Read the channels of a .wav, full scale as 1; a tone that a swing modulates by its strength.
+
+    A sound card passes no constant, so that some put the sensor's voltage on a tone.
+    """
+    from scipy.io import wavfile
+
+    rate: float
+    rate, samples = wavfile.read(io.BytesIO(data))
+    scale = {"i": float(np.iinfo(samples.dtype).max) + 1.0, "u": 128.0}.get(samples.dtype.kind, 1.0)
+    values = samples.reshape(len(samples), -1).astype(np.float64) / scale
+    notes: tuple[str, ...] = ()
+    stretch = round(_STRETCH_S * rate)
+    if rate >= _AUDIO_HZ and len(values) > 100 * stretch:
+        blocks = values[: len(values) // stretch * stretch].reshape(-1, stretch, values.shape[1])
+        strength = blocks.std(axis=1)
+        if strength.mean() > blocks.mean(axis=1).std() and swing_of(strength[:, 0]).clear:
+            values, rate = strength, rate / stretch
+            notes = (f"a tone whose strength swings: that, every {_STRETCH_S:g} s, is the reading",)
+    columns = tuple(
+        Column(f"channel {number}", "1", column, number)
+        for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
+    )
+    return Table(place, form, columns, interval_s=1.0 / rate, notes=notes)
+
+
+_Reader = Callable[[Path, bytes, str, ReadOptions], Table]
+_FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
+    ("hdf5", lambda data: _HDF5 in data[:1024] or data[:10] == b"MATLAB 7.3", _of_hdf5),
+    (
+        "numpy",
+        lambda data: data[:6] == b"\x93NUMPY" or (data[:2] == b"PK" and b".npy" in data[:128]),
+        _of_numpy,
+    ),
+    ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
+    ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),
+)
