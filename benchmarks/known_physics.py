@@ -1,0 +1,385 @@
+"""What is known of real recordings, and whether the library finds it.
+
+    python -m benchmarks.known_physics [--only NAME] [--limit SECONDS] [--journal FILE]
+
+`known_physics.tsv` lists the free decays of ../shared/recordings with what their README states
+(`known`), what was worked out by hand (`by_hand`), and names that would be wrong. `pendpipe fit`
+and `pendpipe diagnose` run on each with the path and the listed options alone. An item is found
+if one of its alternatives (split by `/`) is named, or belongs to the class of a named effect.
+
+Residuals are set beside the floor of the sensor, never beside a fitted spectrum: step/sqrt(12) for
+an encoder that is read at fixed times, else what polynomials of degree 5 leave of nine
+neighbouring rows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from statistics import median
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from benchmarks.null_families import ROOT, code_digest
+
+RECORDINGS: Final = ROOT.parent / "shared/recordings"
+TABLE: Final = Path(__file__).with_suffix(".tsv")
+ROWS, DEGREE = 9, 5
+FOLLOWED: Final = 0.1
+"""A model whose residual is a larger part of the reading's rms does not follow the motion."""
+Content = Mapping[str, Any]
+Array = NDArray[np.float64]
+
+
+# ---------------------------------------------------------------- what is asked
+
+
+class Answers:
+    """Both answers about one recording, as the commands print them."""
+
+    def __init__(self, fit: Content, diagnosis: Content) -> None:
+        self.fit, self.diagnosis = fit, diagnosis
+        self.content: Content = diagnosis.get("content", {})
+        self.effects: list[Content] = self.content.get("effects", [])
+        best = self.content.get("improved") or fit.get("content", {})
+        self.parameters: Content = (best or {}).get("parameters", {})
+
+    @property
+    def names(self) -> dict[str, float]:
+        """Effects that are named or in the class of one, with their greatest probability."""
+        found: dict[str, float] = {}
+        for effect in self.effects:
+            for each in (effect, *effect["indistinguishable_from"]):
+                found[each["id"]] = max(found.get(each["id"], 0.0), each["probability"])
+        return found
+
+    @property
+    def said(self) -> str:
+        """All words that were printed, those of the reader too."""
+        return " ".join(
+            [*self.content.get("warnings", []), self.content.get("statement", ""),
+             self.diagnosis.get("said", ""), self.fit.get("said", "")]
+        )  # fmt: skip
+
+    def between(self, name: str, low: float = -np.inf, high: float = np.inf) -> bool:
+        """Whether an interval of 95 % lies between two values."""
+        low95, high95 = self.parameters.get(name, {}).get("interval95") or (None, None)
+        return low95 is not None and high95 is not None and low < low95 and high95 < high
+
+    def value(self, name: str) -> float:
+        """Of a parameter of the law; not a number where there is none."""
+        found = self.parameters.get(name, {}).get("value")
+        return float("nan") if found is None else float(found)
+
+    @property
+    def quality_factor(self) -> float:
+        """At half of the first amplitude, by the law that was fitted."""
+        y = self.value("amplitude") / 2
+        loss = self.value("a") * y + self.value("b") + self.value("c") / y
+        return float(np.pi * self.value("frequency") / loss) if loss else float("inf")
+
+    def coefficient(self, effect: str, sign: float) -> bool:
+        """Whether an effect is named with a first coefficient of that sign."""
+        return any(
+            sign * float(next(iter(each["parameters"].values()))["value"] or 0.0) > 0
+            for each in self.effects
+            if each["id"] == effect
+        )
+
+
+def _below(answers: Answers, sign: float) -> bool:
+    found = answers.content.get("small_amplitudes")
+    return bool(found) and sign * found["frequency_excess"] > 0
+
+
+def _stiffness(answers: Answers, sign: float) -> bool:
+    """Whether the frequency grows (or falls) with the amplitude, by any torque that says so."""
+    named = ("cubic-stiffness", "amplitude-linear-stiffness")
+    other = {"unnamed-restoring", "keulegan-carpenter-drag", "frequency-drift"}
+    if sign < 0:
+        other |= {"presliding-friction"}
+    return any(answers.coefficient(each, sign) for each in named) or not other.isdisjoint(
+        answers.names
+    )
+
+
+SPRINGS: Final = (
+    *("presliding-friction", "cubic-stiffness", "amplitude-linear-stiffness"),
+    *("unnamed-restoring", "frequency-drift", "complex-modulus"),
+)
+BEATS: Final = ("second-mode", "tone-pickup", "plane-coupling", "periodic-drive")
+TESTS: Final[dict[str, Callable[[Answers], bool]]] = {
+    "a>0": lambda it: it.between("a", low=0) or "quadratic-drag" in it.names,
+    "b>0": lambda it: it.between("b", low=0),
+    "c>0": lambda it: it.between("c", low=0) or "coulomb-friction" in it.names,
+    "stiffer-below": lambda it: _below(it, 1) or "presliding-friction" in it.names,
+    "softer-below": lambda it: _below(it, -1) or "softer" in it.said,
+    "hardening": lambda it: _stiffness(it, 1),
+    "softens": lambda it: _stiffness(it, -1),
+    "spring-type": lambda it: not it.names.keys().isdisjoint(SPRINGS),
+    "beat": lambda it: "beating" in it.said or any(each in it.names for each in BEATS),
+    "wander": lambda it: "wanders" in it.said or "offset-drift" in it.names,
+    "offset": lambda it: it.between("offset", low=0) or it.between("offset", high=0),
+    "gap": lambda it: re.search(r"\bgaps?\b|missing|dropped", it.said) is not None,
+    "cut": lambda it: bool(it.fit.get("content", {}).get("cuts")) or it.diagnosis["status"] == 2,
+}  # fmt: skip
+"""Items that are no name of the catalogue."""
+
+
+def is_found(item: str, answers: Answers) -> bool:
+    """Whether one of the alternatives of an item is in the answers."""
+    for each in item.split("/"):
+        word, _, rest = each.partition(":")
+        bounds = [float(v) for v in rest.split(":")] if re.fullmatch(r"[\d.:]+", rest) else []
+        if word == "quality":
+            found = bounds[0] <= answers.quality_factor <= bounds[1]
+        elif word == "period":
+            found = bounds[0] <= 1 / (answers.value("frequency") or np.nan) <= bounds[1]
+        elif word in ("from", "until"):
+            at = answers.fit.get("kept_s", (np.nan, np.nan))[word == "until"]
+            found = bounds[0] <= at <= bounds[1]
+        elif word == "says":
+            found = rest in answers.said
+        elif word == "gap" and bounds:
+            found = (
+                re.search(rf"of {bounds[0]:.0f}\.\d* s|gap.{{0,40}}{rest}", answers.said)
+                is not None
+            )
+        elif word in TESTS:
+            found = TESTS[word](answers)
+        else:
+            found = word in answers.names
+        if found:
+            return True
+    return False
+
+
+# ---------------------------------------------------------------- what is measured
+
+
+def floor_of(time_s: Array, reading: Array) -> float:
+    """The noise of one reading: what a polynomial leaves of a few neighbours, most of the time.
+
+    Parameters
+    ----------
+    time_s, reading
+        Shape (n,); times need not be uniform.
+    """
+    starts = np.linspace(0, len(time_s) - ROWS, min(len(time_s) - ROWS, 2000)).astype(int)
+    left = []
+    for at in starts:
+        t, y = time_s[at : at + ROWS], reading[at : at + ROWS]
+        if np.ptp(y) > 0 and np.ptp(t) > 0:
+            powers = np.vander(2 * (t - t[0]) / np.ptp(t) - 1, DEGREE + 1)
+            fitted = powers @ np.linalg.lstsq(powers, y)[0]
+            left.append(float(np.sum((y - fitted) ** 2)))
+    return float(np.sqrt(np.median(left) / stats.chi2.median(ROWS - DEGREE - 1)))
+
+
+def residuals(content: Content, said: str) -> dict[str, float]:
+    """Residual at the start, with names alone, and with curves too, in rad (or the unit it has)."""
+    before, after = (content[key]["residual_rms_rad"] for key in ("baseline", "improved"))
+    curves = [each for each in content["effects"] if each["kind"] == "unnamed"]
+    counted = re.search(r"to (\d+) readings", said)
+    names = after
+    if curves and counted:
+        # A curve's gain in chi^2, in units of what is left, tells what is left without it.
+        left = content["improved"]["chi2_per_dof"] * int(counted.group(1))
+        names *= np.sqrt(1 + sum(max(0.0, each["delta_chi2"]) for each in curves) / left)
+    given = [each.get("residual_rms_rad") for each in content["effects"] if each not in curves]
+    if given and given[-1]:
+        names = given[-1]
+    return {"before": before, "names": min(names, before), "curve": after}
+
+
+def run(command: str, words: list[str], limit_s: float) -> dict[str, Any]:
+    """Run a command of the library; its status, its answer, what it said, its CPU seconds."""
+    before = getrusage(RUSAGE_CHILDREN)
+    call = [sys.executable, "-m", "pendpipe.cli", command, *words, "--json"]
+    try:
+        done = subprocess.run(call, capture_output=True, text=True, timeout=limit_s)
+        status, printed, said = done.returncode, done.stdout, done.stderr
+    except subprocess.TimeoutExpired:
+        status, printed, said = -1, "", f"not done in {limit_s:g} s"
+    after = getrusage(RUSAGE_CHILDREN)
+    try:
+        content = json.loads(printed)
+    except ValueError:
+        content = {}
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"status": status, "content": content, "said": said, "cpu_s": cpu_s}
+
+
+def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
+    """Both commands on one recording, and its sensor's floor."""
+    import pendpipe as pp
+
+    path, options = RECORDINGS / row["file"], row["options"].split()
+    words = [str(path), *options]
+    fit = run("fit", words, limit_s)
+    diagnosis = run("diagnose", [*words, "--no-figures"], limit_s)
+    names = [each.removeprefix("--") for each in options[::2]]
+    recording = pp.read(path, **dict(zip(names, options[1::2], strict=True)))
+    kept = slice(None)
+    try:
+        decay = pp.find_free_decay(recording)
+        fit["kept_s"] = decay.start_s, decay.stop_s
+        within = (recording.time_s >= decay.start_s) & (recording.time_s <= decay.stop_s)
+        kept = np.flatnonzero(within)
+    except pp.InputError:
+        pass
+    floor = floor_of(recording.time_s[kept], recording.values[kept])
+    if row["encoder_step"]:
+        floor = float(row["encoder_step"]) * 1e-3 / np.sqrt(12)
+    rms = float(np.std(recording.values[kept]))
+    return {"record": row["record"], "fit": fit, "diagnosis": diagnosis, "floor": floor, "rms": rms}
+
+
+# ---------------------------------------------------------------- the table
+
+
+def items(cell: str) -> list[str]:
+    """Of a cell of the table of facts."""
+    return [each.strip() for each in cell.split(";") if each.strip()]
+
+
+def judge(row: Mapping[str, str], kept: Mapping[str, Any]) -> dict[str, Any]:
+    """What one recording's answers are worth."""
+    answers = Answers(kept["fit"], kept["diagnosis"])
+    content, status = answers.content, kept["diagnosis"]["status"]
+    refused = content.get("reason") or (kept["diagnosis"]["said"].strip().splitlines() or [""])[-1]
+    judged: dict[str, Any] = {
+        "known": {each: is_found(each, answers) for each in items(row["known"])},
+        "by_hand": {each: is_found(each, answers) for each in items(row["by_hand"])},
+        "wrong": [each["id"] for each in answers.effects if each["id"] in row["wrong"].split("/")],
+        "answered": bool(answers.effects) or content.get("verdict") == "consistent",
+        "refused": "" if status in (0, 3) else refused,
+        "restoring": kept["fit"]["content"].get("restoring", "none"),
+        "cpu_s": (kept["fit"]["cpu_s"], kept["diagnosis"]["cpu_s"]),
+    }
+    if judged["answered"]:
+        left = residuals(content, kept["diagnosis"]["said"])
+        judged["over_floor"] = {key: value / kept["floor"] for key, value in left.items()}
+        judged["followed"] = left["curve"] < FOLLOWED * kept["rms"]
+        if row["hand_rms"]:
+            judged["over_hand"] = left["names"] / (float(row["hand_rms"]) * 1e-3)
+    return judged
+
+
+def line(row: Mapping[str, str], kept: Mapping[str, Any], judged: Mapping[str, Any]) -> str:
+    """One recording's row of the printed table."""
+    effects = Answers(kept["fit"], kept["diagnosis"]).effects
+    shown = "; ".join(f"{each['id']} {each['probability']:.2f}" for each in effects) or "nothing"
+    group = (
+        ", ".join(each["id"] for each in effects[0]["indistinguishable_from"]) if effects else ""
+    )
+    found, missed = (
+        [each for each, hit in judged["known"].items() if hit is wanted] for wanted in (True, False)
+    )
+    missed += [f"*wrong: {each}*" for each in judged["wrong"]]
+    if judged["answered"] and not judged["followed"]:
+        missed.append("**not followed**")
+    hand = [each for each, hit in judged["by_hand"].items() if hit]
+    over = judged.get("over_floor")
+    cells = [
+        row["record"],
+        shown if judged["answered"] else f"refused: {judged['refused'][:120]}",
+        group,
+        ", ".join(found),
+        ", ".join(missed),
+        f"{len(hand)} of {len(judged['by_hand'])}" if judged["by_hand"] else "",
+        *([f"{over[key]:.3g}" for key in ("before", "names", "curve")] if over else [""] * 3),
+        f"{judged['over_hand']:.2f}" if "over_hand" in judged else "",
+        judged["restoring"],
+        "{:.1f}, {:.1f}".format(*judged["cpu_s"]),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+HEAD: Final = (
+    "| record | named | class of the first | known: found | missed | by hand, found"
+    " | residual over floor: Eq. 8 | names | with curve | names over hand's | fit's torque"
+    " | CPU s: fit, diagnose |\n" + "|---" * 12 + "|"
+)
+
+
+def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
+    """What the rows come to."""
+    facts = [hit for _, each in judged for hit in each["known"].values()]
+    hand = [hit for _, each in judged for hit in each["by_hand"].values()]
+    free = [each for row, each in judged if row["answer"] == "free"]
+    driven = [each for row, each in judged if row["answer"] == "driven"]
+    sine = [(row, each) for row, each in judged if "circular-error" in items(row["known"])]
+    agree = sum(each["restoring"] == "sine" for _, each in sine)
+    over = [each["over_floor"] for each in free if "over_floor" in each]
+    ratio = [each["over_hand"] for each in free if "over_hand" in each]
+    cpu_s = [each["cpu_s"][1] for _, each in judged]
+    whole = sum(all(each["known"].values()) and not each["wrong"] for each in free)
+    lines = [
+        f"known: {sum(facts)} of {len(facts)} found ({sum(facts) / max(1, len(facts)):.0%});"
+        f" {whole} of {len(free)} recordings without a miss",
+        f"by hand: {sum(hand)} of {len(hand)} found",
+        f"wrong names: {sum(len(each['wrong']) for _, each in judged)}",
+        f"free decays not followed or refused: "
+        f"{sum(not each.get('followed', False) for each in free)} of {len(free)}",
+        f"driven and refused as such: {sum('driv' in each['refused'] for each in driven)}"
+        f" of {len(driven)}",
+        f"fit takes sin x where it is known: {agree} of {len(sine)}",
+        f"CPU of diagnose: median {median(cpu_s):.1f} s, largest {max(cpu_s):.1f} s",
+    ]
+    if over:
+        medians = [
+            f"{median(each[key] for each in over):.3g}" for key in ("before", "names", "curve")
+        ]
+        lines.append(f"median residual over floor: {', '.join(medians)} (Eq. 8, names, with curve)")
+    if ratio:
+        lines.append(
+            f"residual with names over that by hand: median {median(ratio):.2f},"
+            f" at most 1.2 in {sum(each <= 1.2 for each in ratio)} of {len(ratio)}"
+        )
+    return "\n".join(f"* {each}" for each in lines)
+
+
+def main() -> None:
+    """Ask what has not been asked yet of this code, and print a row a recording."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", action="append", default=[], help="part of a name; repeatable")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds a command")
+    parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/known_physics.jsonl")
+    arguments = parser.parse_args()
+    with TABLE.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream, delimiter="\t", quoting=csv.QUOTE_NONE))
+    wanted = arguments.only or [""]
+    rows = [row for row in rows if any(each in row["record"] for each in wanted)]
+    code, known = code_digest(), {}
+    arguments.journal.parent.mkdir(parents=True, exist_ok=True)
+    if arguments.journal.exists():
+        for text in arguments.journal.read_text("utf-8").splitlines():
+            kept = json.loads(text) if text.endswith("}") else {}
+            if kept.get("code") == code:
+                known[kept["record"]] = kept
+    print(HEAD, flush=True)
+    judged = []
+    for row in rows:
+        name = row["record"]
+        if name not in known:
+            known[name] = ask(row, arguments.limit)
+            with arguments.journal.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps(known[name] | {"code": code}) + "\n")
+        judged.append((row, judge(row, known[name])))
+        print(line(row, known[name], judged[-1][1]), flush=True)
+    print("", summary(judged), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
