@@ -194,12 +194,29 @@ def test_a_small_knock_and_a_wild_reading_stay(kick: float) -> None:
     assert found.stop_s > len(swing) / RATE - PERIOD
 
 
-def test_a_long_gap_parts_the_record() -> None:
-    swing = oscillation(0.5, 0.02, 1e-3, 60.0)
+def holed(swing: Floats, first: float, last: float) -> Recording:
     whole = recording([swing], noise=1e-3)
-    keep = (whole.time_s < 20) | (whole.time_s > 33)
-    found = find_free_decay(Recording(whole.time_s[keep], whole.values[keep], "angle_rad"))
-    assert found.stop_s <= 20.0 or found.start_s >= 33.0
+    keep = (whole.time_s < first) | (whole.time_s > last)
+    return Recording(whole.time_s[keep], whole.values[keep], "angle_rad")
+
+
+@pytest.mark.parametrize("last", [20.9, 23.4, 33.0])
+def test_a_decay_goes_on_behind_a_gap_whose_half_cycles_can_be_counted(last: float) -> None:
+    found = find_free_decay(holed(oscillation(0.5, 0.02, 1e-3, 60.0), 20.0, last))
+    assert found.start_s == 0.0
+    assert found.stop_s > 50.0
+    assert not [note for note in found.notes if "not used" in note]
+
+
+def test_a_gap_in_which_something_else_happened_parts_the_record() -> None:
+    swing = oscillation(0.5, 0.02, 1e-3, 60.0)
+    # Half a half cycle is lost, as where the clock stops with the recorder; or it is released anew.
+    late = np.concatenate([swing[:2400], swing[2431:]])
+    anew = np.concatenate([swing[:2400], 2.0 * swing[2400:]])
+    for values in (late, anew):
+        found = find_free_decay(holed(values, 20.0, 33.0))
+        assert found.stop_s <= 20.0 or found.start_s >= 33.0
+        assert any("is not used" in note for note in found.notes)
 
 
 def test_a_clamp_ends_the_decay_at_once() -> None:
@@ -274,3 +291,72 @@ def test_few_samples_a_cycle_hold_no_amplitude_up(
     assert found.start_s == 0.0
     assert found.stop_s == time[-1]
     assert not found.cuts
+
+
+@pytest.mark.parametrize("stiffer", [1.8, 4.0])
+def test_sides_that_differ_make_half_periods_alternate_and_stay(stiffer: float) -> None:
+    """A pendulum against a cushion: it is quicker on one side, by the root of its stiffness."""
+    time = np.arange(6000) / RATE
+    short = PERIOD / (1.0 + np.sqrt(stiffer))
+    long = PERIOD - short
+    cycle = time % PERIOD
+    above = cycle < long
+    phase = np.where(above, np.pi * cycle / long, np.pi * (cycle - long) / short)
+    values = np.where(above, np.sin(phase), -np.sin(phase) / np.sqrt(stiffer))
+    values = 0.3 * np.exp(-0.03 * time) * values
+    found = find_free_decay(recording([values], noise=1e-4))
+    assert found.start_s < PERIOD
+    assert found.half_cycles > 80
+
+
+def test_a_pendulum_that_goes_over_the_top_is_cut_there_and_so_it_is_said() -> None:
+    free = oscillation(2.5, 0.05, 5e-3, 40.0)
+    turning = np.linspace(-7.5 * np.pi, 0.0, 400)
+    hanging = np.linspace(0.0, 2.5, 40)
+    found = find_free_decay(recording([turning, hanging, free], noise=1e-3))
+    assert 4.0 <= found.start_s <= 4.4 + PERIOD
+    assert reasons(found)[0] == "it went over the top before it settled"
+    # A wheel that is wound up as far swings back as far: nothing was over the top.
+    wheel = [ramp(0.0, 9.0, 3.0), oscillation(9.0, 0.05, 5e-3, 40.0)]
+    assert reasons(find_free_decay(recording(wheel, noise=1e-3)))[0] == (
+        "moved by hand before release"
+    )
+
+
+def test_a_decay_in_loud_noise_is_seen_by_all_its_readings() -> None:
+    """8 % at Q = 1650, the amplitude 7.8 times the noise of a reading."""
+    time = np.arange(12000) / RATE
+    values = 0.1 * np.exp(-0.08 * time / time[-1]) * np.cos(OMEGA * time)
+    found = find_free_decay(recording([values], noise=0.1 / 7.8))
+    assert found.half_cycles > 180
+
+
+def test_a_decay_that_can_not_be_seen_is_called_too_slow_and_not_driven() -> None:
+    time = np.arange(3000) / RATE
+    values = 0.1 * np.exp(-1e-3 * time / time[-1]) * np.cos(OMEGA * time)
+    with pytest.raises(NotAnalysableError, match="too slow to be resolved") as caught:
+        find_free_decay(recording([values], noise=0.01))
+    assert "oscillation has no free decay" not in str(caught.value)
+
+
+def beat(losses: tuple[float, float], *, rest: bool) -> Recording:
+    time = np.arange(8000) / RATE
+    one, other = (
+        np.exp(-loss * time) * np.cos(omega * time)
+        for loss, omega in zip(losses, (OMEGA, 1.08 * OMEGA), strict=True)
+    )
+    return recording([0.3 * (one - other if rest else one + other)], noise=1e-3)
+
+
+@pytest.mark.parametrize("rest", [False, True])
+def test_two_modes_that_beat_are_a_decay_with_two_frequencies_and_losses(rest: bool) -> None:
+    found = find_free_decay(beat((0.02, 0.03), rest=rest))
+    assert found.half_cycles > 100
+    note = next(note for note in found.notes if note.startswith("two modes beat"))
+    assert "0.8000" in note or "0.79999" in note
+    assert "0.8640" in note or "0.86399" in note
+
+
+def test_a_mode_that_does_not_decay_is_a_drive() -> None:
+    with pytest.raises(NotAnalysableError, match="a drive holds the amplitude up"):
+        find_free_decay(beat((0.03, 0.0), rest=True))

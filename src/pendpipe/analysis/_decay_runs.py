@@ -123,7 +123,9 @@ def _regular(cycles: HalfCycles, run: Run) -> bool:
     swing = cycles.swing[run.first : run.last + 1]
     half = np.diff(cycles.middle_s[run.first : run.last + 1])
     blur = cycles.step / float(np.median(swing))
-    waver = float(np.median(np.abs(np.diff(half)))) / float(np.median(half))
+    # Where the sides differ, half cycles two apart are alike; of a few that says too little.
+    apart = 2 if len(half) > 6 else 1
+    waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
     kinks = float(np.median(np.abs(np.diff(swing, 2)))) / float(np.median(swing))
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
 
@@ -132,7 +134,9 @@ def _continues(cycles: HalfCycles, before: Run, after: Run) -> bool:
     """Say whether `after` goes on where `before` was broken off."""
     half = float(np.median(np.diff(cycles.middle_s[before.first : before.last + 1])))
     pause = float(cycles.middle_s[after.first] - cycles.middle_s[before.last])
-    ratio = float(cycles.swing[after.first] / cycles.swing[before.last])
+    # Where a turning point is lost in a gap, the swings beside it are too small.
+    last = float(np.max(cycles.swing[max(before.first, before.last - 2) : before.last + 1]))
+    ratio = float(cycles.swing[after.first]) / last
     strong = float(cycles.swing[after.first]) > 3.0 * cycles.step
     if not (strong and before.legs >= 3 and pause < 4.5 * half and 0.5 < ratio < 1.15):
         return False

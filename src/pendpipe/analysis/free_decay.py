@@ -9,8 +9,9 @@ repositioning, and every decay but the most telling one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -18,14 +19,23 @@ from pendpipe.analysis._decay_runs import Run, best_runs
 from pendpipe.analysis._stretches import Cut, stretches
 from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.two_modes import BEAT, two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
+from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
 
 __all__ = ["Cut", "FreeDecay", "find_free_decay"]
 
 _BLOCKS: Final = 9
 _LEAST_HALF_CYCLES: Final = 3
+_MANY: Final = 18
+_STEADY: Final = 0.2
+"""By which the half periods of a beat may differ from the usual one, but at its nodes."""
+_COUNTED: Final = 0.25
+"""Half cycles by which the count across a gap may be off."""
+_NODE: Final = 4
+"""Half cycles at a node of a beat."""
 
 
 @dataclass(frozen=True)
@@ -104,40 +114,111 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         for run in best_runs(cycles)
     ]
     found = [entry for entry in found if entry[3].legs >= _LEAST_HALF_CYCLES]
-    if not found:
+    told = max(found, key=lambda entry: entry[3].worth, default=None)
+    rivals = sum(entry[3].path > 0.2 * told[3].path for entry in found) - 1 if told else 0
+    used = [] if told is None else _chained(found, told)
+    beside = sum(entry[3].path for entry in found) - sum(entry[3].path for entry in used)
+    if told is None or beside > 0.3 * told[3].path or not _falls(told[2], told[3], least):
+        beat = _beating(time, values, least, half_period, place)
+        if beat is not None:
+            return beat
+    if told is None:
         raise NotAnalysableError(
             place,
             "no free decay: no three half cycles follow each other with falling amplitude",
             "handling, a clamp or a drive can't be analysed",
         )
-    first, last, cycles, run = max(found, key=lambda entry: entry[3].worth)
-    rivals = sum(entry[3].path > 0.2 * run.path for entry in found) - 1
-    if run.legs < 6 * _LEAST_HALF_CYCLES and rivals >= max(2, run.legs // 3):
-        raise NotAnalysableError(
-            place,
-            f"no free decay: {rivals + 1} short oscillations of {run.legs} half cycles or so",
-            "irregular motion can't be analysed",
-        )
-    _refuse_without_fall(place, cycles, run, least)
-    start, stop = _ends(time[first:last], values[first:last], cycles, run)
-    others = [(c, r) for _, _, c, r in found if r is not run and r.path > 0.05 * run.path]
+    if told[3].legs < _MANY and rivals >= max(2, told[3].legs // 3):
+        # Many half cycles that follow one another are no accident, however small they are.
+        longer = [entry for entry in found if entry[3].legs >= _MANY]
+        if not longer:
+            raise NotAnalysableError(
+                place,
+                f"no free decay: {rivals + 1} short oscillations of {told[3].legs} half cycles or"
+                " so",
+                "irregular motion can't be analysed",
+            )
+        told = max(longer, key=lambda entry: entry[3].worth)
+        used = _chained(found, told)
+    first, last, cycles, run = told
+    _refuse_without_fall(place, time[first:last], values[first:last], cycles, run, least)
+    start = _ends(time[slice(*used[0][:2])], values[slice(*used[0][:2])], *used[0][2:])[0]
+    stop = _ends(time[slice(*used[-1][:2])], values[slice(*used[-1][:2])], *used[-1][2:])[1]
+    notes = [
+        f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
+        for _, end, _, _ in used[:-1]
+    ]
+    cycles, run = used[0][2:]
+    others = [(c, r) for _, _, c, r in found if r.path > 0.05 * told[3].path]
     half = float(np.median(np.diff(cycles.middle_s[run.first : run.last + 1])))
     quiet = max(2.0 * least, 0.02 * float(cycles.swing[run.first]))
     before = "driven: the amplitude is held up" if run.driven else "moved by hand before release"
+    centre, swing = float(np.mean(cycles.turn[run.first : run.first + 2])), cycles.swing[run.first]
+    wide = np.abs(values[time < start] - centre).max(initial=0.0)
+    if recording.quantity == "angle_rad" and wide > np.pi > 0.5 * swing:
+        before = "it went over the top before it settled"
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half, before=before)
-    notes = [
+    notes += [
         f"another decay of {r.legs} half cycles from {c.middle_s[r.first]:.6g} s is not used"
         for c, r in others
+        if not any(r is entry[3] for entry in used)
     ]
-    if run.bridged:
-        notes.append(f"{run.bridged} disturbed half cycle(s) inside the decay are kept")
-    return FreeDecay(start, stop, cuts, half, run.legs, notes)
+    bridged = sum(entry[3].bridged for entry in used)
+    if bridged:
+        notes.append(f"{bridged} disturbed half cycle(s) inside the decay are kept")
+    return FreeDecay(start, stop, cuts, half, sum(entry[3].legs for entry in used), notes)
 
 
 def _pieces(time: FloatArray, longest_s: float) -> list[tuple[int, int]]:
     """Part the record at gaps in which the motion could have done anything."""
     edges = (np.flatnonzero(np.diff(time) > longest_s) + 1).tolist()
     return list(zip([0, *edges], [*edges, len(time)], strict=True))
+
+
+_Found: TypeAlias = tuple[int, int, HalfCycles, Run]
+"""First and last reading of a piece of the record, its half cycles, and a run of them."""
+
+
+def _chained(found: list[_Found], told: _Found) -> list[_Found]:
+    """The runs that one decay makes where gaps part the record, in the order of time."""
+    chain = [told]
+    for entry in sorted(found, key=lambda entry: entry[0]):
+        if entry[0] == chain[-1][1] and _goes_on(*chain[-1][2:], *entry[2:]):
+            chain.append(entry)
+    for entry in sorted(found, key=lambda entry: -entry[0]):
+        if entry[1] == chain[0][0] and _goes_on(*entry[2:], *chain[0][2:]):
+            chain.insert(0, entry)
+    return chain
+
+
+def _goes_on(cycles: HalfCycles, run: Run, later: HalfCycles, follower: Run) -> bool:
+    """Whether a run behind a gap is the same decay: amplitude, half period and phase go on.
+
+    The half cycles in the gap must be countable: half periods before and behind it say the same
+    whole number, and the side on which the follower begins is that number's. So must their loss.
+    """
+    if run.last + 1 < len(cycles) or follower.first > 1 or follower.legs < _LEAST_HALF_CYCLES:
+        return False
+    before = cycles.middle_s[run.first : run.last + 1][-_BLOCKS:]
+    behind = later.middle_s[follower.first : follower.last + 1][:_BLOCKS]
+    halves = [float(np.mean(np.diff(part))) for part in (before, behind)]
+    counts = [float(behind[0] - before[-1]) / half for half in halves]
+    number = round(0.5 * sum(counts))
+    falls = later.turn[follower.first + 1] < later.turn[follower.first]
+    fell = cycles.turn[run.last + 1] < cycles.turn[run.last]
+    if (falls == fell) != (number % 2 == 0) or number == 0:
+        return False
+    losses = [
+        float(part[0] - part[-1]) / (len(part) - 1)
+        for part in (
+            cycles.swing[run.first : run.last + 1][-_BLOCKS:],
+            later.swing[follower.first : follower.last + 1][:_BLOCKS],
+        )
+    ]
+    lost = float(cycles.swing[run.last] - later.swing[follower.first])
+    few, many = 0.5 * number * min(losses), 2.0 * number * max(losses)
+    agree = max(abs(count - number) for count in counts) < _COUNTED
+    return agree and few - cycles.step < lost < many + cycles.step
 
 
 def _rise(swing: FloatArray) -> float:
@@ -148,7 +229,74 @@ def _rise(swing: FloatArray) -> float:
     return float(np.max(means - np.minimum.accumulate(means)))
 
 
-def _refuse_without_fall(place: str | Path, cycles: HalfCycles, run: Run, least: float) -> None:
+def _beating(
+    time: FloatArray, values: FloatArray, least: float, half_period: float, place: str | Path
+) -> FreeDecay | None:
+    """Find two free modes that beat; None where nothing beats.
+
+    Raises
+    ------
+    NotAnalysableError
+        When one of the modes does not decay, but is driven.
+    """
+    cycles = half_cycles(time, values, least, half_period)
+    if len(cycles) < _MANY:
+        return None
+    half = np.diff(cycles.middle_s)
+    steady = np.flatnonzero(np.abs(np.log(half / np.median(half))) < _STEADY)
+    blocks = np.split(steady, np.flatnonzero(np.diff(steady) > _NODE) + 1)
+    block = max(blocks, key=len)
+    if len(block) < _MANY:
+        return None
+    first, last = int(block[0]), int(block[-1]) + 1
+    smooth = np.median(
+        np.lib.stride_tricks.sliding_window_view(cycles.swing[first:last], 5), axis=1
+    )
+    if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
+        return None
+    start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
+    inside = (time >= start) & (time <= stop)
+    modes = two_modes(time[inside], values[inside], float(np.median(half)))
+    if modes is None:
+        return None
+    steadily = [mode for mode in modes if mode.driven]
+    if steadily:
+        raise NotAnalysableError(
+            place,
+            f"a drive holds the amplitude up: the motion of {steadily[0].frequency.value:.4g} Hz"
+            " does not decay",
+            "a driven oscillation has no free decay",
+        )
+    each = " and ".join(
+        f"{mode.frequency.value:.6g} Hz, which loses"
+        f" {with_error(mode.loss.value, mode.loss.sd, short=True)} 1/s"
+        for mode in modes
+    )
+    cuts = stretches(
+        time, values, start, stop, quiet=2.0 * least, window_s=half_period,
+        before="moved by hand before release",
+    )  # fmt: skip
+    return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
+
+
+def _falls(cycles: HalfCycles, run: Run, least: float) -> bool:
+    """Whether the turning points alone show the amplitude fall."""
+    swing = cycles.swing[run.first : run.last + 1]
+    third = max(1, len(swing) // 3)
+    fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
+    scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
+    few = max(3.0 * scatter / np.sqrt(third), _rise(swing), 0.3 * least, 1e-4 * float(swing[0]))
+    return bool(fall > few)
+
+
+def _refuse_without_fall(
+    place: str | Path,
+    time: FloatArray,
+    values: FloatArray,
+    cycles: HalfCycles,
+    run: Run,
+    least: float,
+) -> None:
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
     swing = cycles.swing[run.first : run.last + 1]
     if float(swing[:3].max()) < 3.0 * least:
@@ -158,16 +306,54 @@ def _refuse_without_fall(place: str | Path, cycles: HalfCycles, run: Run, least:
             f" ({least:.2g})",
             "record with a larger amplitude",
         )
-    third = max(1, len(swing) // 3)
-    fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
-    scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
-    few = max(3.0 * scatter / np.sqrt(third), _rise(swing), 0.3 * least, 1e-4 * float(swing[0]))
-    if fall <= few:
+    if _falls(cycles, run, least):
+        return
+    fall, sd, wavers = _fall_of_all(time, values, cycles.middle_s[run.first : run.last + 1])
+    if wavers:
         raise NotAnalysableError(
             place,
             f"the amplitude does not fall over {len(swing)} half cycles",
             "a driven oscillation has no free decay",
         )
+    if fall < 4.0 * sd:
+        raise NotAnalysableError(
+            place,
+            f"the amplitude does not fall over {len(swing)} half cycles by more than its error"
+            f" ({100.0 * fall:.2g} +- {100.0 * sd:.1g} %): the decay is too slow to be resolved",
+            "record longer, unless something drives it",
+        )
+
+
+def _fall_of_all(
+    time: FloatArray, values: FloatArray, middle: FloatArray
+) -> tuple[float, float, bool]:
+    """Fall of the amplitude along a run, from all its readings.
+
+    Returns
+    -------
+    fall, sd
+        Of a straight line through the amplitudes of `_BLOCKS` parts, over the first.
+    wavers
+        Whether these differ from the line by more than the readings' noise makes them.
+    """
+    phase = np.pi * np.interp(time, middle, np.arange(len(middle)))
+    parts = np.searchsorted(time, np.linspace(middle[0], middle[-1], _BLOCKS + 1))
+    found = []
+    for first, last in pairwise(parts.tolist()):
+        wave = phase[first:last]
+        design = np.stack([np.ones(len(wave)), np.sin(wave), np.cos(wave)], axis=1)
+        inverse = np.linalg.pinv(design)
+        value = inverse @ values[first:last]
+        rest = values[first:last] - design @ value
+        noise = np.sqrt(float(rest @ rest) / max(len(wave) - 3, 1))
+        found.append((float(np.hypot(*value[1:])), float(noise * np.linalg.norm(inverse[1]))))
+    amplitude, sd = np.array(found).T
+    design = np.stack([np.ones(_BLOCKS), np.linspace(0.0, 1.0, _BLOCKS)], axis=1) / sd[:, None]
+    inverse = np.linalg.pinv(design)
+    begun, slope = (inverse @ (amplitude / sd)).tolist()
+    off = amplitude / sd - design @ [begun, slope]
+    wavers = float(off @ off) > 40.0
+    return -slope / begun, float(np.linalg.norm(inverse[1])) / begun, wavers
 
 
 def _ends(

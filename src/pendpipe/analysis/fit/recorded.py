@@ -13,6 +13,7 @@ from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Recording
 
@@ -74,6 +75,9 @@ def fit_recording(
             place, "a displacement in metres has no sine", "leave --restoring out, or give --unit"
         )
     result = _fit(recording, method, restoring, baseline, fixed, points, place)
+    beats = [note for note in points.notes if note.startswith(BEAT)] if points else []
+    if beats:
+        return replace(result, light="red", light_reason=f"{beats[0]}; Eq. 8 has one")
     if result.settled:
         return result
     raise NotAnalysableError(

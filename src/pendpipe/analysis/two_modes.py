@@ -1,0 +1,121 @@
+"""Two modes that beat: their frequencies and losses, from the readings."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.estimate import Estimate
+
+BEAT: Final = "two modes beat"
+"""How a note begins that tells of them."""
+_WINDOWS: Final = 120
+_FEWEST: Final = 10
+"""Windows, each of a period or more, that two modes need: they have eight numbers."""
+_STEPS: Final = 12
+_APART: Final = 0.3
+"""Of the frequency: farther apart they do not beat, and the half period says little."""
+_EXPLAINED: Final = 0.9
+"""Part of the motion's variance that two modes must explain."""
+
+
+class Mode(NamedTuple):
+    """One damped mode."""
+
+    frequency: Estimate
+    """Hz."""
+    loss: Estimate
+    """Relative loss of amplitude, 1/s."""
+    amplitude: Estimate
+    """At the first reading, in the unit of the readings."""
+
+    @property
+    def driven(self) -> bool:
+        """Whether it does not decay."""
+        return self.loss.value < 3.0 * self.loss.sd
+
+
+def two_modes(
+    time_s: FloatArray, values: FloatArray, half_period_s: float
+) -> tuple[Mode, Mode] | None:
+    """Fit two damped modes and a level to readings.
+
+    Parameters
+    ----------
+    time_s, values
+        The readings, shape (n,); times may be uneven.
+    half_period_s
+        The half period, roughly.
+
+    Returns
+    -------
+    tuple of Mode or None
+        The stronger first; None where two modes leave more than a tenth of the motion's variance.
+
+    Notes
+    -----
+    The motion's slow complex amplitude is the sum of two complex exponentials. These are the
+    eigenvalues of the step from one part of its strongest two-dimensional signal space to the next
+    (ESPRIT); a few Gauss-Newton steps on all readings follow.
+    """
+    slow = math.pi / half_period_s
+    time = time_s - time_s[0]
+    width = max(2.0 * half_period_s, float(time[-1]) / _WINDOWS)
+    amplitude = _slow_amplitude(time, values, slow, width)
+    if len(amplitude) < _FEWEST:
+        return None
+    rows = np.lib.stride_tricks.sliding_window_view(amplitude, len(amplitude) // 2 + 1)
+    space = np.linalg.svd(rows, full_matrices=False)[2][:2].T
+    step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
+    rates = np.log(np.linalg.eigvals(step)) / width + 1j * slow
+    for _ in range(_STEPS):
+        waves = np.exp(np.outer(time, rates))
+        columns = [np.ones_like(time), *waves.real.T, *waves.imag.T]
+        level, one, two, one_im, two_im = np.linalg.lstsq(
+            np.stack(columns, axis=1), values, rcond=None
+        )[0]
+        size = np.array([one - 1j * one_im, two - 1j * two_im])
+        by_rate = time[:, None] * waves * size
+        design = np.stack([*columns, *by_rate.real.T, *(-by_rate.imag).T], axis=1)
+        residual = values - level - (waves * size).real.sum(axis=1)
+        change = np.linalg.lstsq(design, residual, rcond=None)[0]
+        rates = rates + change[5:7] + 1j * change[7:9]
+        if not np.all(np.abs(rates - 1j * slow) < _APART * slow):
+            return None
+    if not np.var(residual) < (1.0 - _EXPLAINED) * np.var(values):
+        return None
+    inverse = np.linalg.pinv(design)
+    # What two modes leave is smooth: its neighbours tell the same.
+    alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)
+    alike = min(max(alike, 0.0), 0.98)
+    scale = math.sqrt(float(np.var(residual)) * (1.0 + alike) / (1.0 - alike))
+    error = scale * np.linalg.norm(inverse, axis=1)
+    modes = [
+        Mode(
+            Estimate(float(rates[k].imag) / (2.0 * math.pi), error[7 + k] / (2.0 * math.pi), "Hz"),
+            Estimate(-float(rates[k].real), float(error[5 + k]), "1/s"),
+            Estimate(float(abs(size[k])), float(error[1 + k]), ""),
+        )
+        for k in np.argsort(-np.abs(size))
+    ]
+    return modes[0], modes[1]
+
+
+def _slow_amplitude(
+    time: FloatArray, values: FloatArray, angular_frequency: float, width: float
+) -> AnyArray:
+    """Complex amplitude in each window, about the window's own level."""
+    edges = np.searchsorted(time, np.arange(0.0, time[-1], width))
+    found = []
+    for first, last in pairwise(edges.tolist()):
+        wave = np.exp(-1j * angular_frequency * time[first:last])
+        if last - first < 6:
+            break
+        design = np.stack([np.ones(len(wave)), wave.real, wave.imag], axis=1)
+        _, cosine, sine = np.linalg.lstsq(design, values[first:last], rcond=None)[0]
+        found.append(cosine + 1j * sine)
+    return np.array(found)

@@ -1,0 +1,52 @@
+"""Two damped modes are told apart by their readings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.two_modes import two_modes
+from pendpipe.dynamics import Eq8, Release, sample
+
+TIME = np.arange(0.0, 80.0, 0.01)
+TRUTH = ((0.80, 0.02, 0.5), (0.86, 0.03, 0.3))
+
+
+def motion(time: np.ndarray) -> np.ndarray:
+    return sum(
+        size * np.exp(-loss * time) * np.cos(2.0 * np.pi * hertz * time)
+        for hertz, loss, size in TRUTH
+    )
+
+
+def test_frequencies_losses_and_amplitudes_are_within_their_errors() -> None:
+    pulls = []
+    keep = (TIME < 30.0) | (TIME > 33.0)
+    for seed in range(20):
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(TIME))
+        modes = two_modes(TIME[keep], (0.1 + motion(TIME) + noise)[keep], 0.61)
+        assert modes is not None
+        for mode, truth in zip(modes, TRUTH, strict=True):
+            found = (mode.frequency, mode.loss, mode.amplitude)
+            pulls += [
+                (each.value - true) / each.sd for each, true in zip(found, truth, strict=True)
+            ]
+            assert not mode.driven
+    assert np.std(pulls) == pytest.approx(1.0, abs=0.25)
+
+
+def test_one_pendulum_is_not_two_modes() -> None:
+    # sin x slows it at first; Coulomb friction bends its envelope: no two modes explain that.
+    law = Eq8(5.0, 0.05, 0.0, 0.0, 0.02, "sine")
+    values = sample(law, Release(-0.1, 2.5), TIME)
+    assert two_modes(TIME, values, 0.65) is None
+    noise = np.random.default_rng(1).standard_normal(len(TIME))
+    assert two_modes(TIME, noise, 0.6) is None
+
+
+def test_a_mode_without_loss_is_driven() -> None:
+    free = 0.3 * np.exp(-0.05 * TIME) * np.cos(5.0 * TIME)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(TIME))
+    modes = two_modes(TIME, free + 0.2 * np.cos(5.3 * TIME) + noise, 0.62)
+    assert modes is not None
+    assert [mode.driven for mode in modes] == [False, True]
