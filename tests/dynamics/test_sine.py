@@ -15,7 +15,6 @@ from pendpipe.dynamics import (
     JACOBIAN_COLUMNS,
     Eq8,
     Release,
-    compare,
     sample,
     sample_with_jacobian,
     turning_points,
@@ -187,22 +186,6 @@ def test_samples_change_as_their_differences_do(y: float) -> None:
         # Where a turning point lies between the differences, these are off by its kink.
         assert np.quantile(error, 0.9) < 1e-6
         assert error.max() < 1e-3
-
-
-@pytest.mark.parametrize("y", [0.31, 1.5, 2.9])
-def test_a_comparison_is_that_with_the_jacobian_written_out(y: float) -> None:
-    release = Release(-0.3, y, 0.003)
-    time = np.linspace(0.0, 150.0, 5000)
-    readings = sample(MODEL, release, time) + 1e-3 * np.random.default_rng(3).normal(size=5000)
-    angle, jacobian = sample_with_jacobian(MODEL, release, time)
-    found = compare(MODEL, release, time, readings)
-    np.testing.assert_allclose(found.residual, readings - angle, rtol=0, atol=1e-13)
-    size = np.linalg.norm(jacobian, axis=0)
-    gradient = jacobian.T @ (readings - angle)
-    noise = np.linalg.norm(readings - angle)
-    np.testing.assert_allclose(found.gradient / size, gradient / size, rtol=0, atol=1e-11 * noise)
-    normal = jacobian.T @ jacobian / np.outer(size, size)
-    np.testing.assert_allclose(found.normal / np.outer(size, size), normal, rtol=0, atol=2e-3)
 
 
 def test_a_release_beyond_the_top_and_an_unknown_torque_are_refused() -> None:

@@ -4,10 +4,7 @@ Eq. 8 goes through the compiled engine (`eq8`); any other law through `any_law`.
 """
 
 from pendpipe.dynamics.eq8 import (
-    Comparison,
     TurningPoints,
-    compare,
-    residuals,
     sample,
     sample_with_jacobian,
     turning_points,
@@ -17,12 +14,9 @@ from pendpipe.dynamics.model import JACOBIAN_COLUMNS, Eq8, Release
 
 __all__ = [
     "JACOBIAN_COLUMNS",
-    "Comparison",
     "Eq8",
     "Release",
     "TurningPoints",
-    "compare",
-    "residuals",
     "sample",
     "sample_with_jacobian",
     "turning_points",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.comparison import add_batch, compare, compare_rest, subtract
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import NODE_COUNT
 from pendpipe.dynamics.panel import angle_of, curve, horner
@@ -97,15 +96,9 @@ def emit(
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
         horner(work.total[0], z, angle_rad[at:stop])
-        if work.compared > 0:
-            subtract(work.readings[at:stop], angle_rad[at:stop])
-            if work.sensitivities > 0:
-                compare(work, angle_rad[at : min(stop, end)], start, duration)
-        elif work.sensitivities > 0:
+        if work.sensitivities > 0:
             _emit_derivatives(work, z, t, at)
         at = stop
-    if end == time_s.size and work.compared > 0 and work.sensitivities > 0:
-        add_batch(work)
     return end
 
 
@@ -131,26 +124,25 @@ def _emit_derivatives(work: Work, theta: FloatArray, time_s: FloatArray, at: int
 @kernel
 def rest(work: Work, y: float, first: int) -> None:
     """Write the samples after the stop: the last turning point, exactly."""
-    directions, omega, signs = work.rates, work.motion[0], work.signs
-    angle_rad, jacobian = work.angle_rad, work.jacobian
-    level, bend = signs[0] * angle_of(work.shape, y) + work.motion[2], curve(work.shape, y)
-    if work.sensitivities > 0:
-        if work.compared > 0:
-            add_batch(work)
-        by_omega = 0.0
-        for c in range(directions):
-            work.some[c, 0] = signs[0] * work.amplitude[c + 1] / bend
-            by_omega -= work.rate[c] / omega * work.some[c, 0]
-        work.some[directions, 0] = by_omega
-        work.some[directions + 1, 0] = signs[0] * signs[1] * work.amplitude[0] / bend
-        work.some[directions + 2, 0], work.some[directions + 3, 0] = 0.0, 1.0
-        if work.compared > 0:
-            compare_rest(work, level, first)
+    angle_rad, signs = work.angle_rad, work.signs
+    level = signs[0] * angle_of(work.shape, y) + work.motion[2]
     for i in range(first, angle_rad.size):
         angle_rad[i] = level
-    if work.compared > 0:
-        subtract(work.readings[first:], angle_rad[first:])
+    if work.sensitivities == 0:
         return
-    for c in range(min(jacobian.shape[0], directions + 3)):
-        for i in range(first, angle_rad.size):
-            jacobian[c, i] = work.some[c, 0]
+    directions, side = work.rates, signs[0] / curve(work.shape, y)
+    by_omega = 0.0
+    for c in range(directions):
+        by_rate = side * work.amplitude[c + 1]
+        by_omega -= work.rate[c] / work.motion[0] * by_rate
+        _fill(work.jacobian[c, first:], by_rate)
+    _fill(work.jacobian[directions, first:], by_omega)
+    _fill(work.jacobian[directions + 1, first:], side * signs[1] * work.amplitude[0])
+    _fill(work.jacobian[directions + 2, first:], 0.0)
+
+
+@kernel
+def _fill(column: FloatArray, value: float) -> None:
+    """Write one value to a part of a column."""
+    for i in range(column.size):
+        column[i] = value

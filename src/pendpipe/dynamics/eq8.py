@@ -1,10 +1,10 @@
-"""Eq. 8's turning points, samples, derivatives by every parameter, and comparison with readings."""
+"""Eq. 8's turning points, samples, and their derivatives by every parameter."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from pendpipe.dynamics.layout import (
     OVERDAMPED,
     STOPPED,
     counts,
-    sums_size,
     work_size,
 )
 from pendpipe.dynamics.march import march
@@ -191,76 +190,6 @@ def _checked_times(time_s: FloatArray, release: Release) -> FloatArray:
     return times
 
 
-class Comparison(NamedTuple):
-    """Readings against Eq. 8; J is the Jacobian of `sample_with_jacobian`, r the residual."""
-
-    square: float
-    """r' r."""
-    gradient: FloatArray
-    """J' r, shape (8,)."""
-    normal: FloatArray
-    """J' J, shape (8, 8), for readings spread evenly within each half cycle."""
-    residual: FloatArray
-    """r, shape (n,)."""
-
-
-def residuals(
-    model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatArray
-) -> FloatArray:
-    """Return readings less model, shape (n,)."""
-    return _compare(model, release, time_s, angle_rad, np.zeros(sums_size(0)))
-
-
-def compare(model: Eq8, release: Release, time_s: FloatArray, angle_rad: FloatArray) -> Comparison:
-    """Compare readings with Eq. 8, with the columns `JACOBIAN_COLUMNS`.
-
-    The Jacobian is never written: the products that a fit needs are summed half cycle by
-    half cycle. The gradient is exact; the normal matrix takes the readings as spread evenly
-    within each half cycle (or its panels), and is exact but for that.
-
-    Parameters
-    ----------
-    model, release, time_s
-        As in `sample`.
-    angle_rad
-        The readings, shape (n,).
-    """
-    sums = np.zeros(sums_size(_COLUMNS))
-    residual = _compare(model, release, time_s, angle_rad, sums, derivatives=True)
-    lower = sums[1 + _COLUMNS :].reshape(_COLUMNS, _COLUMNS)
-    normal = lower + lower.T
-    normal.flat[:: _COLUMNS + 1] *= 0.5
-    return Comparison(float(sums[0]), sums[1 : 1 + _COLUMNS], normal, residual)
-
-
-def _compare(
-    model: Eq8,
-    release: Release,
-    time_s: FloatArray,
-    angle_rad: FloatArray,
-    sums: FloatArray,
-    *,
-    derivatives: bool = False,
-) -> FloatArray:
-    """Return readings less model; add up the sums of the comparison."""
-    times = _checked_times(time_s, release)
-    readings = np.ascontiguousarray(angle_rad, dtype=np.float64)
-    if readings.shape != times.shape:
-        message = f"{readings.shape} readings do not go with {times.shape} times"
-        raise ValueError(message)
-    residual = np.empty(times.size)
-    _run(
-        model,
-        release,
-        derivatives=derivatives,
-        time_s=times,
-        angle_rad=residual,
-        readings=readings,
-        sums=sums,
-    )
-    return residual
-
-
 def _run(
     model: Eq8,
     release: Release,
@@ -272,8 +201,6 @@ def _run(
     angle_rad: FloatArray = _NONE,
     jacobian: FloatArray = _NONE,
     turning: FloatArray = _NONE,
-    readings: FloatArray = _NONE,
-    sums: FloatArray = _NONE,
 ) -> tuple[int, bool]:
     """Call the engine; return the number of turning points and whether the last is the stop."""
     if model.restoring == "sine" and not abs(release.angle_rad) < math.pi:
@@ -308,12 +235,10 @@ def _run(
         "angle_rad": angle_rad,
         "jacobian": jacobian,
         "turning": turning,
-        "readings": readings,
-        "sums": sums,
     }
     room = turning.shape[-1]
     request = [address(arrays[name]) for name in ADDRESSES]
-    request += counts(rates, time_s.size, readings.size, room, most)
+    request += counts(rates, time_s.size, room, most)
     found, ending = divmod(march(np.array(request)), ENDINGS)
     if ending == OVERDAMPED:
         message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"

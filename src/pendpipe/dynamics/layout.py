@@ -23,11 +23,6 @@ FEW_POINTS, MOST_POINTS = 12, 18
 MOST_PANELS: Final = 8
 """Panels to a half cycle in a table."""
 THETA: Final = 512
-MOMENTS: Final = NODE_COUNT + 1
-PLACES: Final = 8
-"""Of a panel, at which the normal matrix is taken; see `comparison.py`."""
-BATCH: Final = 8 * PLACES
-"""Places that are multiplied in one go."""
 
 RUNNING, STOPPED, OVERDAMPED = range(3)
 ENDINGS: Final = 3
@@ -38,19 +33,15 @@ COUNTS: Final = (
     "sensitivities",
     "parameters",
     "samples",
-    "written",
     "recorded",
     "room",
-    "compared",
-    "summed",
     "polynomials",
     "width",
     "most",
 )
 """Numbers of rates; of sensitivities (to the amplitude and those); of columns of the Jacobian; of
-samples, and of those of which the Jacobian is written; of what is recorded of a turning point, and
-of how many; of readings to compare with, and of the sums that this gives; of the polynomials of a
-panel; the width of a row; how many turning points are wanted at most."""
+samples; of what is recorded of a turning point, and of how many; of the polynomials of a panel; the
+width of a row; how many turning points are wanted at most."""
 Work = Any
 """What the engine works on: the arrays of `FIELDS` and the numbers of `COUNTS`, as attributes."""
 
@@ -76,8 +67,8 @@ class Field(NamedTuple):
     columns: tuple[str, int]
 
 
-_MOST_RATES, _MOST_COLUMNS = 4, 8
-_S, _C = _MOST_RATES + 1, _MOST_COLUMNS
+_MOST_RATES: Final = 4
+_S: Final = _MOST_RATES + 1
 _INSIDE: Final[dict[str, tuple[int, tuple[str, int] | None, tuple[str, int]]]] = {
     # name: room, rows, columns
     "shape": (5, None, ("", 5)),  # m, h, q, g, k of `panel.py`
@@ -94,17 +85,12 @@ _INSIDE: Final[dict[str, tuple[int, tuple[str, int] | None, tuple[str, int]]]] =
     "amplitude": (_S, None, ("sensitivities", 0)),
     "clock": (_S, None, ("sensitivities", 0)),
     "segment": (6, None, ("", 6)),  # what the table spans; see `table.py`
-    "wanted": (3, None, ("", 3)),  # how `march` lays out its tables; how many places are taken
+    "wanted": (2, None, ("", 2)),  # how `march` lays out its tables
     "columns": ((_S + 1) * NODE_COUNT, ("sensitivities", 1), ("", NODE_COUNT)),  # dx/dp, and x
     "chebyshev": (NODE_COUNT * NODE_COUNT, ("", NODE_COUNT), ("", NODE_COUNT)),
     # the polynomials of the angle, its velocity and its derivatives
     "total": ((_S + 2) * NODE_COUNT, ("sensitivities", 2), ("", NODE_COUNT)),
     "theta": (THETA, None, ("", THETA)),  # a block of places within a panel
-    "power": (THETA, None, ("", THETA)),  # residuals times a power of their place
-    "moments": (MOMENTS, None, ("", MOMENTS)),  # of the residuals of a block
-    # the Jacobian's columns at some places of the last panels, and how many readings each is
-    "some": (_C * BATCH, ("parameters", 0), ("", BATCH)),
-    "weights": (BATCH, None, ("", BATCH)),
     "nodes": (SLOTS * NODE_SIZE, ("", SLOTS), ("", NODE_SIZE)),  # panels; see `panel.py`
 }
 
@@ -127,10 +113,8 @@ FIELDS: Final[dict[str, Field]] = _FIELDS | {
     "table": Field("workspace", _FIXED, MOST_POINTS + 2, ("", MOST_POINTS), ("width", 0)),
     "time_s": Field("time_s", 0, 0, None, ("samples", 0)),
     "angle_rad": Field("angle_rad", 0, 0, None, ("samples", 0)),
-    "jacobian": Field("jacobian", 0, 0, ("parameters", 0), ("written", 0)),
+    "jacobian": Field("jacobian", 0, 0, ("parameters", 0), ("samples", 0)),
     "turning": Field("turning", 0, 0, ("recorded", 0), ("room", 0)),
-    "readings": Field("readings", 0, 0, None, ("compared", 0)),
-    "sums": Field("sums", 0, 0, None, ("summed", 0)),
 }
 """Every array that the engine works on, by name."""
 
@@ -148,16 +132,11 @@ def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
 
 def work_size(rates: int, samples: int) -> int:
     """Return how many numbers the workspace has."""
-    width = counts(rates, samples, 0, 0, 0)[COUNTS.index("width")]
+    width = counts(rates, samples, 0, 0)[COUNTS.index("width")]
     return _FIXED + (2 * MOST_POINTS + 2) * width
 
 
-def sums_size(columns: int) -> int:
-    """Return how many numbers a comparison gives: chi^2, gradient, normal matrix."""
-    return 1 + columns * (1 + columns)
-
-
-def counts(rates: int, samples: int, compared: int, room: int, most: int) -> tuple[int, ...]:
+def counts(rates: int, samples: int, room: int, most: int) -> tuple[int, ...]:
     """Return the integers of a call, in the order of `COUNTS`."""
     sensitivities, parameters = (rates + 1, rates + 4) if rates else (0, 0)
     polynomials = sensitivities + 1 if samples else 0
@@ -166,11 +145,8 @@ def counts(rates: int, samples: int, compared: int, room: int, most: int) -> tup
         sensitivities,
         parameters,
         samples,
-        samples - compared,
         2 + 2 * parameters,
         room,
-        compared,
-        sums_size(parameters) if compared else 0,
         polynomials,
         row_width(sensitivities, polynomials, MOST_PANELS),
         most,

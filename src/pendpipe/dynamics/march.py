@@ -150,7 +150,7 @@ def _begin(work: Work) -> float:
     y = 2.0 * math.sin(0.5 * angle) if shape[CURVATURE] > 0.0 else angle
     for c in range(work.sensitivities):
         work.amplitude[c], work.clock[c] = (curve(shape, y) if c == 0 else 0.0), 0.0
-    work.wanted[0], work.wanted[1], work.wanted[2] = 1.0, math.inf, 0.0
+    work.wanted[0], work.wanted[1] = 1.0, math.inf
     return y
 
 
@@ -158,9 +158,8 @@ def _begin(work: Work) -> float:
 def march(work: Work) -> int:
     """Follow the pendulum from its release.
 
-    With samples the residuals or they themselves are written to `work.angle_rad`, with rates
-    their Jacobian or, with readings, the sums of their comparison; the last column of the
-    Jacobian, by the offset, is left to the caller. Turning points are written as far as there
+    Samples are written to `work.angle_rad`, with rates their Jacobian, whose last column, by the
+    offset, is left to the caller. Turning points are written as far as there
     is room for them.
 
     Parameters

@@ -339,15 +339,3 @@ def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
         upper = ((((((((c16 * z + c15) * z + c14) * z + c13) * z + c12) * z) + c11) * z) + c10) * z
         lower = ((((((upper + c9) * z + c8) * z + c7) * z + c6) * z + c5) * z + c4) * z
         out[i] = (((lower + c3) * z + c2) * z + c1) * z + c0
-
-
-@kernel(inline=True)
-def horner_few(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
-    """As `horner`, at a few places: even and odd powers apart, so that each step waits less."""
-    for i in range(theta.size):
-        z = theta[i]
-        square = z * z
-        even, odd = c[NODE_COUNT - 1], c[NODE_COUNT - 2]
-        for k in range(NODE_COUNT - 3, 0, -2):
-            even, odd = even * square + c[k], odd * square + c[k - 1]
-        out[i] = even * square + c[0] + z * odd

@@ -13,7 +13,7 @@ from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.fit.result import Restoring
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release, compare, residuals, sample_with_jacobian
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 
 NAMES: Final = ("a", "b", "c", "omega", "angle", "time", "offset", "share")
 A, B, C, OMEGA, ANGLE, TIME, OFFSET, SHARE = range(8)
@@ -21,7 +21,8 @@ BOUNDS: Final = Bounds(
     np.array([0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, 0.0]),
     np.array([np.inf] * 7 + [1.0]),
 )
-_PIECE: Final = 1 << 16
+_PIECE: Final = 1 << 18
+"""Readings whose Jacobian is in memory at a time: 16 MB."""
 PRIOR_SHARE: Final = 0.5
 PRIOR_INVERSE: Final = 12.0
 """Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
@@ -79,7 +80,7 @@ class Waveform:
         key = value.tobytes()
         if key not in self._last:
             self._last.clear()
-            self._last[key] = residuals(*self.model(value), self.time_s, self.values)
+            self._last[key] = self.values - sample(*self.model(value), self.time_s)
         return self._last[key]
 
     def chi2(self, value: FloatArray) -> float:
@@ -136,33 +137,32 @@ class Waveform:
         if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
             return refused
         try:
-            if self.step == 0.0:
-                found = compare(model, release, self.time_s, self.values)
-                self._last.clear()
-                self._last[value.tobytes()] = found.residual
-                weight = self.noise_rms**-2
-                chi2 = found.square * weight
-                gradient, normal = found.gradient * weight, found.normal * weight
-            else:
-                chi2, gradient, normal = self._rounded(model, release)
+            summed = self._summed(value)
         except ValueError:
             # Overdamped: far from anything that turns.
             return refused
         change = self.change(value)
-        gradient, normal = change.T @ gradient, change.T @ normal @ change
-        return self._with_prior(value, Quadratic(chi2, gradient, normal))
+        gradient, normal = change.T @ summed.gradient, change.T @ summed.normal @ change
+        return self._with_prior(value, Quadratic(summed.chi2, gradient, normal))
 
-    def _rounded(self, model: Eq8, release: Release) -> tuple[float, FloatArray, FloatArray]:
-        """As `compare`, with the weights that the rounding gives; over pieces of the record."""
+    def _summed(self, value: FloatArray) -> Quadratic:
+        """chi^2, gradient and normal matrix by the engine's parameters."""
         chi2, gradient, normal = 0.0, np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
-        for first in range(0, len(self.time_s), _PIECE):
+        residual = np.empty(len(self.values))
+        for first in range(0, len(residual), _PIECE):
             piece = slice(first, first + _PIECE)
-            angle, raw = sample_with_jacobian(model, release, self.time_s[piece])
-            part, score, weights = self._weighed(self.values[piece] - angle)
+            angle, jacobian = sample_with_jacobian(*self.model(value), self.time_s[piece])
+            np.subtract(self.values[piece], angle, out=residual[piece])
+            part, score, weights = self._weighed(residual[piece])
             chi2 += part
-            gradient += raw.T @ score
-            normal += raw.T @ (raw * np.reshape(weights, (-1, 1)))
-        return chi2, gradient, normal
+            gradient += jacobian.T @ score
+            if isinstance(weights, float):
+                normal += weights * (jacobian.T @ jacobian)
+            else:
+                normal += jacobian.T @ (jacobian * weights[:, None])
+        self._last.clear()
+        self._last[value.tobytes()] = residual
+        return Quadratic(chi2, gradient, normal)
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""
