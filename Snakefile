@@ -9,16 +9,12 @@ configfile: "config/config.yaml"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/acquire.smk"
-include: "workflow/rules/calibrate.smk"
-include: "workflow/rules/turning_points.smk"
-include: "workflow/rules/fit.smk"
-include: "workflow/rules/diagnose.smk"
-include: "workflow/rules/separate.smk"
-include: "workflow/rules/compare.smk"
-include: "workflow/rules/figures.smk"
-include: "workflow/rules/report.smk"
-include: "workflow/rules/challenge.smk"
+
+
+for stage in sorted(Path(workflow.basedir, "workflow/rules").glob("*.smk")):
+    if stage.name != "common.smk":
+
+        include: stage
 
 
 # Damaged results are named when a run is planned, a dry run too; they are renamed when it

@@ -1,9 +1,9 @@
 """The command line: it picks a command and turns user errors into one line and a status.
 
-Every command is a module of `pendpipe.commands` with two functions,
-``add_arguments(parser)`` and ``run(arguments) -> int``. Only the module of the command
-that was asked for is imported, since a job's cost is its imports. Other packages add commands
-by entry points of the group ``pendpipe.commands``.
+Every command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
+campaign and no more, with two functions, ``add_arguments(parser)`` and ``run(arguments) -> int``.
+Only the module of the command that was asked for is imported, since a job's cost is its imports.
+Other packages add commands by entry points of the group ``pendpipe.commands``.
 """
 
 from __future__ import annotations
@@ -34,9 +34,6 @@ COMMANDS: Final = {
     "fit": "a, b, c and the rest of one recording",
     "diagnose": "what physics was left out: located, named, modelled",
     "page": "one HTML page about one recording",
-    "diagnose-campaign": "the same over a campaign's records (not available yet)",
-    "separate": "the hysteretic and the viscous part of a campaign's losses",
-    "compare": "a campaign's losses beside Eq. 16",
     "figures": "the figures 3 to 10 of a campaign",
     "report": "one self-contained page about a campaign",
     "doctor": "what is wrong with a campaign's results, and what is safe to do",
@@ -44,6 +41,11 @@ COMMANDS: Final = {
     "effects": "the catalogue of what may have been left out",
 }
 """The commands with the line that ``--help`` shows for each."""
+STAGES: Final = {
+    "separate": "the hysteretic and the viscous part of a campaign's losses",
+    "compare": "a campaign's losses beside Eq. 16",
+}
+"""Stages of a campaign that are commands themselves."""
 
 FIRST_STEPS: Final = """\
 pendpipe analyses free decays of pendulums. With a recording in FILE:
@@ -78,13 +80,17 @@ def _added() -> dict[str, EntryPoint]:
 def _descriptions() -> dict[str, str]:
     """All commands with a line about each; an added one's is the first of its module."""
     added = {name: (found.load().__doc__ or "").splitlines() for name, found in _added().items()}
-    return COMMANDS | {name: lines[0].rstrip(".") for name, lines in added.items() if lines}
+    return (
+        COMMANDS | STAGES | {name: lines[0].rstrip(".") for name, lines in added.items() if lines}
+    )
 
 
 def _module_of(name: str) -> Any:
     """The module of a command; None where there is no such command."""
     if name in COMMANDS:
         return importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
+    if name in STAGES:
+        return importlib.import_module(f"pendpipe.stages.{name.replace('-', '_')}")
     if (found := _added().get(name)) is not None:
         return found.load()
     if name in IN_A_CLONE:

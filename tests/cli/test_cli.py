@@ -12,7 +12,7 @@ import pytest
 from pendpipe import cli
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", cli.COMMANDS | cli.STAGES)
 def test_every_command_has_its_module_and_its_help(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -20,7 +20,8 @@ def test_every_command_has_its_module_and_its_help(
         cli.main([name, "--help"])
     assert ended.value.code == 0
     shown = capsys.readouterr().out
-    module = importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
+    home = "commands" if name in cli.COMMANDS else "stages"
+    module = importlib.import_module(f"pendpipe.{home}.{name.replace('-', '_')}")
     assert (module.__doc__ or "").splitlines()[0] in shown
 
 

@@ -216,13 +216,6 @@ def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> No
         assert (tmp_path / f"{name}.svg").read_text().startswith("<svg")
 
 
-def test_the_campaigns_diagnosis_says_that_it_is_not_there_yet(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.main(["diagnose-campaign", str(tmp_path)]) == 2
-    assert "not available yet" in capsys.readouterr().err
-
-
 def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:
     from pendpipe.diagnosis import diagnose_recording
     from pendpipe.recording import read_plain

@@ -14,7 +14,7 @@ rule compare:
     params:
         depends=jobs.theory(CAMPAIGN),
         repaired=repaired("", "compare"),
-        code=code_version("pendpipe.commands.compare"),
+        code=code_version("pendpipe.stages.compare"),
     message:
         "the losses beside Eq. 16"
     shell:

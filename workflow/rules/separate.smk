@@ -12,7 +12,7 @@ rule separate:
     params:
         depends=jobs.theory(CAMPAIGN),
         repaired=repaired("", "separate"),
-        code=code_version("pendpipe.commands.separate"),
+        code=code_version("pendpipe.stages.separate"),
     message:
         "hysteretic and viscous losses"
     shell:

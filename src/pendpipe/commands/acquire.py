@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from pendpipe.commands._campaign import add_campaign, add_record
+from pendpipe.commands.arguments import add, load
 from pendpipe.errors import InputError
 
 
@@ -77,8 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--link", choices=("pty", "socket"), help="with --serve: on which line")
     workflow = parser.add_argument_group("as a stage of a campaign")
-    add_campaign(workflow)
-    add_record(workflow)
+    add(workflow, "--campaign", "--record", "--refused")
     workflow.add_argument(
         "--caliper", action="store_true", help="the campaign's caliper run instead of a record"
     )
@@ -190,8 +189,6 @@ def _check_length(arguments: argparse.Namespace) -> None:
 
 def _stage(arguments: argparse.Namespace) -> int:
     """Acquire one record of a campaign, or its caliper run."""
-    from pendpipe.commands._campaign import load
-
     campaign = load(arguments.campaign)
     if arguments.caliper:
         from pendpipe.configuration.jobs import caliper_source

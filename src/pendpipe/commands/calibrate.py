@@ -14,8 +14,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pendpipe.commands import print_json
-from pendpipe.commands._campaign import add_record
+from pendpipe.commands.arguments import add, print_json
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibration import Calibration
@@ -25,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe calibrate``."""
     parser.add_argument("file", metavar="FILE", type=Path, help="table of volts against angles")
     parser.add_argument("--out", type=Path, metavar="JSON", help="write the result here")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the summary")
+    add(parser, "--json")
     parser.add_argument("--arm-m", type=float, metavar="M", help="arm of the displacements, metres")
     parser.add_argument(
         "--arm-sd-m", type=float, default=0.0, metavar="M", help="its standard deviation"
@@ -40,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--delimiter", help="between the cells; guessed from the header")
     parser.add_argument("--decimal", choices=".,", help="decimal mark; guessed from the delimiter")
     workflow = parser.add_argument_group("with --record")
-    add_record(parser)
+    add(workflow, "--record", "--refused")
     workflow.add_argument("--sensor", type=Path, metavar="JSON", help="the campaign's calibration")
     workflow.add_argument(
         "--volts-per-radian", type=float, metavar="V/RAD", help="a known constant"

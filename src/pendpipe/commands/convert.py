@@ -6,12 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from pendpipe.commands import _reading
+from pendpipe.commands.arguments import add_file, announce, read_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe convert``."""
-    _reading.add_arguments(parser)
+    add_file(parser)
     parser.add_argument(
         "out",
         metavar="OUT",
@@ -29,8 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     piped = str(arguments.out) == "-"
     if not piped:
         check_name(arguments.out)
-    recording = read(arguments.file, _reading.options(arguments))
-    _reading.announce(arguments, recording)
+    recording = read(arguments.file, read_options(arguments))
+    announce(arguments, recording)
     if piped:
         sys.stdout.writelines(plain_lines(recording))
         return 0

@@ -11,40 +11,29 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.commands import _reading, print_json
-from pendpipe.commands._campaign import add_record
+from pendpipe.commands.arguments import add, add_file, print_json, read_motion
+from pendpipe.errors import DamagedError, InputError
+from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 
 if TYPE_CHECKING:
-    from pendpipe.stages.diagnose import DiagnosisOptions
+    from pendpipe.diagnosis import Outcome
+    from pendpipe.recording import Recording
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
+_EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
+<text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
+{}</text></svg>
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe diagnose``."""
-    _reading.add_arguments(parser)
+    add_file(parser)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write diagnosis.json and the figures there"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print diagnosis.json instead of the paragraph"
-    )
-    parser.add_argument(
-        "--baseline",
-        choices=("eq8", "viscous"),
-        default="eq8",
-        help="the null model; eq8: Eq. 8, linear restoring torque (default); viscous: Eq. 3",
-    )
-    parser.add_argument(
-        "--fix",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="hold a parameter, so that a prediction is tested (a, b, c, frequency, amplitude,"
-        " offset, quality_factor_hysteretic, quality_factor_viscous); repeatable",
     )
     parser.add_argument(
         "--level",
@@ -68,112 +57,133 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-figures", dest="figures", action="store_const", const="none", help="as --figures none"
     )
-    parser.add_argument(
-        "--turning-points", type=Path, metavar="CSV", help="of an earlier stage, with their cuts"
-    )
-    parser.add_argument(
-        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
-    )
-    add_record(parser)
+    add(parser, "--json", "--baseline", "--fix")
+    add(parser, "--turning-points", "--calibration", "--record", "--refused")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, write the result, and print the answer."""
     from pendpipe.analysis.fit.fixed import parse_fixed
-    from pendpipe.errors import InputError
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
-    from pendpipe.stages.diagnose import DiagnosisOptions
 
     if arguments.record is not None and arguments.out is None:
         raise InputError("--record", "a campaign's record needs a folder", "add --out DIR")
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
-    options = DiagnosisOptions(
-        arguments.baseline,
-        fixed,
-        arguments.seed,
-        arguments.level,
-        arguments.figures,
-        arguments.record is not None,
-    )
     if arguments.out is not None and Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a folder to write to.
         make_folder(arguments.out)
     if arguments.record is None:
-        return _answer(arguments, options)
+        return _diagnose(arguments, fixed)
+    from pendpipe.diagnosis.result import FILE_NAME
     from pendpipe.manifest import check, job
-    from pendpipe.stages.diagnose import RESULT
 
     check([arguments.refused] if arguments.refused is not None else [])
     read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
     inputs = [path for path in read if path is not None]
     with job(arguments.out.parent, "diagnose", inputs=inputs) as running:
-        status = _answer(arguments, options)
-        running.outputs.append(arguments.out / RESULT)
+        status = _diagnose(arguments, fixed)
+        running.outputs.append(arguments.out / FILE_NAME)
         running.extras += sorted(
             path for path in arguments.out.iterdir() if path.suffix in (".svg", ".png")
         )
     return status
 
 
-def _answer(arguments: argparse.Namespace, options: DiagnosisOptions) -> int:
-    """Diagnose, unless the record was refused before."""
-    from pendpipe.stages.diagnose import refused_before
+def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
+    """Diagnose, unless a stage that this one builds on has refused the record.
 
-    earlier = refused_before(arguments.refused)
-    if earlier is not None:
-        return _not_analysable(arguments, options, earlier, {})
-    return _diagnose(arguments, options)
+    The fit runs beside the diagnosis, so its refusal does not count. Nor does a diagnosis refuse
+    a record: what can't be diagnosed may still have been fitted.
+    """
+    from pendpipe.stages.refusal import reason_of, within_results
 
-
-def _diagnose(arguments: argparse.Namespace, options: DiagnosisOptions) -> int:
-    from pendpipe.commands._motion import read_motion
-    from pendpipe.errors import DamagedError, InputError
-    from pendpipe.stages.diagnose import diagnose_motion, write_diagnosis
-
-    provenance: dict[str, Any] = {"seed": options.seed, "fixed": list(arguments.fix)}
+    earlier = arguments.refused and reason_of(arguments.refused, before="fit")
+    if earlier:
+        return _not_analysable(arguments, earlier, {})
+    provenance: dict[str, Any] = {"seed": arguments.seed, "fixed": list(arguments.fix)}
     try:
         recording, made = read_motion(arguments)
-        provenance = made | provenance | {"level": options.level}
-        outcome = diagnose_motion(
-            recording,
-            options,
-            place=arguments.file,
-            turning_points=arguments.turning_points,
-            provenance=provenance,
-            progress=_print_progress,
-        )
+        provenance = made | provenance | {"level": arguments.level}
+        outcome = _outcome(arguments, recording, fixed=fixed, provenance=provenance)
     except InputError as error:
         if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
-        from pendpipe.stages.refusal import within_results
-
-        reason = within_results(error, arguments.refused)
-        return _not_analysable(arguments, options, reason, provenance)
+        return _not_analysable(arguments, within_results(error, arguments.refused), provenance)
     content = outcome.to_dict()
     if arguments.out is not None:
-        content = write_diagnosis(arguments.out, outcome, options, _print_progress)
+        content = _write(arguments, outcome)
     for warning in content["warnings"]:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
     _print_answer(arguments, content)
     return FOUND if arguments.fail_on == content["verdict"] else 0
 
 
-def _not_analysable(
-    arguments: argparse.Namespace,
-    options: DiagnosisOptions,
-    reason: str,
-    provenance: dict[str, Any],
-) -> int:
-    """Write why there is no diagnosis; in a campaign the other records go on."""
-    from pendpipe.diagnosis.result import not_analysable
-    from pendpipe.stages.diagnose import write_not_analysable
+def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -> Outcome:
+    """Diagnose a recording, with the turning points of an earlier stage if given."""
+    from pendpipe.analysis.turning_points import read_turning_points
+    from pendpipe.diagnosis import diagnose_decay, diagnose_recording
 
+    more |= {
+        "baseline": arguments.baseline,
+        "seed": arguments.seed,
+        "level": arguments.level,
+        "place": arguments.file,
+        "progress": _print_progress,
+    }
+    if arguments.turning_points is None:
+        return diagnose_recording(recording, **more)
+    points = read_turning_points(arguments.turning_points)
+    part = recording.between(points.start_s, points.stop_s)
+    return diagnose_decay(part, points, whole=recording, **more)
+
+
+def _write(arguments: argparse.Namespace, outcome: Outcome) -> dict[str, Any]:
+    """Draw the figures that are wanted, then write the result that names them."""
+    wanted = arguments.figures == "all" or (
+        arguments.figures == "found" and outcome.verdict == "missing-physics"
+    )
+    _remove_figures(arguments.out)
+    if wanted:
+        _print_progress("drawing")
+    content = outcome.save(arguments.out, figures=wanted)
+    _write_placeholders(arguments, "Not drawn: nothing is missing here.")
+    return content
+
+
+def _remove_figures(folder: Path) -> None:
+    """Remove the figures of an earlier diagnosis."""
+    for name in (*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES):
+        for form in (".svg", ".png"):
+            folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
+
+
+def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
+    """Write one line instead of each figure that a workflow waits for and that was not drawn."""
+    from pendpipe.files import replaced
+
+    if arguments.record is None or arguments.figures == "none":
+        return
+    for name in OF_EVERY_DIAGNOSIS:
+        path = arguments.out / f"{name}.svg"
+        if not path.exists():
+            with replaced(path) as stream:
+                stream.write(_EMPTY.format(reason))
+
+
+def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
+    """Write why there is no diagnosis; in a campaign the other records go on."""
+    from pendpipe.diagnosis.result import FILE_NAME, not_analysable
+    from pendpipe.files import write_json
+
+    content = not_analysable(arguments.baseline, reason, provenance)
     if arguments.out is not None:
-        write_not_analysable(arguments.out, options, reason, provenance)
+        _remove_figures(arguments.out)
+        _write_placeholders(arguments, "Not drawn: this record can't be analysed.")
+        write_json(arguments.out / FILE_NAME, content)
     if arguments.json:
-        _print_answer(arguments, not_analysable(options.baseline, reason, provenance))
+        print_json(content)
     print(f"pendpipe: {reason}", file=sys.stderr)
     return 2 if arguments.refused is None else 0
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pendpipe.commands import print_json
+from pendpipe.commands.arguments import add, print_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="a folder of results (%(default)s)",
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add(parser, "--json")
     parser.add_argument(
         "--fail-on", choices=("findings",), help="end with status 3 if anything is wrong"
     )

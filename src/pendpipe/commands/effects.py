@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 
-from pendpipe.commands import print_json
+from pendpipe.commands.arguments import add, print_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe effects``."""
     parser.add_argument("--list", action="store_true", help="one line an effect")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add(parser, "--json")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -18,8 +18,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pendpipe.commands import _reading, print_json
-from pendpipe.commands._campaign import add_record
+from pendpipe.commands.arguments import add, add_file, print_json, read_motion
 from pendpipe.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,9 +27,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe fit``."""
-    _reading.add_arguments(parser, several=True)
+    add_file(parser, several=True)
     parser.add_argument("--out", metavar="JSON", help="the result; - is standard output")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the summary")
     parser.add_argument(
         "--figure",
         type=Path,
@@ -53,28 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--accept", action="store_true", help="print a law that contradicts the decay, status 0"
     )
-    parser.add_argument(
-        "--baseline",
-        choices=("eq8", "viscous"),
-        default="eq8",
-        help="eq8: Eq. 8 (default); viscous: Eq. 3, a = c = 0",
-    )
-    parser.add_argument(
-        "--fix",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="hold a parameter (a, b, c, frequency, amplitude, offset, quality_factor_hysteretic,"
-        " quality_factor_viscous); repeatable",
-    )
-    parser.add_argument(
-        "--turning-points", type=Path, metavar="CSV", help="found before, with their cuts"
-    )
-    parser.add_argument(
-        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
-    )
     parser.add_argument("--seed", type=int, metavar="N", help="recorded only")
-    add_record(parser)
+    add(parser, "--json", "--baseline", "--fix")
+    add(parser, "--turning-points", "--calibration", "--record", "--refused")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -122,7 +101,6 @@ def _fit(arguments: argparse.Namespace) -> FitResult:
     from pendpipe import api
     from pendpipe.analysis.fit.fixed import parse_fixed
     from pendpipe.analysis.turning_points import read_turning_points
-    from pendpipe.commands._motion import read_motion
 
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments)

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from pendpipe.commands import _reading, print_json
+from pendpipe.commands.arguments import add, add_file, print_json, read_options
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe inspect``."""
-    _reading.add_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_file(parser)
+    add(parser, "--json")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Inspect and print."""
     from pendpipe.formats import inspect
 
-    found = inspect(arguments.file, _reading.options(arguments))
+    found = inspect(arguments.file, read_options(arguments))
     if arguments.json:
         print_json(found.as_json())
     else:

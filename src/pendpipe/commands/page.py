@@ -9,17 +9,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from pendpipe.commands import _reading
+from pendpipe.commands.arguments import add, add_file, read_motion
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe page``."""
-    _reading.add_arguments(parser)
+    add_file(parser)
     parser.add_argument("--out", metavar="HTML", help="the page (FILE.html); - is standard output")
     parser.add_argument("--no-diagnosis", action="store_true", help="the fit alone, in a second")
-    parser.add_argument(
-        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
-    )
+    add(parser, "--calibration")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,7 +25,6 @@ def run(arguments: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from pendpipe import api
-    from pendpipe.commands._motion import read_motion
     from pendpipe.files import replaced
     from pendpipe.report.recording import render_recording
 

@@ -11,18 +11,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from pendpipe.commands import _reading
-from pendpipe.commands._campaign import add_record
+from pendpipe.commands.arguments import add, add_file, read_motion
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe turning-points``."""
-    _reading.add_arguments(parser)
+    add_file(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="the table")
-    parser.add_argument(
-        "--calibration", type=Path, metavar="JSON", help="the sensor's, from pendpipe calibrate"
-    )
-    add_record(parser)
+    add(parser, "--calibration", "--record", "--refused")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,7 +38,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _measure(arguments: argparse.Namespace) -> None:
     from pendpipe.analysis.turning_points import write_turning_points
     from pendpipe.analysis.turning_points.recorded import measure_recording
-    from pendpipe.commands._motion import read_motion
 
     recording, provenance = read_motion(arguments)
     points, _ = measure_recording(recording, arguments.file, provenance)

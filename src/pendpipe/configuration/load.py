@@ -25,6 +25,11 @@ class Campaign:
     configuration: Configuration
     records: tuple[Record, ...]
 
+    @property
+    def folder(self) -> Path:
+        """The results: a folder a record lies in it."""
+        return Path(self.configuration.results)
+
     def record(self, name: str) -> Record:
         """Find a record by its name."""
         for entry in self.records:

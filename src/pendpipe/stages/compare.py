@@ -1,7 +1,8 @@
-"""A campaign beside its theory: comparison.json, and campaign.json with its numbers alone."""
+"""Compare a campaign's losses with Eq. 16, and sum the campaign up in numbers."""
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,17 +16,41 @@ from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.shared_fit import SharedEstimate
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, Surroundings
+from pendpipe.commands.arguments import add, load
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
+from pendpipe.manifest import job
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
 from pendpipe.provenance import code_version
-from pendpipe.stages.results import RecordResult, read_results, sensor_file
+from pendpipe.stages.results import RecordResult, read_results, record_files, sensor_file
 from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.stages.theory import branch_curves, record_theory
 from pendpipe.version import __version__
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe compare``."""
+    add(parser, "--campaign", required=True)
+    parser.add_argument("--separation", type=Path, required=True, help="the stage before's JSON")
+    parser.add_argument("--out", type=Path, required=True, help="the comparison, JSON")
+    parser.add_argument("--summary", type=Path, required=True, help="campaign.json")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare."""
+    campaign = load(arguments.campaign)
+    inputs = [
+        arguments.separation,
+        sensor_file(campaign),
+        *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
+    ]
+    with job(campaign.folder, "compare", inputs=inputs, out=arguments.out) as running:
+        compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
+        running.outputs += [arguments.out, arguments.summary]
+    return 0
 
 
 def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:
@@ -115,9 +140,7 @@ def _record(
     excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
     content["warnings"] = [*excluded, *fit["warnings"], *result.calibration["warnings"]]
     content["volts_per_radian"] = result.calibration["volts_per_radian"]
-    points = read_turning_points(
-        Path(campaign.configuration.results) / row.record / "turning_points.csv"
-    )
+    points = read_turning_points(campaign.folder / row.record / "turning_points.csv")
     content["start_s"], content["stop_s"] = float(points.time_s[0]), float(points.time_s[-1])
     content["misfit"] = asdict(amplitude_misfit(points))
     if split is not None:
@@ -248,7 +271,7 @@ def _tail(campaign: Campaign, results: list[RecordResult]) -> list[dict[str, Any
     usable = [result.record.record for result in results if result.refused is None]
     if name is None or name not in usable:
         return []
-    path = Path(campaign.configuration.results) / name / "turning_points.csv"
+    path = campaign.folder / name / "turning_points.csv"
     return [
         {
             "start_s": tail.start_s,

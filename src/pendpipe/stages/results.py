@@ -51,19 +51,17 @@ def estimate(content: dict[str, Any]) -> Estimate:
 
 def record_files(campaign: Campaign, *names: str) -> list[Path]:
     """The files of these names in every record's folder."""
-    folder = Path(campaign.configuration.results)
-    return [folder / record.record / name for record in campaign.records for name in names]
+    return [campaign.folder / row.record / name for row in campaign.records for name in names]
 
 
 def sensor_file(campaign: Campaign) -> Path:
     """The result of the campaign's caliper run."""
-    return Path(campaign.configuration.results, "calibration", "sensor.json")
+    return campaign.folder / "calibration" / "sensor.json"
 
 
 def read_results(campaign: Campaign) -> list[RecordResult]:
     """Read every record's fit, in the order of the table."""
-    folder = Path(campaign.configuration.results)
-    return [_read(folder / record.record, record) for record in campaign.records]
+    return [_read(campaign.folder / record.record, record) for record in campaign.records]
 
 
 def _read(folder: Path, record: Record) -> RecordResult:

@@ -1,19 +1,38 @@
-"""The campaign's hysteretic coefficient, and every record's losses split by Eq. 17."""
+"""Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord
 from pendpipe.analysis.separate import Benchmark, fit_benchmark, separate
+from pendpipe.commands.arguments import add, load
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
-from pendpipe.stages.results import RecordResult, estimate, read_results
+from pendpipe.manifest import job
+from pendpipe.stages.results import RecordResult, estimate, read_results, record_files
 from pendpipe.stages.theory import record_theory
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe separate``."""
+    add(parser, "--campaign", required=True)
+    parser.add_argument("--out", type=Path, required=True, help="the separation, JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Separate."""
+    campaign = load(arguments.campaign)
+    inputs = record_files(campaign, "fit.json", "calibration.json")
+    with job(campaign.folder, "separate", inputs=inputs, out=arguments.out) as running:
+        separate_campaign(campaign, arguments.out)
+        running.outputs.append(arguments.out)
+    return 0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,165 @@
+"""The arguments that several commands share, and what is read and printed by them."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pendpipe.errors import InputError
+from pendpipe.files import finite, read_json
+from pendpipe.version import __version__
+
+if TYPE_CHECKING:
+    from pendpipe.configuration.load import Campaign
+    from pendpipe.formats import ReadOptions
+    from pendpipe.recording import Recording
+
+Flags = dict[str, dict[str, Any]]
+
+READING: Final[Flags] = {
+    "--channel": {"metavar": "CHANNEL", "help": "number (from 1) or name, see inspect"},
+    "--column": {
+        "metavar": "COLUMN",
+        "help": "number (from 1) or name; X,Y for a position; TIME:COLUMN",
+    },
+    "--unit": {"metavar": "UNIT", "help": "rad, deg, V, mm, counts, ...; or ms:deg"},
+    "--sample-rate": {"metavar": "HZ", "type": float, "help": "samples a second"},
+    "--decimal": {"metavar": "SIGN", "help": "decimal sign, '.' or ','"},
+    "--delimiter": {"metavar": "SIGN", "help": "sign between cells, or tab, space"},
+    "--volts-per-radian": {
+        "metavar": "V",
+        "type": float,
+        "help": "the sensor's constant, V/rad",
+    },
+    "--start": {
+        "metavar": "S",
+        "type": float,
+        "dest": "start_s",
+        "help": "first time to read, seconds",
+    },
+    "--stop": {
+        "metavar": "S",
+        "type": float,
+        "dest": "stop_s",
+        "help": "last time to read, seconds",
+    },
+}
+"""Overrides of a reader's guesses, one a field of `pendpipe.formats.ReadOptions`."""
+
+SHARED: Final[Flags] = {
+    "--json": {"action": "store_true", "help": "print one JSON object"},
+    "--calibration": {
+        "type": Path,
+        "metavar": "JSON",
+        "help": "the sensor's, from pendpipe calibrate",
+    },
+    "--turning-points": {
+        "type": Path,
+        "metavar": "CSV",
+        "help": "of an earlier stage, with their cuts",
+    },
+    "--baseline": {
+        "choices": ("eq8", "viscous"),
+        "default": "eq8",
+        "help": "eq8: Eq. 8 (default); viscous: Eq. 3, a = c = 0",
+    },
+    "--fix": {
+        "action": "append",
+        "default": [],
+        "metavar": "NAME=VALUE",
+        "help": "hold a parameter, as for a prediction (a, b, c, frequency, amplitude, offset,"
+        " quality_factor_hysteretic, quality_factor_viscous); repeatable",
+    },
+    "--campaign": {"type": Path, "metavar": "CONFIG", "help": "a campaign's configuration"},
+    "--record": {"metavar": "NAME", "help": "the campaign's name for this record"},
+    "--refused": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "write here why the record can't be used, and end with 0, instead of ending with 2",
+    },
+}
+"""Arguments of more than one command."""
+
+
+def add(parser: argparse._ActionsContainer, *names: str, **more: Any) -> None:
+    """Declare shared arguments."""
+    for name in names:
+        parser.add_argument(name, **SHARED[name], **more)
+
+
+def add_file(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """Declare FILE (or `several`, as ``files``) and the overrides of a reader's guesses."""
+    about = "a recording in any supported format; - is standard input"
+    named = ("files", "+") if several else ("file", None)
+    parser.add_argument(named[0], metavar="FILE", nargs=named[1], help=about)
+    group = parser.add_argument_group("where a guess is wrong")
+    for name, options in READING.items():
+        group.add_argument(name, **options)
+
+
+def read_options(arguments: argparse.Namespace) -> ReadOptions:
+    """Turn the parsed arguments into the readers' options."""
+    from pendpipe.formats import ReadOptions
+
+    return ReadOptions(**{each.name: getattr(arguments, each.name) for each in fields(ReadOptions)})
+
+
+def announce(arguments: argparse.Namespace, recording: Recording) -> None:
+    """Print what was guessed, the weak guesses first, to stderr."""
+    weak = [f"a guess: {guess}" for guess in recording.weak_guesses]
+    for line in (*weak, *recording.notes):
+        print(f"{arguments.file}: {line}", file=sys.stderr)
+
+
+def read_motion(arguments: argparse.Namespace) -> tuple[Recording, dict[str, Any]]:
+    """Read FILE, apply the sensor constant, and say what was guessed.
+
+    Returns
+    -------
+    recording
+        In rad, or in its own unit where no constant makes it an angle.
+    provenance
+        ``input_sha256`` (of what came through standard input too), ``version``,
+        ``volts_per_radian`` (None where none was used).
+    """
+    from pendpipe.formats import read
+    from pendpipe.formats.reading import file_bytes
+
+    recording = read(arguments.file, read_options(arguments))
+    constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
+    was_volts = recording.quantity == "volts"
+    recording = recording.as_motion(constant, arguments.file)
+    announce(arguments, recording)
+    return recording, {
+        "input_sha256": hashlib.sha256(file_bytes(Path(arguments.file))).hexdigest(),
+        "version": __version__,
+        "volts_per_radian": recording.number("volts_per_radian") if was_volts else None,
+    }
+
+
+def _calibrated(path: Path | None) -> float | None:
+    """The sensor constant in a result of ``pendpipe calibrate``; None where it has none."""
+    if path is None:
+        return None
+    try:
+        constant = read_json(path)["volts_per_radian"]
+    except (KeyError, TypeError):
+        raise InputError(path, "this is no calibration", "run pendpipe calibrate") from None
+    return None if constant is None else float(constant["value"])
+
+
+def load(path: Path) -> Campaign:
+    """Read and check a campaign."""
+    from pendpipe.configuration.load import load_campaign, read_configuration
+
+    return load_campaign(read_configuration(path), path)
+
+
+def print_json(content: Any) -> None:
+    """Print one JSON object for programs; what is not finite is null."""
+    print(json.dumps(finite(content), indent=1, ensure_ascii=False))
