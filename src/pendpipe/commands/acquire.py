@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from pendpipe.commands.arguments import add, load
+from pendpipe.arguments import add, load
 from pendpipe.errors import InputError
 
 

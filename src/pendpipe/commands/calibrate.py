@@ -14,7 +14,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pendpipe.commands.arguments import add, print_json
+from pendpipe.arguments import add, print_json
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibration import Calibration

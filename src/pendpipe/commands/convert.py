@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pendpipe.commands.arguments import add_file, announce, read_options
+from pendpipe.arguments import add_file, announce, read_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

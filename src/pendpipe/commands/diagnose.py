@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.commands.arguments import add, add_file, print_json, read_motion
+from pendpipe.arguments import add, add_file, print_json, read_motion
 from pendpipe.errors import DamagedError, InputError
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 

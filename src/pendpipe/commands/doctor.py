@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pendpipe.commands.arguments import add, print_json
+from pendpipe.arguments import add, print_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from pendpipe.commands.arguments import add, print_json
+from pendpipe.arguments import add, print_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pendpipe.commands.arguments import add, add_file, print_json, read_motion
+from pendpipe.arguments import add, add_file, print_json, read_motion
 from pendpipe.errors import InputError
 
 if TYPE_CHECKING:

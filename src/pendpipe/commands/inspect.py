@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from pendpipe.commands.arguments import add, add_file, print_json, read_options
+from pendpipe.arguments import add, add_file, print_json, read_options
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection

@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pendpipe.commands.arguments import add, add_file, read_motion
+from pendpipe.arguments import add, add_file, read_motion
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-Numbers: TypeAlias = npt.ArrayLike
+Arguments = ParamSpec("Arguments")
+
+Numbers: TypeAlias = Any
 """A number or an array of numbers; several arguments broadcast against each other."""
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+def equation(function: Callable[Arguments, FloatArray]) -> Callable[Arguments, FloatArray]:
+    """Let a function of arrays take numbers too, and return a number where all are numbers."""
+
+    @wraps(function)
+    def of_numbers(*given: Arguments.args, **named: Arguments.kwargs) -> FloatArray:
+        arrays = [np.asarray(value, dtype=np.float64) for value in given]
+        others = {name: np.asarray(value, dtype=np.float64) for name, value in named.items()}
+        return plain(function(*arrays, **others))  # type: ignore[arg-type]
+
+    return of_numbers
 
 
 def floats(*values: Numbers) -> tuple[FloatArray, ...]:

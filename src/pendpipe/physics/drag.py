@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation
 
 
+@equation
 def stokes_drag(
     velocity_m_per_s: Numbers, radius_m: Numbers, viscosity_pa_s: Numbers
 ) -> FloatArray:
@@ -27,10 +28,10 @@ def stokes_drag(
     FloatArray
         The force in N, in the direction of the velocity that it opposes.
     """
-    velocity, radius, viscosity = floats(velocity_m_per_s, radius_m, viscosity_pa_s)
-    return plain(6.0 * np.pi * viscosity * radius * velocity)
+    return 6.0 * np.pi * viscosity_pa_s * radius_m * velocity_m_per_s
 
 
+@equation
 def penetration_depth(
     angular_frequency_per_s: Numbers, viscosity_pa_s: Numbers, density_kg_per_m3: Numbers
 ) -> FloatArray:
@@ -46,10 +47,10 @@ def penetration_depth(
     FloatArray
         The penetration depth of Eqs. 2 and 16 in m.
     """
-    omega, eta, rho = floats(angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3)
-    return plain(np.sqrt(2.0 * eta / (omega * rho)))
+    return np.sqrt(2.0 * viscosity_pa_s / (angular_frequency_per_s * density_kg_per_m3))
 
 
+@equation
 def harmonic_drag(
     velocity_m_per_s: Numbers,
     radius_m: Numbers,
@@ -75,12 +76,12 @@ def harmonic_drag(
     FloatArray
         The force in N, in the direction of the velocity that it opposes.
     """
-    radius, history = floats(radius_m, history_coefficient)
     depth = penetration_depth(angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3)
     steady = stokes_drag(velocity_m_per_s, radius_m, viscosity_pa_s)
-    return plain(steady * (1.0 + history * radius / depth))
+    return steady * (1.0 + history_coefficient * radius_m / depth)
 
 
+@equation
 def viscous_quality_factor(
     moment_of_inertia_kg_m2: Numbers,
     angular_frequency_per_s: Numbers,
@@ -108,13 +109,18 @@ def viscous_quality_factor(
     FloatArray
         Q_v, a pure number.
     """
-    inertia, omega, distance = floats(moment_of_inertia_kg_m2, angular_frequency_per_s, distance_m)
     drag_per_velocity = harmonic_drag(
-        1.0, radius_m, omega, viscosity_pa_s, density_kg_per_m3, history_coefficient
+        1.0,
+        radius_m,
+        angular_frequency_per_s,
+        viscosity_pa_s,
+        density_kg_per_m3,
+        history_coefficient,
     )
-    return plain(inertia * omega / (drag_per_velocity * distance**2))
+    return moment_of_inertia_kg_m2 * angular_frequency_per_s / (drag_per_velocity * distance_m**2)
 
 
+@equation
 def quadratic_drag_rate(
     drag_coefficient: Numbers,
     moment_of_inertia_kg_m2: Numbers,
@@ -140,18 +146,11 @@ def quadratic_drag_rate(
     FloatArray
         a in 1/(rad s).
     """
-    coefficient, inertia, omega, radius, distance, rho = floats(
-        drag_coefficient,
-        moment_of_inertia_kg_m2,
-        angular_frequency_per_s,
-        radius_m,
-        distance_m,
-        density_kg_per_m3,
-    )
-    torque = 0.5 * rho * coefficient * np.pi * radius**2 * distance**3
-    return plain(4.0 / (3.0 * np.pi) * omega * torque / inertia)
+    torque = 0.5 * density_kg_per_m3 * drag_coefficient * np.pi * radius_m**2 * distance_m**3
+    return 4.0 / (3.0 * np.pi) * angular_frequency_per_s * torque / moment_of_inertia_kg_m2
 
 
+@equation
 def added_mass_coefficient(
     radius_m: Numbers,
     angular_frequency_per_s: Numbers,
@@ -173,9 +172,8 @@ def added_mass_coefficient(
     FloatArray
         Added mass over the mass of the displaced fluid, a pure number.
     """
-    (radius,) = floats(radius_m)
     depth = penetration_depth(angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3)
-    return plain(0.5 + 2.25 * depth / radius)
+    return 0.5 + 2.25 * depth / radius_m
 
 
 POTENTIAL_FLOW_ADDED_MASS = 0.5

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 from pendpipe.physics.separation import inverse
 
 
@@ -142,6 +142,7 @@ def universal_acceleration(
     return plain(-bracket * np.sign(v) - omega / viscous * v - omega**2 * x)
 
 
+@equation
 def energy_power_friction(
     amplitude_rad: Numbers, coefficient: Numbers, exponent: Numbers
 ) -> FloatArray:
@@ -160,10 +161,10 @@ def energy_power_friction(
     FloatArray
         f/m in rad/s^2.
     """
-    y, strength, power = floats(amplitude_rad, coefficient, exponent)
-    return plain(strength * y ** (2.0 * power))
+    return coefficient * amplitude_rad ** (2.0 * exponent)
 
 
+@equation
 def energy_power_quality_factor(
     amplitude_rad: Numbers,
     coefficient: Numbers,
@@ -175,9 +176,8 @@ def energy_power_quality_factor(
     The square wave of the friction has the fundamental (4/pi) f/m, which Eq. 9a equates
     with omega v/Q: ``Q = (pi/4) omega^2 y^(1 - 2 lambda) / c``.
     """
-    y, omega = floats(amplitude_rad, angular_frequency_per_s)
     friction = energy_power_friction(amplitude_rad, coefficient, exponent)
-    return plain((np.pi / 4.0) * omega**2 * y / friction)
+    return (np.pi / 4.0) * angular_frequency_per_s**2 * amplitude_rad / friction
 
 
 def net_quality_factor(
@@ -202,6 +202,7 @@ def net_quality_factor(
     return inverse(loss)
 
 
+@equation
 def structural_quality_factor(
     moment_of_inertia_kg_m2: Numbers,
     angular_frequency_per_s: Numbers,
@@ -217,7 +218,4 @@ def structural_quality_factor(
     moment_of_inertia_kg_m2, angular_frequency_per_s, loss_torque_n_m_per_rad
         I in kg m^2, omega in rad/s, kappa'' in N m/rad; broadcast.
     """
-    inertia, omega, loss = floats(
-        moment_of_inertia_kg_m2, angular_frequency_per_s, loss_torque_n_m_per_rad
-    )
-    return plain(inertia * omega**2 / loss)
+    return moment_of_inertia_kg_m2 * angular_frequency_per_s**2 / loss_torque_n_m_per_rad

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 
 
+@equation
 def viscous_acceleration(
     displacement: Numbers,
     velocity: Numbers,
@@ -27,47 +28,50 @@ def viscous_acceleration(
     FloatArray
         x'' in rad/s^2 (or m/s^2).
     """
-    x, v, omega, quality = floats(displacement, velocity, angular_frequency_per_s, quality_factor)
-    return plain(-omega / quality * v - omega**2 * x)
+    return (
+        -angular_frequency_per_s / quality_factor * velocity
+        - angular_frequency_per_s**2 * displacement
+    )
 
 
+@equation
 def damping_coefficient(angular_frequency_per_s: Numbers, quality_factor: Numbers) -> FloatArray:
     """The rate beta of the amplitude's decay in 1/s, Eq. 4: ``2 beta = omega/Q``."""
-    omega, quality = floats(angular_frequency_per_s, quality_factor)
-    return plain(omega / (2.0 * quality))
+    return angular_frequency_per_s / (2.0 * quality_factor)
 
 
+@equation
 def logarithmic_decrement(quality_factor: Numbers) -> FloatArray:
     """Logarithm of the ratio of amplitudes one period apart, Eq. 5: ``beta T = pi/Q``."""
-    (quality,) = floats(quality_factor)
-    return plain(np.pi / quality)
+    return np.pi / quality_factor
 
 
+@equation
 def viscous_frequency_shift(quality_factor: Numbers) -> FloatArray:
     """Relative frequency shift of viscous damping to leading order, Eq. 6: ``-1/(8 Q^2)``."""
-    (quality,) = floats(quality_factor)
-    return plain(-1.0 / (8.0 * quality**2))
+    return -1.0 / (8.0 * quality_factor**2)
 
 
+@equation
 def viscous_frequency_ratio(quality_factor: Numbers) -> FloatArray:
     """Frequency of Eq. 3's free decay over the undamped one: ``sqrt(1 - 1/(4 Q^2))``.
 
     NaN for Q below 1/2, where there is no oscillation.
     """
-    (quality,) = floats(quality_factor)
-    squared = 1.0 - 0.25 / quality**2
-    return plain(np.sqrt(np.where(squared >= 0.0, squared, np.nan)))
+    squared = 1.0 - 0.25 / quality_factor**2
+    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
 
 
+@equation
 def hysteretic_frequency_shift(quality_factor: Numbers) -> FloatArray:
     """Relative frequency shift of Eq. 8's hysteretic term to leading order: ``-pi^2/(32 Q_h^2)``.
 
     According to the paper there is none; Eq. 8 itself has one, 2.5 times that of Eq. 6.
     """
-    (quality,) = floats(quality_factor)
-    return plain(-(np.pi**2) / (32.0 * quality**2))
+    return -(np.pi**2) / (32.0 * quality_factor**2)
 
 
+@equation
 def hysteretic_frequency_ratio(quality_factor: Numbers) -> FloatArray:
     """Frequency of Eq. 8's hysteretic decay over omega/(2 pi): ``sqrt(1 - (pi/(4 Q_h))^2)``.
 
@@ -76,11 +80,11 @@ def hysteretic_frequency_ratio(quality_factor: Numbers) -> FloatArray:
     ``phi' = omega - h cos(phi)``, so it takes ``pi/sqrt(omega^2 - h^2)``.
     NaN for Q_h below pi/4, where there is no oscillation.
     """
-    (quality,) = floats(quality_factor)
-    squared = 1.0 - (np.pi / (4.0 * quality)) ** 2
-    return plain(np.sqrt(np.where(squared >= 0.0, squared, np.nan)))
+    squared = 1.0 - (np.pi / (4.0 * quality_factor)) ** 2
+    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
 
 
+@equation
 def hysteretic_decrement_quality(quality_factor: Numbers) -> FloatArray:
     """Q from the decrement of a half cycle of Eq. 8's hysteretic term.
 
@@ -99,14 +103,13 @@ def hysteretic_decrement_quality(quality_factor: Numbers) -> FloatArray:
         The quality factor that the turning points show, below Q_h by pi^2/(48 Q_h^2)
         of it to leading order (0.2 % at Q_h = 10).
     """
-    (quality,) = floats(quality_factor)
-    return plain(np.pi / (4.0 * np.arctanh(np.pi / (4.0 * quality))))
+    return np.pi / (4.0 * np.arctanh(np.pi / (4.0 * quality_factor)))
 
 
+@equation
 def hysteretic_quality_of_decrement(decrement_quality: Numbers) -> FloatArray:
     """Q_h of Eq. 8 whose half cycles show the given Q: ``Q_h = pi/(4 tanh(pi/(4 Q)))``."""
-    (quality,) = floats(decrement_quality)
-    return plain(np.pi / (4.0 * np.tanh(np.pi / (4.0 * quality))))
+    return np.pi / (4.0 * np.tanh(np.pi / (4.0 * decrement_quality)))
 
 
 def driven_pendulum_acceleration(

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 from pendpipe.physics.drag import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
@@ -83,10 +83,10 @@ class Fluid(NamedTuple):
     viscosity_pa_s: Numbers
 
 
+@equation
 def sphere_volume(radius_m: Numbers) -> FloatArray:
     """Volume of a sphere in m^3: ``4 pi a^3/3``."""
-    (radius,) = floats(radius_m)
-    return plain(4.0 / 3.0 * np.pi * radius**3)
+    return 4.0 / 3.0 * np.pi * radius_m**3
 
 
 def moment_of_inertia(parts: Sequence[Part]) -> FloatArray:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 from pendpipe.physics.separation import inverse
 
 
+@equation
 def amplitude_rate(amplitude_rad: Numbers, a: Numbers, b: Numbers, c: Numbers) -> FloatArray:
     """Rate of the amplitude, Eq. 13: ``y' = -(a y^2 + b y + c)``.
 
@@ -23,8 +24,7 @@ def amplitude_rate(amplitude_rad: Numbers, a: Numbers, b: Numbers, c: Numbers) -
     FloatArray
         y' in rad/s; zero where y = 0 (the pendulum rests).
     """
-    y, quadratic, linear, coulomb = floats(amplitude_rad, a, b, c)
-    return plain(np.where(y > 0.0, -((quadratic * y + linear) * y + coulomb), 0.0))
+    return np.where(amplitude_rad > 0.0, -((a * amplitude_rad + b) * amplitude_rad + c), 0.0)
 
 
 def rates_from_energy_constants(
@@ -52,6 +52,7 @@ def rates_from_energy_constants(
     return plain(0.5 * third * root), plain(0.5 * second), plain(0.5 * first / root)
 
 
+@equation
 def quality_factor(
     amplitude_rad: Numbers, frequency_hz: Numbers, a: Numbers, b: Numbers, c: Numbers
 ) -> FloatArray:
@@ -69,10 +70,9 @@ def quality_factor(
     FloatArray
         Q; zero at y = 0 with c > 0, infinite where nothing is lost.
     """
-    y, frequency, quadratic, linear, coulomb = floats(amplitude_rad, frequency_hz, a, b, c)
     # Where the pendulum rests, c/y is infinite, unless there is no c.
-    coulomb_loss = coulomb * inverse(np.where(coulomb == 0.0, 1.0, y))
-    return plain(np.pi * frequency * inverse(quadratic * y + linear + coulomb_loss))
+    coulomb_loss = c * inverse(np.where(c == 0.0, 1.0, amplitude_rad))
+    return np.pi * frequency_hz * inverse(a * amplitude_rad + b + coulomb_loss)
 
 
 def quality_factor_limit(frequency_hz: Numbers, b: Numbers) -> FloatArray:
@@ -80,10 +80,10 @@ def quality_factor_limit(frequency_hz: Numbers, b: Numbers) -> FloatArray:
     return quality_factor(1.0, frequency_hz, 0.0, b, 0.0)
 
 
+@equation
 def largest_quality_factor(frequency_hz: Numbers, a: Numbers, b: Numbers, c: Numbers) -> FloatArray:
     """Return the maximum of Eq. 15 over all amplitudes: ``pi f/(b + 2 sqrt(a c))``."""
-    quadratic, linear, coulomb = floats(a, b, c)
-    return quality_factor_limit(frequency_hz, linear + 2.0 * np.sqrt(quadratic * coulomb))
+    return quality_factor_limit(frequency_hz, b + 2.0 * np.sqrt(a * c))
 
 
 def amplitude_of_largest_quality_factor(a: Numbers, c: Numbers) -> FloatArray:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 
 
+@equation
 def hysteretic_quality_factor(
     frequency_hz: Numbers, hysteretic_coefficient_s2: Numbers
 ) -> FloatArray:
@@ -22,10 +23,10 @@ def hysteretic_quality_factor(
     FloatArray
         Q_hys, a pure number.
     """
-    frequency, coefficient = floats(frequency_hz, hysteretic_coefficient_s2)
-    return plain(coefficient * frequency**2)
+    return hysteretic_coefficient_s2 * frequency_hz**2
 
 
+@equation
 def without_hysteresis(
     quality_factor_measured: Numbers, quality_factor_hysteretic: Numbers
 ) -> FloatArray:
@@ -44,8 +45,7 @@ def without_hysteresis(
     FloatArray
         Q_v,exp, a pure number.
     """
-    measured, hysteretic = floats(quality_factor_measured, quality_factor_hysteretic)
-    return inverse(1.0 / measured - 1.0 / hysteretic)
+    return inverse(1.0 / quality_factor_measured - 1.0 / quality_factor_hysteretic)
 
 
 def inverse(rate: Numbers) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, plain
 from pendpipe.physics.pendulum import (
     STANDARD_GRAVITY_M_PER_S2,
     Fluid,
@@ -86,6 +86,7 @@ def swing(
     return Swing(plain(omega), plain(inertia), torque)
 
 
+@equation
 def inertia_from_frequency(
     frequency_hz: Numbers, restoring_torque_n_m_per_rad: Numbers
 ) -> FloatArray:
@@ -104,8 +105,7 @@ def inertia_from_frequency(
     FloatArray
         I in kg m^2.
     """
-    frequency, torque = floats(frequency_hz, restoring_torque_n_m_per_rad)
-    return plain(torque / (2.0 * np.pi * frequency) ** 2)
+    return restoring_torque_n_m_per_rad / (2.0 * np.pi * frequency_hz) ** 2
 
 
 def period_lengthening(
@@ -140,6 +140,7 @@ def period_lengthening(
     )
 
 
+@equation
 def bearing_friction_rate(
     friction_torque_n_m: Numbers,
     moment_of_inertia_kg_m2: Numbers,
@@ -159,7 +160,4 @@ def bearing_friction_rate(
     FloatArray
         c in rad/s.
     """
-    torque, inertia, omega = floats(
-        friction_torque_n_m, moment_of_inertia_kg_m2, angular_frequency_per_s
-    )
-    return plain(2.0 * torque / (np.pi * inertia * omega))
+    return 2.0 * friction_torque_n_m / (np.pi * moment_of_inertia_kg_m2 * angular_frequency_per_s)

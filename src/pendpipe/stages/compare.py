@@ -16,7 +16,7 @@ from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.shared_fit import SharedEstimate
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, Surroundings
-from pendpipe.commands.arguments import add, load
+from pendpipe.arguments import add, load
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign

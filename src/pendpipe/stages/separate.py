@@ -9,7 +9,7 @@ from typing import Any
 
 from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord
 from pendpipe.analysis.separate import Benchmark, fit_benchmark, separate
-from pendpipe.commands.arguments import add, load
+from pendpipe.arguments import add, load
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.estimate import Estimate
