@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from pendpipe.configuration.models import Configuration
+from pendpipe.templates import render
 
 BEGIN: Final = "<!-- made by `pendpipe config --manual`: begin -->"
 END: Final = "<!-- end -->"
@@ -22,20 +23,17 @@ def schema() -> str:
 def manual() -> str:
     """The tables of ``config/README.md``: every key, its kind, default and meaning."""
     content = Configuration.model_json_schema()
-    parts = [_table("top level", content)]
-    for name, model in content["$defs"].items():
-        parts.append(_table(f"{name}: {model['description']}", model))
-    return "\n".join([BEGIN, "", *parts, END])
-
-
-def _table(title: str, model: dict[str, Any]) -> str:
-    required = model.get("required", [])
-    rows = []
-    for key, entry in model["properties"].items():
-        default = _default(entry, key in required)
-        rows.append(f"| `{key}` | {_kind(entry)} | {default} | {entry['description']} |")
-    head = [f"### {title}", "", "| key | kind | default | meaning |", "|---|---|---|---|"]
-    return "\n".join([*head, *rows, ""])
+    models = {"top level": content}
+    models |= {f"{name}: {each['description']}": each for name, each in content["$defs"].items()}
+    return render(
+        "pendpipe.configuration",
+        "manual.md",
+        begin=BEGIN,
+        end=END,
+        models=models,
+        kind=_kind,
+        default=_default,
+    )
 
 
 def _kind(entry: dict[str, Any]) -> str:
