@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from pendpipe.report.page import render
 from pendpipe.report.proof import proof
+from pendpipe.report.vector import Room
 
 SVG = '<?xml version="1.0"?><svg viewBox="0 0 9 9"><path id="p" d="M 0 0 L 9 9"/></svg>'
 
@@ -132,11 +133,12 @@ def test_without_a_scored_set_nothing_is_said(example: Any, tmp_path: Path) -> N
 
 
 def test_a_figure_beyond_the_budget_is_left_out(scored: Path) -> None:
-    whole, poor = (proof(scored, spent=0, budget=budget) for budget in (10_000, 100))
+    ample = Room(10_000)
+    whole, poor = proof(scored, ample), proof(scored, Room(100))
     assert whole is not None
     assert poor is not None
     assert [type(figure.svg) for figure in whole.figures] == [Markup]
     assert [type(svg) for svg in whole.cases] == [Markup]
-    assert whole.bytes > 100
+    assert ample.left < 10_000 - 100
     assert poor.figures == []
     assert poor.cases == [None]

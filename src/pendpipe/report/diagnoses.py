@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -14,7 +14,7 @@ from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.report.health import Health
-from pendpipe.report.vector import inline_svg
+from pendpipe.report.vector import Room
 
 VERDICTS: Final = {
     "consistent": Health("consistent", "✔", "good", "the noise explains what the model leaves"),
@@ -39,7 +39,7 @@ class Diagnosed(NamedTuple):
     figure: Markup | None
 
 
-def diagnoses(folder: Path, names: list[str], *, spent: int, budget: int) -> list[Diagnosed]:
+def diagnoses(folder: Path, names: list[str], room: Room) -> list[Diagnosed]:
     """Read every record's diagnosis; none where the campaign was not diagnosed.
 
     Parameters
@@ -48,31 +48,22 @@ def diagnoses(folder: Path, names: list[str], *, spent: int, budget: int) -> lis
         The campaign's results.
     names
         Of the records.
-    spent, budget
-        Bytes of the page that other figures take, and that it may have: a figure beyond it
-        is left out.
+    room
+        What the page has left for figures.
     """
     found = []
     for index, name in enumerate(names, start=1):
-        place = folder / name / "diagnosis"
+        place, anchor = folder / name / "diagnosis", f"diagnosis-{index}"
         if not (place / "diagnosis.json").is_file():
             continue
         content = read_json(place / "diagnosis.json")
         figure = None
         if content["verdict"] == "missing-physics":
-            figure = _figure(place / "residual_map.svg", f"diagnosis-{index}", name)
-            spent += len(figure.encode()) if figure is not None else 0
-            figure = figure if spent < budget else None
-        found.append(_diagnosed(name, f"diagnosis-{index}", content, figure))
+            words = f"{CAPTIONS['residual_map'].shows} Record {name}."
+            title = f"Residual of {name} before and after"
+            figure = room.drawing(place / "residual_map.svg", anchor, title, words)
+        found.append(_diagnosed(name, anchor, content, figure))
     return found
-
-
-def _figure(path: Path, anchor: str, name: str) -> Markup | None:
-    if not path.is_file():
-        return None
-    words = f"{CAPTIONS['residual_map'].shows} Record {name}."
-    text = path.read_text(encoding="utf-8")
-    return inline_svg(text, anchor, f"Residual of {name} before and after", words)
 
 
 def _diagnosed(
@@ -80,17 +71,9 @@ def _diagnosed(
 ) -> Diagnosed:
     before, after = content["baseline"], content["improved"]
     unit = str(((before["parameters"] or {}).get("amplitude") or {}).get("unit", "rad"))
-    sizes = [
-        compact(size, unit)
-        for model in (before, after)
-        if math.isfinite(size := number(model["residual_rms_rad"]))
-    ]
-    chi2 = [
-        _three_digits(value)
-        for model in (before, after)
-        if math.isfinite(value := number(model["chi2_per_dof"]))
-    ]
-    shown = slice(None) if content["effects"] else slice(1)
+    models = (before, after)[: 2 if content["effects"] else 1]
+    sizes = [compact(size, unit) for size in _numbers(models, "residual_rms_rad")]
+    chi2 = [_three_digits(value) for value in _numbers(models, "chi2_per_dof")]
     noise = number(content["noise_rms_rad"])
     p_value = number(content["p_value"])
     return Diagnosed(
@@ -99,12 +82,17 @@ def _diagnosed(
         VERDICTS[content["verdict"]],
         f"{p_value:.2g}" if math.isfinite(p_value) else "–",
         [_effect(effect) for effect in content["effects"]],
-        " → ".join(sizes[shown]) or "–",
+        " → ".join(sizes) or "–",
         compact(noise, unit) if math.isfinite(noise) else "–",
-        " → ".join(chi2[shown]) or "–",
+        " → ".join(chi2) or "–",
         without_folders(str(content["statement"])),
         figure,
     )
+
+
+def _numbers(models: Sequence[Mapping[str, Any]], name: str) -> list[float]:
+    """What is known of each model."""
+    return [value for model in models if math.isfinite(value := number(model[name]))]
 
 
 def _three_digits(value: float) -> str:

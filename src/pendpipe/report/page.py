@@ -11,19 +11,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from pendpipe.analysis.fit.result import read_fit
 from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS, GLOSSARY
-from pendpipe.report.diagnoses import Diagnosed, diagnoses
+from pendpipe.report.diagnoses import diagnoses
 from pendpipe.report.headline import headline
 from pendpipe.report.health import CHI2_RANGE
 from pendpipe.report.proof import proof
 from pendpipe.report.records import Line, Table, table_of_records
-from pendpipe.report.remarks import findings
-from pendpipe.report.vector import inline_svg
+from pendpipe.report.vector import Room
+from pendpipe.templates import render as fill_template
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
 BUDGET_BYTES: Final = 5_000_000
@@ -61,58 +60,47 @@ def render(
     str
         One HTML document that refers to nothing outside itself.
     """
-    drawn = _campaign_figures(figures)
     entries = list(comparison["records"])
-    budget = BUDGET_BYTES - _RESERVE_BYTES - _RECORD_BYTES * len(entries)
     has_theory = bool(comparison.get("has_theory"))
     table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
-    decays, outside = _decays(folder, table.lines, budget - sum(map(len, drawn.values())))
-    spent = sum(map(len, [*drawn.values(), *decays.values()]))
-    proven = proof(challenge, spent=spent, budget=budget)
-    spent += proven.bytes if proven else 0
+    room = Room(BUDGET_BYTES)
+    drawn = {
+        name: svg
+        for name, words in CAPTIONS.items()
+        if (svg := room.drawing(figures / f"{name}.svg", name, words.title, words.shows))
+    }
+    room.left -= _RESERVE_BYTES + _RECORD_BYTES * len(entries)
+    decays, outside = _decays(folder, table.lines, room)
+    proven = proof(challenge, room)
     asked = configuration.get("diagnose") or {}
-    diagnosed = _diagnoses(asked, folder, entries, spent, budget)
+    names = [str(entry["record"]) for entry in entries if asked.get("enabled", True)]
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
-    style = (TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html").render(
+    return fill_template(
+        "pendpipe.report",
+        "page.html",
         title=comparison.get("title") or "A campaign of free decays",
         has_theory=has_theory,
         simulated=sum(entry.get("source") == "simulated" for entry in entries),
         rows=headline(comparison, configuration.get("simulated") or {}),
-        findings=findings(comparison),
         figures=drawn,
         captions=CAPTIONS,
-        columns=table.columns,
-        has_fluid=any(line.fluid for line in table.lines),
-        has_branch=any(line.branch for line in table.lines),
-        diagnosed=diagnosed,
-        diagnosis_baseline="Eq. 3" if asked.get("baseline") == "viscous" else "Eq. 8",
-        diagnosis_level=asked.get("level", 0.01),
+        table=table,
+        diagnosed=diagnoses(folder, names, room),
+        asked=asked,
         proof=proven,
         records=table.lines,
         counts=_counts(table.lines),
         chi2_range=CHI2_RANGE,
         decays=decays,
         outside=outside,
-        warned=remarks.grouped_warnings(entries),
-        exponents=remarks.exponent_tables(comparison),
-        budget=remarks.budget_rows(comparison),
-        checks=remarks.check_rows(comparison),
-        steps=remarks.steps(comparison, list(drawn), folder),
         glossary=GLOSSARY,
         provenance=comparison.get("provenance") or {},
         downloads=_downloads(table, summary),
         # These two are the package's own files; the policy names the script by its hash.
-        style=Markup(style),
+        style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        **remarks.of_campaign(comparison, list(drawn), folder),
     )
 
 
@@ -132,19 +120,8 @@ def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
     return [path for path in files if path.is_file()]
 
 
-def _campaign_figures(figures: Path) -> dict[str, Markup]:
-    """The figures that are there, ready for the page."""
-    drawn = {}
-    for name, caption in CAPTIONS.items():
-        path = figures / f"{name}.svg"
-        if path.is_file():
-            text = path.read_text(encoding="utf-8")
-            drawn[name] = inline_svg(text, name, caption.title, caption.shows)
-    return drawn
-
-
-def _decays(folder: Path, table: list[Line], left: int) -> tuple[dict[str, Markup], list[str]]:
-    """Each record's decay figure while the bytes left last, and the records beyond it."""
+def _decays(folder: Path, table: list[Line], room: Room) -> tuple[dict[str, Markup], list[str]]:
+    """Each record's decay figure while there is room, and the records beyond it."""
     decays: dict[str, Markup] = {}
     outside: list[str] = []
     for line in table:
@@ -153,25 +130,12 @@ def _decays(folder: Path, table: list[Line], left: int) -> tuple[dict[str, Marku
             continue
         # The prefix is a number: a record's name need not be an identifier.
         words = f"{CAPTIONS['decay'].shows} Record {line.name}."
-        svg = inline_svg(
-            path.read_text(encoding="utf-8"), line.anchor, f"Decay of {line.name}", words
-        )
-        left -= len(svg.encode())
-        if left < 0:
+        svg = room.drawing(path, line.anchor, f"Decay of {line.name}", words)
+        if svg is None:
             outside.append(line.name)
         else:
             decays[line.name] = svg
     return decays, outside
-
-
-def _diagnoses(
-    asked: Content, folder: Path, entries: list[Content], spent: int, budget: int
-) -> list[Diagnosed]:
-    """The records' diagnoses, where the campaign asks for them."""
-    if not asked.get("enabled", True):
-        return []
-    names = [str(entry["record"]) for entry in entries]
-    return diagnoses(folder, names, spent=spent, budget=budget)
 
 
 def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from pendpipe.files import read_json
 from pendpipe.report.captions import CAPTIONS, PROOF_CAPTIONS, Caption
 from pendpipe.report.health import Health
-from pendpipe.report.vector import inline_svg
+from pendpipe.report.vector import Room
 
 KEPT: Final = {
     True: Health("kept", "✔", "good", "what was promised came out"),
@@ -35,38 +35,24 @@ class Proof(NamedTuple):
     figures: list[Drawn]
     cases: list[Markup | None]
 
-    @property
-    def bytes(self) -> int:
-        """What its figures take of the page."""
-        drawings = [*(figure.svg for figure in self.figures), *filter(None, self.cases)]
-        return sum(len(svg.encode()) for svg in drawings)
 
-
-def proof(folder: Path | None, *, spent: int, budget: int) -> Proof | None:
+def proof(folder: Path | None, room: Room) -> Proof | None:
     """Read a set's scores and figures; None where there is no scored set.
 
     Parameters
     ----------
     folder
         Where ``pendpipe challenge score`` has put ``scores.json`` and ``figures/``.
-    spent, budget
-        Bytes of the page that other figures take, and that it may have: a figure beyond it
-        is left out.
+    room
+        What the page has left for figures.
     """
     if folder is None or not (folder / "scores.json").is_file():
         return None
     scores = read_json(folder / "scores.json")
     promises = [(row["promise"], row["measured"], KEPT[row["kept"]]) for row in scores["promises"]]
-    left = budget - spent
 
     def drawn(name: str, title: str, shows: str) -> Markup | None:
-        nonlocal left
-        path = folder / "figures" / f"{name}.svg"
-        if not path.is_file():
-            return None
-        svg = inline_svg(path.read_text(encoding="utf-8"), f"proof-{name}", title, shows)
-        left -= len(svg.encode())
-        return svg if left > 0 else None
+        return room.drawing(folder / "figures" / f"{name}.svg", f"proof-{name}", title, shows)
 
     figures = [
         Drawn(svg, caption)

@@ -67,6 +67,16 @@ class Table(NamedTuple):
     columns: list[Column]
     lines: list[Line]
 
+    @property
+    def has_fluid(self) -> bool:
+        """Whether any record names its fluid."""
+        return any(line.fluid for line in self.lines)
+
+    @property
+    def has_branch(self) -> bool:
+        """Whether any record names its branch."""
+        return any(line.branch for line in self.lines)
+
 
 def table_of_records(entries: list[Entry], hashes: Mapping[str, str], *, has_theory: bool) -> Table:
     """Prepare every record, refused ones included, in the order of the table of records.

@@ -15,6 +15,18 @@ from pendpipe.report.health import STATES
 Comparison = Mapping[str, Any]
 
 
+def of_campaign(comparison: Comparison, drawn: Sequence[str], folder: Path) -> dict[str, Any]:
+    """What the page says beside its numbers, by the template's names."""
+    return {
+        "findings": findings(comparison),
+        "exponents": exponent_tables(comparison),
+        "budget": budget_rows(comparison),
+        "checks": check_rows(comparison),
+        "warned": grouped_warnings(comparison["records"]),
+        "steps": steps(comparison, drawn, folder),
+    }
+
+
 def findings(comparison: Comparison) -> list[str]:
     """A sentence or two for each thing that the campaign can tell."""
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from html import escape
+from pathlib import Path
 
 from markupsafe import Markup
 
@@ -44,3 +45,18 @@ def inline_svg(text: str, prefix: str, title: str, description: str) -> Markup:
         f'<title id="{name}">{escape(title)}</title><desc id="{words}">{escape(description)}</desc>'
     )
     return Markup(opening + rest.strip())
+
+
+class Room:
+    """The bytes that a page has left for figures."""
+
+    def __init__(self, left: int) -> None:
+        self.left = left
+
+    def drawing(self, path: Path, prefix: str, title: str, description: str) -> Markup | None:
+        """Return a drawn SVG as `inline_svg` does; None where there is none, or no room for it."""
+        if not path.is_file():
+            return None
+        svg = inline_svg(path.read_text(encoding="utf-8"), prefix, title, description)
+        self.left -= len(svg.encode())
+        return svg if self.left > 0 else None
