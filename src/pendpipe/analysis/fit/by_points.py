@@ -12,12 +12,13 @@ import numpy as np
 from pendpipe.analysis.fit.assemble import Numbers, estimates, misfit, quality_factor, wrapped
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.decrement import check_decrement, light_of
-from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_envelope
+from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_energies, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
 from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.quadratic import covariance
-from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult
+from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
+from pendpipe.analysis.fit.swings import clear
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
@@ -53,13 +54,40 @@ def share_of(parts: Mapping[str, float], b: float, baseline: Baseline) -> float 
     return max(1.0 - parts["viscous"] / b, 0.0)
 
 
+def envelope_and_period(
+    points: TurningPoints,
+    held: Mapping[str, float],
+    parts: Mapping[str, float],
+    fixed: Mapping[str, float],
+    baseline: Baseline,
+    restoring: Restoring,
+    tolerance: float = 1e-5,
+) -> tuple[EnvelopeFit, Period]:
+    """Fit the amplitudes of turning points, and then their times."""
+    if restoring == "linear":
+        envelope = fit_envelope(points, held, tolerance=tolerance)
+    else:
+        middle = share_of(parts, held.get("b", 0.0), baseline)
+        envelope = fit_energies(points, held, share=0.5 if middle is None else middle)
+    a, b, c = (float(rate) for rate in envelope.value[:3])
+    share = share_of(parts, b, baseline)
+    omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
+    return envelope, fit_period(
+        points, envelope.amplitude, a, b, c, share=share, held=omega, restoring=restoring
+    )
+
+
 def fit_points(
     points: TurningPoints,
     *,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
+    restoring: Restoring = "linear",
 ) -> FitResult:
     """Fit Eq. 14 to turning points, and Eq. 8's frequency to their times.
+
+    With sin x it is the energies that are fitted (`fit_energies`), and the period is that of small
+    amplitudes.
 
     Parameters
     ----------
@@ -69,6 +97,8 @@ def fit_points(
         ``"eq8"``, or ``"viscous"`` for Eq. 3 (a = c = 0).
     fixed
         Parameters that are held, by name.
+    restoring
+        The restoring torque.
 
     Returns
     -------
@@ -76,30 +106,23 @@ def fit_points(
         Without ``cuts`` and ``provenance``, which the caller knows.
     """
     fixed = fixed or {}
+    points = points if restoring == "linear" else clear(points)
     held, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    envelope = fit_envelope(points, held)
+    envelope, period = envelope_and_period(points, held, parts, fixed, baseline, restoring)
     a, b, c = (float(rate) for rate in envelope.value[:3])
-    period = fit_period(
-        points,
-        envelope.amplitude,
-        a,
-        b,
-        c,
-        share=share_of(parts, b, baseline),
-        held=2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None,
-    )
     stretched = misfit(envelope.chi2_per_dof, len(points) - 4.0)
     numbers = _numbers(points, envelope, period, stretched)
     parameters = estimates(numbers, points.unit)
     share = share_of(parts, b, baseline)
     hysteretic = (0.5 if share is None else share) * b
     checks = check_decrement(
-        points, Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c)
+        points, Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring)
     )
     light, reason = light_of(checks, misfit=stretched, unit=points.unit)
     result = FitResult(
         method="turning-points",
         baseline=baseline,
+        restoring=restoring,
         parameters=parameters,
         quality_factor_limit=quality_factor(parameters["b"], parameters["frequency"].value),
         covariance_order=PARAMETERS,

@@ -28,20 +28,20 @@ from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
-from pendpipe.analysis.fit.swings import SwingsFit, fit_swings
 from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import turning_points, turning_points_with_jacobian
-from pendpipe.errors import NotAnalysableError
+from pendpipe.dynamics import turning_points_with_jacobian
 
 _GROWTH: Final = 1.6
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
 _ROUNDS: Final = 2
-_LOST: Final = 1.0
-"""Phase in rad by which a model that has lost the oscillation is told."""
+_FEW: Final = 12
+"""Turning points from which a window grows."""
+_LOUD: Final = 4.0
+"""chi^2 of a reading from which a fit with sin x is tried from another window."""
 
 
 class _Fitted(NamedTuple):
@@ -80,11 +80,6 @@ def fit_waveform(
     FitResult
         Without ``cuts`` and ``provenance``, which the caller knows.
 
-    Raises
-    ------
-    NotAnalysableError
-        With sin x, if no motion through the turning points is found.
-
     Notes
     -----
     The motion is started at a turning point before the first reading, so that every reading
@@ -95,108 +90,20 @@ def fit_waveform(
     fixed = fixed or {}
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     held = _held(held_rates, fixed, parts, baseline)
-    if restoring == "sine":
-        fitted = _with_sine(samples, points, held, parts, held_rates, fixed)
-    else:
-        start = start_values(points, held_rates, fixed, baseline)
-        fitted = _fit(samples, points, start, held, parts)
+    start = start_values(points, held_rates, fixed, baseline, restoring)
+    fitted = _fit(samples, points, start, held, parts, restoring)
+    if restoring == "sine" and not _explained(fitted):
+        # From another window: all at once, or grown from a few swings.
+        few = len(points) if start.reliable < len(points) else _FEW
+        other = _fit(samples, points, start._replace(reliable=few), held, parts, restoring)
+        fitted = min(fitted, other, key=lambda each: each.minimum.quadratic.chi2)
     return _result(_refined(fitted, samples), samples, points, baseline, fixed)
 
 
-def _with_sine(
-    samples: Samples,
-    points: TurningPoints,
-    held: tuple[int, ...],
-    parts: Mapping[str, float],
-    held_rates: Mapping[str, float],
-    fixed: Mapping[str, float],
-) -> _Fitted:
-    """Search from the fit of the half swings: all at once, and where that fails in a window."""
-    swings = swings_of(points, held, parts, held_rates, fixed)
-    inside = len(swings.problem.points)
-    start = Start(swings.minimum.value, 0, len(points), (), last_s=float(points.time_s[inside - 1]))
-    at_once = _fit(samples, points, start, held, parts, "sine")
-    if at_once.minimum.converged and _explained(at_once, swings):
-        return at_once
-    grown = _fit(samples, points, start._replace(reliable=12), held, parts, "sine")
-    return min(at_once, grown, key=lambda fitted: fitted.minimum.quadratic.chi2)
-
-
-def _explained(fitted: _Fitted, swings: SwingsFit) -> bool:
-    """Whether the waveform is followed as well as its turning points are."""
-    residual = fitted.problem.residual(fitted.minimum.value)
-    rms = math.sqrt(float(residual @ residual) / len(residual))
-    points, (high, late) = swings.problem.points, swings.problem.stretch
-    speed = points.amplitude_rad * swings.minimum.value[waveform.OMEGA]
-    expected = np.hypot(high * points.angle_sd_rad, late * points.time_sd_s * speed)
-    return rms < 3.0 * (fitted.problem.noise_rms + float(np.sqrt(np.mean(expected**2))))
-
-
-def swings_of(
-    points: TurningPoints,
-    held: tuple[int, ...],
-    parts: Mapping[str, float],
-    held_rates: Mapping[str, float],
-    fixed: Mapping[str, float],
-) -> SwingsFit:
-    """Fit a pendulum with sin x to the turning points; see `swings.fit_swings`."""
-    index = {"a": 0, "b": 1, "c": 2, "amplitude": waveform.ANGLE, "offset": waveform.OFFSET}
-    known = {index[name]: value for name, value in held_rates.items()}
-    if "frequency" in fixed:
-        known[waveform.OMEGA] = 2.0 * math.pi * fixed["frequency"]
-    found = fit_swings(points, fixed=known, held=held, parts=parts)
-    if found is None:
-        raise NotAnalysableError(
-            "recording", "no pendulum with sin x swings as it does", "use --restoring linear"
-        )
-    return found
-
-
-def fit_points_with_sine(
-    points: TurningPoints,
-    *,
-    baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None,
-) -> FitResult:
-    """Fit a pendulum with sin x to turning points, their angles and times together.
-
-    Parameters and result are those of `fit_points`, which fits Eq. 14.
-    """
-    fixed = fixed or {}
-    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    held = _held(held_rates, fixed, parts, baseline)
-    swings = swings_of(points, held, parts, held_rates, fixed).by_amplitudes()
-    problem, value, inside = swings.problem, swings.minimum.value, swings.problem.points
-    start = Start(value, 0, len(points), ())
-    fitted = _Fitted(problem, swings.minimum, held, start)
-    numbers, _ = _numbers(fitted, 1.0, points.start_s)
-    parameters = estimates(numbers, points.unit)
-    high, _ = problem.stretch
-    law, release = problem.model(value)
-    followed = turning_points(law, release, count=int(inside.half_cycle[-1]) + 1)
-    index = inside.half_cycle - inside.half_cycle[0]
-    off = inside.angle_rad - (followed.angle_rad[index] - release.offset_rad)
-    checks = check_decrement(inside, law)
-    light, reason = light_of(checks, misfit=misfit(high**2, len(inside) - 4.0), unit=points.unit)
-    result = FitResult(
-        method="turning-points",
-        baseline=baseline,
-        restoring="sine",
-        parameters=parameters,
-        quality_factor_limit=quality_factor(parameters["b"], parameters["frequency"].value),
-        covariance_order=PARAMETERS,
-        covariance=numbers.covariance,
-        noise_rms_rad=points.noise_rms_rad,
-        residual_rms_rad=float(np.sqrt(np.mean(off**2))),
-        chi2_per_dof=high**2,
-        samples=points.samples,
-        turning_points=len(inside),
-        settled=swings.minimum.converged,
-        decrement_check=checks,
-        light=light,
-        light_reason=reason,
-    )
-    return replace(result, warnings=(*points.notes, *warnings_of(result, high**2)))
+def _explained(fitted: _Fitted) -> bool:
+    """Whether the search came to its end, and noise explains most of what is left."""
+    readings = len(fitted.problem.values)
+    return fitted.minimum.converged and fitted.minimum.quadratic.chi2 < _LOUD * readings
 
 
 def _result(

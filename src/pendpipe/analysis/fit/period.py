@@ -7,10 +7,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.result import Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 
 _LOUD: Final = 2.0
+TOP: Final = 3.13
+"""Amplitude in rad beyond which a half swing says nothing of the frequency."""
 
 
 class Period(NamedTuple):
@@ -21,6 +24,31 @@ class Period(NamedTuple):
     covariance: FloatArray
     """Of the two, shape (2, 2); it holds what the unknown share adds."""
     chi2_per_dof: float
+    late_rad: FloatArray
+    """Phase by which each turning point is later than the law's, shape (k,)."""
+
+
+def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
+    a, b = np.ones_like(m), np.sqrt(1.0 - m)
+    total, power = 0.5 * m, 0.5
+    for _ in range(40):
+        difference = 0.5 * (a - b)
+        a, b = 0.5 * (a + b), np.sqrt(a * b)
+        power *= 2.0
+        total = total + power * difference**2
+        if float(np.max(np.abs(difference), initial=0.0)) < 1e-17:
+            break
+    k = 0.5 * math.pi / a
+    return k, k * (1.0 - total)
+
+
+def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
+    """Phase omega t of the half swings between neighbours, without losses: K + K', or pi."""
+    if restoring == "linear":
+        return np.full(len(amplitude) - 1, math.pi)
+    quarter = elliptic(np.sin(0.5 * np.clip(amplitude, 0.0, TOP)) ** 2)[0]
+    return np.asarray(quarter[1:] + quarter[:-1])
 
 
 def period_excess(
@@ -51,11 +79,21 @@ def period_excess(
     return np.asarray(np.minimum(excess / angular_frequency**2, 0.5))
 
 
+def phases(
+    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
+    angular_frequency: float, restoring: Restoring,
+) -> FloatArray:  # fmt: skip
+    """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
+    excess = period_excess(amplitude, angular_frequency, *losses)
+    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
+    return np.concatenate([[0.0], np.cumsum(lasts * np.diff(points.half_cycle))])
+
+
 def fit_period(
     points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float,
-    *, share: float | None = None, held: float | None = None,
+    *, share: float | None = None, held: float | None = None, restoring: Restoring = "linear",
 ) -> Period:  # fmt: skip
-    """Fit a straight line to the times, in half cycles lengthened by the losses.
+    """Fit a straight line to the times, in half cycles lengthened by the losses (and by sin x).
 
     Turning points cannot tell how b divides into hysteretic and viscous: the middle is
     taken, and what the ends would change is added to the standard deviations.
@@ -70,31 +108,38 @@ def fit_period(
         The hysteretic share of b, where it is known.
     held
         An angular frequency that is not to be fitted.
+    restoring
+        The restoring torque.
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
-    middle = _line(points, amplitude, a, b, c, 0.5 if share is None else share, omega, held)
-    matrix = middle[1] * (middle[2] if middle[2] > _LOUD else 1.0)
+    middle = _line(
+        points, amplitude, (a, b, c, 0.5 if share is None else share), omega, held, restoring
+    )
+    residual = middle[2] / points.time_sd_s
+    chi2 = float(residual @ residual) / max(len(points) - 2, 1)
+    matrix = middle[1] * (chi2 if chi2 > _LOUD else 1.0)
     if share is None:
-        ends = [_line(points, amplitude, a, b, c, end, omega, held)[0] for end in (0.0, 1.0)]
+        ends = [
+            _line(points, amplitude, (a, b, c, end), omega, held, restoring)[0]
+            for end in (0.0, 1.0)
+        ]
         off = max((end - middle[0] for end in ends), key=lambda change: abs(change[0]))
         matrix += np.outer(off, off) / 3.0
         # All times share what the unknown division of b does to the half cycles' shape.
         matrix[1, 1] += (b / (4.0 * float(middle[0][0]) ** 2)) ** 2 / 3.0
-    return Period(float(middle[0][0]), float(middle[0][1]), matrix, middle[2])
+    found, first = (float(number) for number in middle[0])
+    return Period(found, first, matrix, chi2, found * middle[2])
 
 
 def _line(
-    points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float, share: float,
-    omega: float, held: float | None,
-) -> tuple[FloatArray, FloatArray, float]:  # fmt: skip
-    """Angular frequency and first time for one share; their covariance; chi^2 per dof."""
+    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
+    omega: float, held: float | None, restoring: Restoring,
+) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    """Angular frequency and first time for one share; their covariance; residuals in s."""
     weight = 1.0 / points.time_sd_s**2
     reference = float(points.time_s[0])
     time = points.time_s - reference
-    number = points.half_cycle.astype(np.float64)
-    excess = period_excess(amplitude, omega, a, b, c, share)
-    middle = 0.5 * (excess[1:] + excess[:-1])
-    stretched = number + np.concatenate([[0.0], np.cumsum(middle * np.diff(number))])
+    stretched = phases(points, amplitude, losses, omega, restoring) / math.pi
     columns = np.stack([stretched, np.ones_like(stretched)], axis=1)
     if held is not None:
         first = float(np.average(time - stretched * math.pi / held, weights=weight))
@@ -107,6 +152,4 @@ def _line(
         slope, first = inverse @ ((columns * weight[:, None]).T @ time)
         residual = time - columns @ np.array([slope, first])
     jacobian = np.diag([-math.pi / slope**2, 1.0])
-    chi2 = float(np.sum(weight * residual**2)) / max(len(time) - 2, 1)
-    best = np.array([math.pi / slope, reference + first])
-    return best, jacobian @ inverse @ jacobian, chi2
+    return np.array([math.pi / slope, reference + first]), jacobian @ inverse @ jacobian, residual

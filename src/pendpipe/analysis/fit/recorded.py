@@ -110,11 +110,11 @@ def _fit(
         stated = not any("(--unit)" in guess for guess in recording.weak_guesses)
         restoring = start_of(points, stated=stated).favoured
     if method == "turning-points":
-        return _of_points(points, restoring, baseline, fixed)
+        return fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
     if method == "waveform" or _stands(result):
         return result
-    by_points = _of_points(points, restoring, baseline, fixed)
+    by_points = fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     if _stands(by_points):
         why = result.light_reason if result.settled else "it did not settle"
         return _amber(by_points, f"from the turning points, because for the waveform {why}")
@@ -150,16 +150,3 @@ def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) ->
     below = f"below {least:.2g} {points.unit} the decay is not that of the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
     return replace(_amber(result, f"{below}: that is left out"), cuts=(*result.cuts, cut))
-
-
-def _of_points(
-    points: TurningPoints,
-    restoring: Restoring,
-    baseline: Baseline,
-    fixed: Mapping[str, float] | None,
-) -> FitResult:
-    if restoring == "linear":
-        return fit_points(points, baseline=baseline, fixed=fixed)
-    from pendpipe.analysis.fit.by_waveform import fit_points_with_sine
-
-    return fit_points_with_sine(points, baseline=baseline, fixed=fixed)

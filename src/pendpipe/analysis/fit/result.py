@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
 Restoring = Literal["linear", "sine"]
+TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 

@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import share_of
-from pendpipe.analysis.fit.envelope import fit_envelope
+from pendpipe.analysis.fit.by_points import envelope_and_period, share_of
 from pendpipe.analysis.fit.fixed import loss_rates_of
 from pendpipe.analysis.fit.period import Period, fit_period, period_excess
-from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.fit.result import Baseline, Restoring
+from pendpipe.analysis.fit.swings import clear
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
@@ -33,8 +33,6 @@ class Start(NamedTuple):
     reliable: int
     """How many turning points the start predicts to a fraction of a radian."""
     warnings: tuple[str, ...]
-    last_s: float | None = None
-    """The time after which the stop is near; None where Eq. 14 is to tell."""
 
 
 def start_values(
@@ -42,33 +40,38 @@ def start_values(
     held: Mapping[str, float],
     fixed: Mapping[str, float],
     baseline: Baseline,
+    restoring: Restoring = "linear",
 ) -> Start:
     """Turn a fit of the turning points into the waveform's eight parameters.
 
     The release is a turning point before the first reading (a virtual one, if need be),
-    unless the amplitude is held: then it is the first turning point itself.
+    unless the amplitude is held: then it is the first turning point itself. So it is with sin x:
+    there may be none before it below pi.
     """
-    envelope = fit_envelope(points, held, tolerance=0.3)
-    a, b, c, y0, level = (float(number) for number in envelope.value)
-    parts = loss_rates_of(fixed, points.apparent_frequency_hz)
-    share = share_of(parts, b, baseline)
+    points = points if restoring == "linear" else clear(points)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
-    period = fit_period(
-        points, envelope.amplitude, a, b, c, share=0.5 if share is None else share, held=omega
+    parts = loss_rates_of(fixed, points.apparent_frequency_hz)
+    envelope, period = envelope_and_period(
+        points, held, parts, fixed, baseline, restoring, tolerance=0.3
     )
+    a, b, c, y0, level = (float(number) for number in envelope.value)
+    share = share_of(parts, b, baseline)
     known, reliable, warnings = period, len(points), []
-    late = _lateness(points, envelope.amplitude, (a, b, c), known.angular_frequency, known.time_s)
-    if np.max(np.abs(late)) > _SURE and omega is None:
-        reliable = _sure_part(points, envelope.amplitude, (a, b, c))
-        part = points.first(reliable)
-        known = fit_period(part, envelope.amplitude[:reliable], a, b, c, share=share)
+    # What is not known to a fraction of a radian accuses nobody.
+    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
+    if np.max(np.abs(late), initial=0.0) > _SURE and omega is None:
+        reliable, known = _sure_part(points, envelope.amplitude, (a, b, c), share, restoring)
         warnings.append(
             "the period changes with the amplitude or the time as Eq. 8's does not:"
             f" {np.ptp(late):.2g} rad of phase along the record"
         )
     middle_share = 0.5 if share is None else share
     angle, time, before = _release(
-        points, (a, b, c, y0), middle_share, known, at_first="amplitude" in fixed
+        points,
+        (a, b, c, y0),
+        middle_share,
+        known,
+        at_first="amplitude" in fixed or restoring == "sine",
     )
     value = np.array(
         [a, b, c, known.angular_frequency, angle, time,
@@ -77,32 +80,21 @@ def start_values(
     return Start(value, before, reliable, tuple(warnings))
 
 
-def _lateness(
-    points: TurningPoints, amplitudes: FloatArray, rates: tuple[float, float, float],
-    omega: float, first_s: float,
-) -> FloatArray:  # fmt: skip
-    """Phase in rad by which each turning point is later than a frequency says."""
-    excess = period_excess(amplitudes, omega, *rates, 0.5)
-    stretch = np.concatenate([[0.0], np.cumsum(0.5 * (excess[1:] + excess[:-1])
-                                               * np.diff(points.half_cycle))])  # fmt: skip
-    late = omega * (points.time_s - first_s) - math.pi * (points.half_cycle + stretch)
-    # What is not known to a fraction of a radian accuses nobody.
-    return np.asarray(np.where(omega * points.time_sd_s < 0.2, late, 0.0))
-
-
 def _sure_part(
-    points: TurningPoints, amplitudes: FloatArray, rates: tuple[float, float, float]
-) -> int:
-    """The longest beginning over which one frequency describes the times."""
+    points: TurningPoints,
+    amplitudes: FloatArray,
+    rates: tuple[float, float, float],
+    share: float | None,
+    restoring: Restoring,
+) -> tuple[int, Period]:
+    """The longest beginning over which one frequency describes the times, and that."""
     count = len(points)
-    while count > 4:
+    while True:
         count = max(4, int(0.7 * count))
         part = points.first(count)
-        period = fit_period(part, amplitudes[:count], *rates)
-        late = _lateness(part, amplitudes[:count], rates, period.angular_frequency, period.time_s)
-        if np.max(np.abs(late)) < 0.5 * _SURE:
-            break
-    return count
+        period = fit_period(part, amplitudes[:count], *rates, share=share, restoring=restoring)
+        if np.max(np.abs(period.late_rad)) < 0.5 * _SURE or count == 4:
+            return count, period
 
 
 def _release(
@@ -139,9 +131,6 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     first = float(start.value[5]) if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
-    if start.last_s is not None:
-        last = min(last, start.last_s + 0.5 * half_period)
-        width = 0.0
     y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
     if 0.0 < _STOP * width < y0 and end < 2.0 * _STOP * width:
         last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
