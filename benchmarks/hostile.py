@@ -336,7 +336,7 @@ def _no_recording(folder: Path) -> str:
 
 
 def _page(folder: Path, count: int) -> list[str]:
-    """The page of a campaign in which four records, each under another name, are repeated."""
+    """The page of a campaign in which three records, each under another name, are repeated."""
     project = Project(folder / "project")
     status, said = project.run()
     if status:

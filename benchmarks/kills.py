@@ -3,7 +3,7 @@
     python -m benchmarks.kills                       every part; goes on where it was stopped
     python -m benchmarks.kills group job --number 10 of these parts ten cases more each
 
-Each case runs four records (three of a simulated instrument, one file) in a project of its own,
+Each case runs three records (two of a simulated instrument, one file) in a project of its own,
 disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same command
 again and compares every file of the results, byte for byte, with an undisturbed run. Left out
 are the logs, which carry the dates, and temporary files that a killed process left. The table is
@@ -28,6 +28,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, Final
+
+import numpy as np
 
 from benchmarks import journal
 from pendpipe.doctor import TEMPORARY
@@ -54,12 +56,11 @@ simulated:
   release:
     water: {angle_rad: 0.068, samples: 2048, duration_s: 60.0}
     air: {angle_rad: 0.25, samples: 2048, duration_s: 200.0}
-typical_record: low
+typical_record: high
 """
 RECORDS: Final = (
     "record\tsource\tfluid\tbranch\tgeometry\ttemperature_c\n"
     "high\tsimulated\twater\thigh\thigh-4\t20.0\n"
-    "low\tsimulated\twater\tlow\tlow-5\t20.0\n"
     "air\tsimulated\tair\tair\tair-07\t20.0\n"
     "file\tdecay.csv\n"
 )
@@ -68,6 +69,15 @@ PATIENCE_S: Final = 600.0
 
 Sums = dict[str, str]
 Case = dict[str, Any]
+
+
+def decay() -> str:
+    """A viscous decay of 20 swings with a little noise, as a file."""
+    noise = np.random.default_rng(1).normal(0.0, 1e-4, 1200)
+    time_s = np.arange(1200) / 60.0
+    angle = 0.3 * np.exp(-time_s / 10.0) * np.cos(2.0 * np.pi * time_s) + noise
+    rows = zip(time_s.tolist(), angle.tolist(), strict=True)
+    return "time_s,angle_rad\n" + "".join(f"{t:.6f},{y:.7f}\n" for t, y in rows)
 
 
 class Project:
@@ -80,7 +90,7 @@ class Project:
         shutil.copy(ROOT / "Snakefile", folder)
         for name in ("workflow", "config", "profiles"):
             shutil.copytree(ROOT / name, folder / name)
-        shutil.copy(ROOT / "examples/string-pendulum.csv", folder / "decay.csv")
+        (folder / "decay.csv").write_text(decay(), encoding="utf-8")
         (folder / "tiny.yaml").write_text(CONFIGURATION, encoding="utf-8")
         (folder / "records.tsv").write_text(RECORDS, encoding="utf-8")
 
@@ -203,12 +213,15 @@ class Trial:
         status, said = project.run()
         if status:
             raise SystemExit(f"the undisturbed run ended with status {status}:\n{said}")
-        self.results, self.sums = project.results, project.sums()
+        self.project, self.sums = project, project.sums()
         self.bytes, self.files = size_of(project.folder)
         self.largest = max(path.stat().st_size for path in project.results.rglob("*"))
 
-    def ended(self, project: Project, case: Case) -> Case:
-        """Do what the doctor says, run again, and tell how it ended."""
+    def ended(self, project: Project, case: Case, *, repaired: bool = False) -> Case:
+        """Do what the doctor says, run again, and tell how it ended.
+
+        Where results were `repaired`, the manifests' memory of it is no difference.
+        """
         began = time.monotonic()
         found = project.doctor()
         case["left"] = count(found)
@@ -217,6 +230,8 @@ class Trial:
         case["status"], said = project.run()
         sums = project.sums()
         differ = [n for n in sorted({*sums, *self.sums}) if sums.get(n) != self.sums.get(n)]
+        if repaired:
+            differ = [n for n in differ if record(project, n) != record(self.project, n)]
         case["after"] = count(project.doctor())
         case["differ"] = differ
         case["same"] = not differ and case["status"] == 0
@@ -224,12 +239,21 @@ class Trial:
             case["said"] = said[-2000:]
             kept = journal.KEPT / "kills" / f"{time.time():.0f}"
             for name in differ:
-                for side, results in (("is", project.results), ("was", self.results)):
+                for side, results in (("is", project.results), ("was", self.project.results)):
                     (kept / side / name).parent.mkdir(parents=True, exist_ok=True)
                     with suppress(FileNotFoundError):
                         shutil.copy(results / name, kept / side / name)
         case["rerun_s"] = round(time.monotonic() - began, 1)
         return case
+
+
+def record(project: Project, name: str) -> Any:
+    """A manifest without what was repaired; nothing that is like another, if it is none."""
+    path = project.results / name
+    if path.parent.name != "manifest" or not path.is_file():
+        return object()
+    content = json.loads(path.read_text(encoding="utf-8"))
+    return {key: value for key, value in content.items() if key not in ("repaired", "check")}
 
 
 def size_of(folder: Path) -> tuple[int, int]:
@@ -383,13 +407,45 @@ def order(trial: Trial, _project: Project, draw: random.Random) -> Case:
         "TZ": draw.choice(("Asia/Kathmandu", "America/New_York", "UTC")),
         "LC_ALL": draw.choice(("C", "C.UTF-8")),
     }
-    names = [f"results/{record}/fit.json" for record in ("high", "low", "air", "file")]
+    names = [f"results/{record}/fit.json" for record in ("high", "air", "file")]
     for name in draw.sample(names, k=2):
         project.run(name, cores=cores, **environment)
     case = {"disturbed": True, "cores": cores, "environment": environment}
     ended = trial.ended(project, case)
     shutil.rmtree(project.folder)
     return ended
+
+
+def advice(trial: Trial, project: Project, draw: random.Random) -> Case:
+    """Results broken in every way at once: what the doctor says is done to the letter."""
+    project.run()
+    process = project.start("--forceall")
+    project.wait(process, 0.05, len(trial.sums))
+    time.sleep(draw.uniform(0.0, 4.0))
+    kill_group(process)
+    names = sorted(project.sums())
+    altered, torn, missing = draw.sample([n for n in names if "manifest/" not in n], 3)
+    manifest = draw.choice([n for n in names if "manifest/" in n])
+    changed = [project.results / name for name in (altered, torn, manifest)]
+    for path, content in zip(changed, (b"#", b"", b"{"), strict=True):
+        status = path.stat()
+        path.write_bytes(content + path.read_bytes()[len(content) : draw.randrange(2, 200)])
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    (project.results / missing).unlink()
+    for name in ("high/.fit.json.ab12cd34", "high/notes.csv"):
+        (project.results / name).parent.mkdir(exist_ok=True)
+        (project.results / name).write_text("x")
+        changed.append(project.results / name)
+    found = project.doctor()
+    said = {project.folder / finding["path"] for finding in found}
+    for finding in found:
+        if "delete it" in finding["safe"]:
+            (project.folder / finding["path"]).unlink()
+    case = trial.ended(project, {"disturbed": True, "kinds": count(found)}, repaired=True)
+    unnamed = [path.name for path in changed if path not in said]
+    case["named"] = "" if unnamed else "all"
+    case["unnamed"] = unnamed
+    return case
 
 
 Part = Callable[[Trial, Project, random.Random], Case | None]
@@ -402,6 +458,7 @@ PARTS: Final[dict[str, tuple[str, Part, int]]] = {
     "read-only": ("read-only folder", read_only, 4),
     "two": ("two at once", two, 10),
     "order": ("cores, order, folder", order, 10),
+    "advice": ("broken in every way, the doctor obeyed", advice, 5),
 }
 
 

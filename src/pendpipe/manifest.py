@@ -27,6 +27,7 @@ from typing import Any, Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
 from pendpipe.files import read_json, sha256, write_json
+from pendpipe.version import __version__
 
 FOLDER: Final = "manifest"
 SET_ASIDE: Final = ".damaged-"
@@ -92,6 +93,7 @@ class Manifest:
     def write(self) -> None:
         """Write it; two runs of the same campaign write the same bytes."""
         content: dict[str, Any] = {"schema_version": 1, "stage": self.stage}
+        content["version"] = __version__
         for name in ("outputs", "extras", "sources"):
             content[name] = {key: entry._asdict() for key, entry in getattr(self, name).items()}
         content |= {"inputs": self.inputs, "repaired": list(self.repaired)}

@@ -88,6 +88,12 @@ def diagnoses():
     return of_all_records("diagnosis/diagnosis.json") if asked else []
 
 
+def of_every_record():
+    """All results of all records."""
+    names = ["recording.csv", "calibration.json", "turning_points.csv", "fit.json"]
+    return [path for name in names for path in of_all_records(name)] + diagnoses()
+
+
 def figure_files():
     """The figures of the paper, where the campaign has an apparatus to compare with."""
     if CAMPAIGN.configuration.apparatus is None:
