@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from pendpipe import manifest
 from pendpipe.errors import InputError
-from pendpipe.files import read_json, sha256
 from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
 
 TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
@@ -95,21 +94,6 @@ def _stale(home: Path) -> Iterator[Finding]:
         for name in entry.outputs:
             if (home / name).is_file() and (damage := index.made_from_others(home / name, entry)):
                 yield Finding("stale", str(damage.path), damage.problem, _RUN)
-    recording = home / "recording.csv"
-    for path in (home / "fit.json", home / "diagnosis/diagnosis.json"):
-        made_from = _input_of(path)
-        if made_from is not None and recording.is_file() and made_from != sha256(recording):
-            problem = "its input_sha256 is not that of the recording.csv there now"
-            yield Finding("stale", str(path), problem, _RUN)
-
-
-def _input_of(path: Path) -> str | None:
-    """The hash of the recording in a result's own provenance."""
-    try:
-        content: Any = read_json(path)
-        return content["provenance"].get("input_sha256")  # type: ignore[no-any-return]
-    except (InputError, AttributeError, KeyError, TypeError):
-        return None  # missing, refused, or damaged, which its manifest shows
 
 
 def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:

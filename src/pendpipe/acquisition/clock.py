@@ -3,21 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Protocol
-
-
-class Clock(Protocol):
-    """What the recorder and a simulated device need of a clock."""
-
-    @property
-    def scale(self) -> float:
-        """How many seconds of this clock pass in one second of wall-clock time."""
-
-    def now(self) -> float:
-        """Return the time in seconds of this clock since some fixed instant."""
-
-    def sleep(self, duration_s: float) -> None:
-        """Wait `duration_s` seconds of this clock."""
 
 
 class ScaledClock:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.drivers.decoders import Loss
 from pendpipe.acquisition.raw import COMPLETE, NothingRecordedError, RawRecording, read_raw
-from pendpipe.acquisition.segments import Segment, cut, offsets_s, split
+from pendpipe.acquisition.segments import Segment, offsets_s, split
 from pendpipe.acquisition.timebase import TimeBase, measure_rate
 from pendpipe.arrays import ByteArray, FloatArray, IntArray
 from pendpipe.errors import InputError
@@ -69,7 +69,8 @@ def decode_recording(
     kept = raw.event("stopped").get("keep_scans")
     if kept is not None and len(segments) == 1:
         gone = sum(loss.lost_scans for loss in segments[0].losses if loss.reason == "damage")
-        segments = [cut(segments[0], max(1, int(kept) - gone))]
+        first = segments[0].counts[: max(1, int(kept) - gone)]
+        segments = [replace(segments[0], counts=first)]
     if not segments:
         raise NothingRecordedError(
             place, "no scan was recorded", "check the device, and record again"

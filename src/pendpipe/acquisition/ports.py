@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -12,39 +11,6 @@ from pendpipe.acquisition.drivers import FAMILIES
 from pendpipe.acquisition.drivers.base import Identity
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.errors import InputError
-
-
-@dataclass(frozen=True)
-class FoundPort:
-    """A serial port.
-
-    Parameters
-    ----------
-    port
-        What to give as ``--port``.
-    description
-        The system's description.
-    vendor, product
-        USB numbers, where it is a USB device.
-    """
-
-    port: str
-    description: str
-    vendor: int | None = None
-    product: int | None = None
-
-    @property
-    def is_dataq(self) -> bool:
-        """Whether its USB number is the vendor's."""
-        return self.vendor == VENDOR
-
-
-def list_ports() -> list[FoundPort]:
-    """List the serial ports of this machine, by name; nothing is opened or sent."""
-    from serial.tools import list_ports as tools
-
-    found = [FoundPort(p.device, p.description, p.vid, p.pid) for p in tools.comports()]
-    return sorted(found, key=lambda port: port.port)
 
 
 def identify(port: str) -> Identity:
@@ -88,20 +54,8 @@ _CDC: Final = (
 )
 
 
-@dataclass(frozen=True)
-class Unbound:
-    """A Dataq device without a serial port: its USB product number, and what to do."""
-
-    product: int
-    remedy: str
-
-    def __str__(self) -> str:
-        name = _OF_WINDAQ.get(self.product, "DI-245" if self.product == _DI245 else "device")
-        return f"Dataq {name} (0683:{self.product:04x}) without a serial port: {self.remedy}"
-
-
-def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[Unbound]:
-    """Find the vendor's devices that the kernel has given no serial port (Linux only).
+def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
+    """Say of each of the vendor's devices without a serial port what to do (Linux only).
 
     Parameters
     ----------
@@ -116,7 +70,8 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[Unbound]:
             continue
         if any(device.glob("*/tty*")):
             continue
-        found.append(Unbound(product, _remedy(product)))
+        name = _OF_WINDAQ.get(product, "DI-245" if product == _DI245 else "device")
+        found.append(f"Dataq {name} (0683:{product:04x}) without a serial port: {_remedy(product)}")
     return found
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Final, Protocol, cast
+from typing import IO, Final, cast
 
-from pendpipe.acquisition.clock import Clock, ScaledClock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
@@ -20,6 +20,7 @@ from pendpipe.acquisition.drivers.decoders import Decoder
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.noise import NoiseWatch
 from pendpipe.acquisition.ports import identify
+from pendpipe.acquisition.progress import ProgressLine
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
@@ -35,19 +36,6 @@ _PATIENCE_S: Final = 5.0
 """Seconds of the host, beyond a tenth more than asked, that a slow device is waited for."""
 _RETRY_S: Final = 0.2
 """Seconds of the host between two attempts to find the device again."""
-
-
-class Progress(Protocol):
-    """A display of how a recording goes on."""
-
-    def begin(self, driver: type[Driver], setup: Setup) -> None:
-        """Show what is recorded; again after a break."""
-
-    def update(self, elapsed_s: float, data: bytes) -> None:
-        """Show further bytes, by `elapsed_s` of the recorder's clock."""
-
-    def end(self) -> None:
-        """Close the display."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +94,8 @@ class Session:
         line: Line,
         driver: type[Driver],
         request: AcquisitionRequest,
-        clock: Clock,
-        progress: Progress | None = None,
+        clock: ScaledClock,
+        progress: ProgressLine | None = None,
     ) -> None:
         self._line = line
         self._driver = driver
@@ -247,11 +235,11 @@ def record(
     channels: Sequence[int] = (1,),
     rate_hz: float,
     duration_s: float,
-    clock: Clock | None = None,
+    clock: ScaledClock | None = None,
     raw_path: str | Path | None = None,
     volts_per_radian: float | None = None,
     source: str | None = None,
-    progress: Progress | None = None,
+    progress: ProgressLine | None = None,
     range_volts: float | None = None,
     until_noise: bool = False,
     reconnect_s: float = 30.0,
@@ -372,7 +360,7 @@ def _cannot_write(place: str | Path, fault: OSError) -> InputError:
 
 
 def _header(
-    port: str, identity: Identity, setup: Setup, request: AcquisitionRequest, clock: Clock
+    port: str, identity: Identity, setup: Setup, request: AcquisitionRequest, clock: ScaledClock
 ) -> dict[str, object]:
     """Describe a recording for whoever finds the file."""
     kind = find_driver(identity.model)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, NamedTuple
 
@@ -179,8 +179,3 @@ def _scans_by(
         if loss.after_scan:
             made[later] += loss.lost_scans
     return made, good
-
-
-def cut(segment: Segment, scans: int) -> Segment:
-    """Keep the first scans only."""
-    return replace(segment, counts=segment.counts[:scans])

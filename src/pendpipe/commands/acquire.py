@@ -14,7 +14,6 @@ import argparse
 import math
 import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -163,19 +162,12 @@ def _record(arguments: argparse.Namespace) -> int:
 
 def _check_place(out: Path) -> None:
     """Refuse, before anything is recorded, a place where no recording can be written."""
-    from pendpipe.files import make_folder
+    from pendpipe.files import check_writable
 
     if out.is_dir():
         raise InputError(out, "this is a folder", "name a file in it")
-    make_folder(out.parent)
-    if out.exists() and not out.is_file():
-        return  # a device or a pipe
-    try:
-        with tempfile.TemporaryFile(dir=out.parent):
-            return
-    except OSError as fault:
-        problem = f"it can't be written ({fault.strerror or fault})"
-        raise InputError(out, problem, "name another folder") from None
+    if out.is_file() or not out.exists():  # else it is a device or a pipe
+        check_writable(out.parent)
 
 
 def _check_length(arguments: argparse.Namespace) -> None:
@@ -307,23 +299,25 @@ def _clock_scale(arguments: argparse.Namespace) -> float:
 
 def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
-    from pendpipe.acquisition.ports import identify, list_ports, no_ports, without_port
+    from serial.tools.list_ports import comports
+
+    from pendpipe.acquisition.ports import VENDOR, identify, no_ports, without_port
 
     if port:
         identity = identify(port)
         extra = f", firmware {identity.firmware}" if identity.firmware else ""
         print(f"{port}: {identity.model}{extra}")
         return 0
-    found = list_ports()
+    found = sorted(comports(), key=lambda entry: entry.device)
     for entry in found:
-        shown = "Dataq" if entry.is_dataq else entry.description
+        shown = entry.description
         # Only a device with the vendor's number is asked: others may not bear it.
-        if entry.is_dataq:
+        if entry.vid == VENDOR:
             try:
-                shown = f"Dataq {identify(entry.port).model}"
+                shown = f"Dataq {identify(entry.device).model}"
             except InputError as fault:
                 shown = f"Dataq, {fault.problem}"
-        print(f"{entry.port}: {shown}")
+        print(f"{entry.device}: {shown}")
     unbound = without_port()
     for device in unbound:
         print(device)

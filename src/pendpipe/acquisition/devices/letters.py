@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-import numpy as np
-
-from pendpipe.acquisition.devices.simulated import Dialect
+from pendpipe.acquisition.devices.simulated import Dialect, marked
 from pendpipe.arrays import IntArray
 
 
@@ -78,13 +76,8 @@ class SimulatedDI154RS(Dialect):
         return b""
 
     def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
-        offset = (np.asarray(codes) + 2048).astype(np.uint16)
-        out = np.empty((*offset.shape, 2), dtype=np.uint8)
-        out[..., 0] = (offset % 32) * 8 + 1
-        out[..., 1] = (offset // 32) * 2 + 1
-        out[:, 0, 0] -= 1
-        return out.tobytes()
+        """Two bytes a sample, with a frame mark."""
+        return marked(codes, self.bits)
 
 
 class SimulatedDI194RS(SimulatedDI154RS):
@@ -93,15 +86,6 @@ class SimulatedDI194RS(SimulatedDI154RS):
     model: ClassVar[str] = "DI-194RS"
     bits: ClassVar[int] = 10
     answer_to_identify: ClassVar[bytes] = b"0000000000"
-
-    def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
-        offset = (np.asarray(codes) + 512).astype(np.uint16)
-        out = np.empty((*offset.shape, 2), dtype=np.uint8)
-        out[..., 0] = (offset % 8) * 32 + 1
-        out[..., 1] = (offset // 8) * 2 + 1
-        out[:, 0, 0] -= 1
-        return out.tobytes()
 
 
 _FULL_SCALES: Final = [0.5, 0.25, 0.1, 0.05, 0.025, 0.01, *[0.0] * 2, 50, 25, 10, 5, 2.5, 1]
@@ -182,9 +166,5 @@ class SimulatedDI245(Dialect):
         return text.encode("latin-1") + b"\r"
 
     def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
-        offset = (np.asarray(codes) + 0x2000).astype(np.uint16)
-        low, high = (offset & 0x7F) << 1, offset >> 7 << 1
-        out = (np.stack([low, high], axis=-1) | 1).astype(np.uint8)
-        out[:, 0, 0] ^= 1
-        return out.tobytes()
+        """Two bytes a sample, with a frame mark."""
+        return marked(codes, self.bits)

@@ -6,31 +6,7 @@ import os
 import select
 import socket
 from contextlib import suppress
-from typing import Protocol
-
-
-class Link(Protocol):
-    """The device's end; every call returns at once, except `wait`."""
-
-    port: str
-
-    def wait(self, timeout_s: float, *, sending: bool) -> None:
-        """Wait until there is something to read (or room to write), or `wake` is called."""
-
-    def wake(self) -> None:
-        """Let a waiting thread go on."""
-
-    def receive(self) -> bytes:
-        """Return what the host has sent; nothing when it has sent nothing."""
-
-    def send(self, data: memoryview) -> int:
-        """Send what there is room for; return how many bytes that was."""
-
-    def unplug(self) -> None:
-        """Pull the plug: the host's next read fails."""
-
-    def close(self) -> None:
-        """End the line for good."""
+from typing import TypeAlias
 
 
 class _Waking:
@@ -164,6 +140,10 @@ class LoopbackSocket(_Waking):
         """End the line for good."""
         self.unplug()
         self._close()
+
+
+Link: TypeAlias = PseudoTerminal | LoopbackSocket
+"""The device's end; every call returns at once, except `wait`."""
 
 
 def open_link(kind: str | None = None) -> Link:

@@ -11,7 +11,7 @@ from typing import ClassVar, Final, Self, TypeAlias
 
 import numpy as np
 
-from pendpipe.acquisition.clock import Clock, SimulatedClock
+from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
 from pendpipe.acquisition.devices.links import Link, open_link
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
@@ -96,6 +96,19 @@ def convert(volts: FloatArray, bits: int, range_volts: float) -> IntArray:
     return np.clip(codes, -half, half - 1).astype(np.int64)
 
 
+def marked(codes: IntArray, bits: int) -> bytes:
+    """Write signed codes, shape (scans, channels), as two bytes a sample with a frame mark.
+
+    Offset binary: the upper seven bits of a sample in the second byte, the others at the top of the
+    first. Bit 0 is clear on the first byte of a scan only.
+    """
+    offset = np.asarray(codes) + 2 ** (bits - 1)
+    low = 2 ** (bits - 7)
+    out = np.stack([offset % low * (256 // low) + 1, offset // low * 2 + 1], axis=-1)
+    out[:, 0, 0] -= 1
+    return out.astype(np.uint8).tobytes()
+
+
 Signal: TypeAlias = Callable[[FloatArray], FloatArray]
 """Times in s since the device was switched on to volts at the terminals, noise included."""
 
@@ -129,12 +142,12 @@ class Stream:
         self._released = 0  # bytes since the start
         self._origin_s = 0.0
 
-    def begin(self, clock: Clock) -> None:
+    def begin(self, clock: ScaledClock) -> None:
         """Let scan 0 be taken now; the first block is computed before, and not late."""
         self._compute()
         self._origin_s = clock.now()
 
-    def due(self, clock: Clock) -> bytes:
+    def due(self, clock: ScaledClock) -> bytes:
         """Return the whole packets that are complete by now."""
         elapsed = clock.now() - self._origin_s
         taken = math.floor(elapsed * self._rate_hz) + 1
@@ -146,7 +159,7 @@ class Stream:
         self._released += size
         return piece
 
-    def rest_s(self, clock: Clock) -> float:
+    def rest_s(self, clock: ScaledClock) -> float:
         """How long, in seconds of the host, until the next packet is complete."""
         following = math.ceil((self._released + self._dialect.packet_bytes) / self.scan_bytes)
         complete_s = self._origin_s + (following - 1) / self._rate_hz

@@ -4,15 +4,35 @@ from __future__ import annotations
 
 import struct
 import sys
-from typing import ClassVar
+from abc import abstractmethod
+from typing import ClassVar, Final
 
 import numpy as np
 
-from pendpipe.acquisition.devices.simulated import Dialect
+from pendpipe.acquisition.devices.simulated import Dialect, marked
 from pendpipe.arrays import IntArray
 
 
-class SimulatedDI149(Dialect):
+class TextDialect(Dialect):
+    """Commands of text, ended by CR."""
+
+    full_scales: ClassVar[tuple[float, ...]] = (10.0,)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._line = b""
+
+    def respond(self, data: bytes) -> bytes:
+        """Take bytes from the host; return the echoes and answers."""
+        *complete, self._line = (self._line + data).split(b"\r")
+        return b"".join(self._execute(line.decode("latin-1").strip("\0\n ")) for line in complete)
+
+    @abstractmethod
+    def _execute(self, text: str) -> bytes:
+        """Execute one command and return its echo."""
+
+
+class SimulatedDI149(TextDialect):
     """Eight channels of 12 bits, +-10 V, text commands ended by CR.
 
     Every command is echoed with its CR, ``start`` too. While data flow only ``stop`` is
@@ -21,11 +41,9 @@ class SimulatedDI149(Dialect):
 
     model: ClassVar[str] = "DI-149"
     bits: ClassVar[int] = 12
-    full_scales: ClassVar[tuple[float, ...]] = (10.0,)
 
     def __init__(self) -> None:
         super().__init__()
-        self._line = b""
         self._list = [0]
         self._divisor = 7500
 
@@ -43,12 +61,6 @@ class SimulatedDI149(Dialect):
     def scan_rate_hz(self) -> float:
         """Scans a second: 750 kHz over srate."""
         return 750e3 / self._divisor
-
-    def respond(self, data: bytes) -> bytes:
-        """Take bytes from the host; return the echoes and answers."""
-        self._line += data
-        *complete, self._line = self._line.split(b"\r")
-        return b"".join(self._execute(line.decode("latin-1").strip("\0\n ")) for line in complete)
 
     def _execute(self, text: str) -> bytes:
         """Execute one command and return its echo."""
@@ -74,11 +86,8 @@ class SimulatedDI149(Dialect):
         return f"{text}{answer}\r".encode("latin-1")
 
     def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, offset binary, bit 0 clear on the first byte of a scan only."""
-        top = np.asarray(codes) * 2 ** (14 - self.bits) + 8192
-        out = np.stack([top % 128, top // 128], axis=-1).astype(np.uint8) * 2 + 1
-        out[:, 0, 0] &= 0xFE
-        return out.astype(np.uint8).tobytes()
+        """Two bytes a sample, 14 bits with a frame mark."""
+        return marked(np.asarray(codes) * 2 ** (14 - self.bits), 14)
 
 
 class SimulatedDI155(SimulatedDI149):
@@ -89,7 +98,7 @@ class SimulatedDI155(SimulatedDI149):
     full_scales: ClassVar[tuple[float, ...]] = tuple(50 / g for g in (1, 2, 4, 5, 8, 10, 16, 20))
 
 
-class SimulatedDI2108(Dialect):
+class SimulatedDI2108(TextDialect):
     """Eight channels of 16 bits, +-10 V, text commands ended by CR.
 
     Commands are echoed with their CR; ``start`` is not, and ``info N`` is followed by the
@@ -98,7 +107,6 @@ class SimulatedDI2108(Dialect):
 
     model: ClassVar[str] = "DI-2108"
     bits: ClassVar[int] = 16
-    full_scales: ClassVar[tuple[float, ...]] = (10.0,)
     limits: ClassVar[dict[str, tuple[int, int]]] = {
         "srate": (375, 65535),
         "dec": (1, 512),
@@ -109,7 +117,6 @@ class SimulatedDI2108(Dialect):
 
     def __init__(self) -> None:
         super().__init__()
-        self._line = b""
         self._list: dict[int, int] = {0: 0}
         self._setting = {"srate": 60000, "dec": 1, "deca": 1, "ps": 0, "encode": 0}
 
@@ -124,12 +131,6 @@ class SimulatedDI2108(Dialect):
         return self.full_scales[min(len(self.full_scales) - 1, self._list[0] >> 8 & 0x0F)]
 
     @property
-    def information(self) -> dict[str, str]:
-        """The answers to ``info``."""
-        number = self.model.removeprefix("DI-")
-        return {"0": "DATAQ", "1": number, "2": "0.141", "6": "5F2A9C01", "9": "60000000"}
-
-    @property
     def scan_rate_hz(self) -> float:
         """Scans a second: 60 MHz over the three divisors."""
         return 60e6 / (self._setting["srate"] * self._setting["dec"] * self._setting["deca"])
@@ -138,15 +139,6 @@ class SimulatedDI2108(Dialect):
     def packet_bytes(self) -> int:
         """16, 32, ... 2048 bytes for ``ps`` 0 to 7."""
         return 16 << self._setting["ps"]
-
-    def respond(self, data: bytes) -> bytes:
-        """Take bytes from the host; return the echoes and answers."""
-        self._line += data
-        out = b""
-        while b"\r" in self._line:
-            line, _, self._line = self._line.partition(b"\r")
-            out += self._execute(line.decode("latin-1").strip("\0\n "))
-        return out
 
     def _execute(self, text: str) -> bytes:
         """Execute one command and return its echo."""
@@ -160,7 +152,9 @@ class SimulatedDI2108(Dialect):
         if name == "stop":
             self.streaming = False
         elif name == "info" and arguments:
-            return f"{text} {self.information.get(arguments[0], '')}\r".encode()
+            number = self.model.removeprefix("DI-")
+            answers = {"0": "DATAQ", "1": number, "2": "0.141", "6": "5F2A9C01", "9": "60000000"}
+            return f"{text} {answers.get(arguments[0], '')}\r".encode()
         elif name == "slist" and len(arguments) == 2:
             place = int(arguments[0])
             # A list is written from its first place on, and ends with its last.
@@ -182,58 +176,21 @@ class SimulatedDI2108(Dialect):
         return (words if sys.byteorder == "little" else words.byteswap()).tobytes()
 
 
-class SimulatedDI1100(SimulatedDI2108):
-    """Four channels of 12 bits; no ``dec``."""
+_SIX_RANGES: Final = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+_WITHOUT_DEC: Final = SimulatedDI2108.limits | {"dec": (1, 1)}
+MODELS: Final[dict[str, dict[str, object]]] = {
+    "DI-1100": {"bits": 12, "limits": _WITHOUT_DEC | {"srate": (1500, 65535)}},
+    "DI-1110": {"bits": 12, "limits": _WITHOUT_DEC},
+    "DI-1120": {"bits": 14, "full_scales": _SIX_RANGES},
+    "DI-4108": {"full_scales": (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)},
+    "DI-2108-P": {
+        "full_scales": (10.0, 5.0, 2.5),
+        "limits": SimulatedDI2108.limits | {"deca": (1, 1)},
+    },
+    "DI-4208": {"full_scales": _SIX_RANGES},
+    "DI-4718B": {"full_scales": (5.0,)},
+}
+"""The boxes that differ from the DI-2108 in figures only."""
 
-    model: ClassVar[str] = "DI-1100"
-    bits: ClassVar[int] = 12
-    limits: ClassVar[dict[str, tuple[int, int]]] = {
-        **SimulatedDI2108.limits,
-        "srate": (1500, 65535),
-        "dec": (1, 1),
-    }
-
-
-class SimulatedDI1110(SimulatedDI2108):
-    """Eight channels of 12 bits; no ``dec``."""
-
-    model: ClassVar[str] = "DI-1110"
-    bits: ClassVar[int] = 12
-    limits: ClassVar[dict[str, tuple[int, int]]] = {**SimulatedDI2108.limits, "dec": (1, 1)}
-
-
-class SimulatedDI1120(SimulatedDI2108):
-    """Four channels of 14 bits in six ranges."""
-
-    model: ClassVar[str] = "DI-1120"
-    bits: ClassVar[int] = 14
-    full_scales: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-
-
-class SimulatedDI4108(SimulatedDI2108):
-    """Eight channels of 16 bits in six ranges."""
-
-    model: ClassVar[str] = "DI-4108"
-    full_scales: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
-
-
-class SimulatedDI2108P(SimulatedDI2108):
-    """Eight channels of 16 bits in three ranges; no ``deca``."""
-
-    model: ClassVar[str] = "DI-2108-P"
-    full_scales: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.5)
-    limits: ClassVar[dict[str, tuple[int, int]]] = {**SimulatedDI2108.limits, "deca": (1, 1)}
-
-
-class SimulatedDI4208(SimulatedDI2108):
-    """Eight channels of 16 bits in six ranges."""
-
-    model: ClassVar[str] = "DI-4208"
-    full_scales: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-
-
-class SimulatedDI4718B(SimulatedDI2108):
-    """Eight channels of 16 bits, +-5 V."""
-
-    model: ClassVar[str] = "DI-4718B"
-    full_scales: ClassVar[tuple[float, ...]] = (5.0,)
+for _model, _figures in MODELS.items():
+    type(f"Simulated{_model}", (SimulatedDI2108,), {"model": _model, **_figures})

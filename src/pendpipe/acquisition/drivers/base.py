@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from pendpipe.acquisition.clock import Clock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.drivers.decoders import Decoder, SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
@@ -89,7 +89,7 @@ class Driver(ABC):
         if "model" in cls.__dict__:
             DRIVERS[plain_name(cls.model)] = cls
 
-    def __init__(self, line: Line, clock: Clock) -> None:
+    def __init__(self, line: Line, clock: ScaledClock) -> None:
         self.line = line
         self.setup: Setup | None = None
         self._clock = clock
@@ -177,11 +177,7 @@ class Driver(ABC):
         """Send the command, and take its echo off the line but none of the data behind it."""
 
     def stop(self) -> None:
-        """End the stream and throw away what still arrives."""
-        self._end_stream()
-
-    def _end_stream(self) -> None:
-        """Send the stop command until its echo is followed by silence.
+        """Send the stop command until its echo is followed by silence; throw away what arrives.
 
         While data flow the echo is buried among them, and bytes of data may look like it.
         """

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -73,20 +73,6 @@ class Scans:
 
     def __len__(self) -> int:
         return len(self.counts)
-
-
-class Decoder(Protocol):
-    """Bytes in, scans and losses out; how the bytes are cut into pieces changes nothing."""
-
-    @property
-    def bytes_per_scan(self) -> int:
-        """How many bytes an undamaged scan takes."""
-
-    def feed(self, data: bytes) -> Scans:
-        """Decode further bytes; an unfinished scan waits for the next call."""
-
-    def finish(self) -> Scans:
-        """Say what is left over at the end: scans held back till now, perhaps a loss."""
 
 
 class SyncBitDecoder:
@@ -262,3 +248,7 @@ class WordDecoder:
         words: AnyArray = np.frombuffer(data, dtype="<i2").reshape(-1, self._channels)
         self._scans += len(words)
         return Scans(words >> self._shift if self._shift else words)
+
+
+Decoder: TypeAlias = SyncBitDecoder | WordDecoder
+"""Bytes in, scans and losses out; how the bytes are cut into pieces changes nothing."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from pendpipe.acquisition.clock import Clock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.drivers.base import Driver, Identity
 from pendpipe.acquisition.line import Line
 
@@ -58,7 +58,7 @@ class DI154RS(LetterDriver):
     bits: ClassVar[int] = 12
     channels: ClassVar[int] = 4
 
-    def __init__(self, line: Line, clock: Clock) -> None:
+    def __init__(self, line: Line, clock: ScaledClock) -> None:
         super().__init__(line, clock)
         self._baudrate = self.baudrate
 
@@ -89,7 +89,7 @@ class DI154RS(LetterDriver):
 
     def stop(self) -> None:
         """End the stream, throw away what still arrives, and go back to 4800 baud."""
-        self._end_stream()
+        super().stop()
         self._set_baudrate(self.baudrate)
 
     def _set_baudrate(self, baudrate: int) -> None:
@@ -111,7 +111,7 @@ class DI154RS(LetterDriver):
                 self._doubt = True
                 self._clock.sleep(0.5)
                 if undo:
-                    self._end_stream()
+                    super().stop()
                 self.line.discard(self.quiet_s)
             echoed, echo = self._send_letters(letter, argument)
             if echoed:

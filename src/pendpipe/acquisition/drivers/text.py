@@ -160,64 +160,21 @@ class DI2108(TextDriver):
         return divisor, decimation, further
 
 
-class DI1100(DI2108):
-    """The DI-1100: 4 channels, 12 bits at the top of a word, +-10 V, 40 kHz."""
+_RANGES: Final = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+MODELS: Final[dict[str, dict[str, object]]] = {
+    "DI-1100": {"bits": 12, "channels": 4, "divisors": (1500, 65535), "decimations": 1},
+    "DI-1110": {"bits": 12, "decimations": 1},
+    "DI-1120": {"bits": 14, "channels": 4, "ranges": _RANGES},
+    "DI-4108": {"ranges": (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)},
+    # Its ranges from 0 V up are not used: a pendulum swings about its rest. It knows no deca.
+    "DI-2108-P": {"ranges": (10.0, 5.0, 2.5), "further_decimations": 1},
+    "DI-4208": {"ranges": _RANGES},
+    "DI-4718B": {"range_volts": 5.0, "ranges": (5.0,)},  # behind its amplifiers
+}
+"""The boxes that differ from the DI-2108 in figures only; 12 and 14 bits stand at the top."""
 
-    model: ClassVar[str] = "DI-1100"
-    bits: ClassVar[int] = 12
-    channels: ClassVar[int] = 4
-    divisors: ClassVar[tuple[int, int]] = (1500, 65535)
-    decimations: ClassVar[int] = 1
-
-
-class DI1110(DI2108):
-    """The DI-1110: 8 channels, 12 bits at the top of a word, +-10 V, 160 kHz."""
-
-    model: ClassVar[str] = "DI-1110"
-    bits: ClassVar[int] = 12
-    decimations: ClassVar[int] = 1
-
-
-class DI1120(DI2108):
-    """The DI-1120: 4 channels, 14 bits at the top of a word, +-2 to +-100 V, 160 kHz."""
-
-    model: ClassVar[str] = "DI-1120"
-    bits: ClassVar[int] = 14
-    channels: ClassVar[int] = 4
-    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-
-
-class DI4108(DI2108):
-    """The DI-4108: 8 channels, 16 bits, +-0.2 to +-10 V, 160 kHz."""
-
-    model: ClassVar[str] = "DI-4108"
-    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
-
-
-class DI2108P(DI2108):
-    """The DI-2108-P: as the DI-2108, +-10, +-5 or +-2.5 V, no ``deca``.
-
-    Its ranges from 0 V up are not used: a pendulum swings about its rest.
-    """
-
-    model: ClassVar[str] = "DI-2108-P"
-    ranges: ClassVar[tuple[float, ...]] = (10.0, 5.0, 2.5)
-    further_decimations: ClassVar[int] = 1
-
-
-class DI4208(DI2108):
-    """The DI-4208 over USB: 8 channels, 16 bits, +-2 to +-100 V, 160 kHz."""
-
-    model: ClassVar[str] = "DI-4208"
-    ranges: ClassVar[tuple[float, ...]] = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-
-
-class DI4718B(DI2108):
-    """The DI-4718B: 8 channels, 16 bits, +-5 V behind its amplifiers, 160 kHz."""
-
-    model: ClassVar[str] = "DI-4718B"
-    range_volts: ClassVar[float] = 5.0
-    ranges: ClassVar[tuple[float, ...]] = (5.0,)
+for _model, _figures in MODELS.items():
+    type(_model.replace("-", ""), (DI2108,), {"model": _model, **_figures})
 
 
 def _packet_code(bytes_per_second: float) -> int:
