@@ -13,7 +13,7 @@ import compileall
 import sys
 from pathlib import Path
 
-from pendpipe.dynamics.kernel import Kernel
+from pendpipe.dynamics.kernel import SHIPPED, Kernel, shipped_name
 
 
 def kernels() -> list[Kernel]:
@@ -35,9 +35,13 @@ def warm_up() -> None:
 
 
 def ship() -> None:
-    """Put the machine code into the package."""
+    """Put the machine code into the package, and take out what older sources left there."""
     for each in kernels():
         each.ship()
+    current = {shipped_name(each.file_name()) for each in kernels()}
+    for path in SHIPPED.glob("*.bin"):
+        if path.name not in current:
+            path.unlink()
 
 
 if __name__ == "__main__":

@@ -147,7 +147,7 @@ def test_the_light_says_how_far_the_numbers_may_be_believed() -> None:
     wrong = check_decrement(points, Eq8(OMEGA, viscous=0.054))
     light, reason = light_of(wrong, misfit=1.0, unit="rad")
     assert light == "red"
-    assert "it loses 0.054 1/s, the turning points show 0.05" in reason
+    assert "it loses 0.054 s⁻¹, the turning points show 0.05" in reason
     assert "(+8 %)" in reason
 
 
@@ -291,3 +291,13 @@ def test_laws_that_are_right_are_green() -> None:
     assert "red" not in lights
     # The check is at two standard deviations, three times.
     assert lights.count("green") > 30
+
+
+@pytest.mark.parametrize("over_friction", [2.2, 3.0, 30.0])
+def test_the_loss_is_that_of_the_cycle_about_the_amplitude(over_friction: float) -> None:
+    # Dry friction alone takes d = pi c/omega from each half swing: from y + d to y - d.
+    law = Eq8(OMEGA, coulomb=1e-3)
+    fall = math.pi * 1e-3 / OMEGA
+    amplitude = over_friction * fall
+    expected = math.log((amplitude + fall) / (amplitude - fall)) / (2.0 * math.pi / OMEGA)
+    assert loss_of(law, amplitude) == pytest.approx(expected, rel=1e-6)

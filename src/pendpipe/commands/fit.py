@@ -66,8 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
     _check_figure(arguments.figure)
     result = _fit(arguments)
     if result.light == "red":
-        remedy = "see pendpipe diagnose; --accept prints the law all the same"
-        print(f"pendpipe: {arguments.file}: {result.light_reason}; {remedy}", file=sys.stderr)
+        why = result.light_reason if arguments.json else "no law is printed"
+        print(f"pendpipe: {arguments.file}: {why} (--accept prints it)", file=sys.stderr)
     if arguments.out and arguments.out != "-":
         _write(arguments, result)
     if arguments.figure:

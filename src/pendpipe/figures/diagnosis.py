@@ -36,6 +36,7 @@ from pendpipe.figures.style import (
     VERMILION,
     WIDTH_IN,
     key_above,
+    quantity_of,
     save,
     styled,
 )
@@ -133,7 +134,7 @@ def draw_decay(content: Shown) -> Figure:
         models.append((content.extended_name, content.extended, BLUE))
     data, figure = content.data, Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
     decay, end, rest = figure.subplots(3, 1)
-    quantity = "Angle" if data.unit == "rad" else "Displacement"
+    quantity = quantity_of(data.unit)
     values = np.where(data.weight > 0.0, data.values, np.nan)
     factor, unit = axis_unit(values, data.unit)
     decay.plot(data.time_s, factor * values, color=GREY, linewidth=0.4, label="readings")
@@ -164,6 +165,7 @@ def _draw_end(axes: Axes, content: Shown, values: FloatArray, models: list[Model
     axes.plot(time[last], factor * values[last], "o", color=GREY, markersize=2.0)
     for _, fit, colour in models:
         axes.plot(time[last], factor * fit.at.reading[last], color=colour, linewidth=1.0)
+    axes.set_title("The last cycles")
     axes.set_xlabel("Time (s)")
 
 
@@ -447,7 +449,7 @@ def draw_frequency(content: Shown) -> Figure:
             label=name,
             linewidth=1.2,
         )
-    axes.set_ylabel(f"Frequency/({origin:.6g} Hz) − 1 ({power})")
+    axes.set_ylabel(f"Frequency change from {origin:.5g} Hz ({power})")
     _amplitude_axis(axes, x, unit)
     key_above(axes, 3 if content.extended is None else 2)
     return figure
@@ -520,7 +522,7 @@ def draw_curve(content: Shown) -> Figure:
         panel = next(panels)
         _curve(panel, effect)
         if not panel.get_legend():
-            panel.set_title(effect.identifier)
+            panel.set_title(effect.name[:1].upper() + effect.name[1:])
         if _exponents(effect):
             _exponent(next(panels), effect)
     return figure

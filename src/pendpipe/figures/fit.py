@@ -9,14 +9,15 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.fit.summary import period_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
-from pendpipe.figures.style import BLUE, GREY, INK, WIDTH_IN, key_above, styled
+from pendpipe.figures.style import BLUE, GREY, INK, WIDTH_IN, key_above, quantity_of, styled
 from pendpipe.quantities import axis_unit
 from pendpipe.recording import Recording
 
@@ -49,16 +50,11 @@ def draw_fit(result: FitResult, points: TurningPoints, recording: Recording) -> 
     figure = Figure(figsize=(WIDTH_IN, 6.6), layout="constrained")
     decay, rest, quality = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.3, 0.7, 1.0]})
     _draw_decay(decay, factor, recording, points, fitted)
-    decay.set_ylabel(f"{_kind(points.unit)} ({unit})")
+    decay.set_ylabel(f"{quantity_of(points.unit)} ({unit})")
     _draw_residual(rest, points, fitted)
     rest.sharex(decay)
     _draw_quality(quality, law, result, points)
     return figure
-
-
-def _kind(unit: str) -> str:
-    """Name the quantity on an axis."""
-    return {"rad": "Angle", "m": "Displacement"}.get(unit, "Reading")
 
 
 def _fitted_amplitudes(law: Eq8, result: FitResult, points: TurningPoints) -> FloatArray:
@@ -125,31 +121,34 @@ def _draw_residual(axes: Axes, points: TurningPoints, fitted: FloatArray) -> Non
 
 
 def _draw_quality(axes: Axes, law: Eq8, result: FitResult, points: TurningPoints) -> None:
-    frequency = result.parameters["frequency"].value
     clear = points.amplitude_rad[points.amplitude_rad > 0.0]
     factor, unit = axis_unit(clear, points.unit)
     amplitude = np.geomspace(float(clear.min()), float(clear.max()), 60)
-    loss = np.array([loss_of(law, float(each)) for each in amplitude])
-    axes.plot(
-        factor * amplitude, math.pi * frequency / loss, color=INK, label="fitted law: Q = πf/loss"
-    )
+    lost = np.array([loss_of(law, y) * period_of(result, y) for y in amplitude.tolist()])
+    # Where a cycle takes more than half of the amplitude, no Q describes it.
+    q = np.where(lost < 0.7, math.pi / lost, math.nan)
+    axes.plot(factor * amplitude, q, color=INK, label="fitted law")
     seen = [check for check in result.decrement_check if check.seen > 0.0]
     if seen:
-        q = np.array([math.pi * frequency / check.seen for check in seen])
+        q_seen = np.array(
+            [math.pi / (check.seen * period_of(result, check.amplitude_rad)) for check in seen]
+        )
         relative = np.array([check.seen_sd / check.seen for check in seen])
         axes.errorbar(
             [factor * check.amplitude_rad for check in seen],
-            q,
-            q * relative,
+            q_seen,
+            q_seen * relative,
             fmt="o",
             color=BLUE,
-            label="turning points, without a model",
+            label="turning points alone",
         )
     limit = result.quality_factor_limit
-    if limit is not None and limit.value < 2.0 * float(np.max(math.pi * frequency / loss)):
+    if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(q)):
         axes.axhline(limit.value, color=GREY, linestyle=":", label="limit πf/b")
     if amplitude[-1] > 5.0 * amplitude[0]:
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(xlabel=f"Amplitude ({unit})", ylabel="Q", ylim=(0.0, None))
     key_above(axes, 2)

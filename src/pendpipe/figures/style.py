@@ -126,6 +126,11 @@ def figure_with_residuals(
     return figure, upper, lower
 
 
+def quantity_of(unit: str) -> str:
+    """Name what has this unit, for an axis."""
+    return {"rad": "Angle", "m": "Displacement"}.get(unit, "Reading")
+
+
 def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0) -> None:
     """Put the legend above the axes, where it can't hide data."""
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, lift), ncols=columns, borderaxespad=0.3)

@@ -16,6 +16,7 @@ import numpy as np
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.quantities import compact, with_error
 
 Light = Literal["green", "amber", "red"]
 TOLERANCE: Final = 0.05
@@ -69,8 +70,9 @@ class Decrement(NamedTuple):
     def sentence(self, unit: str) -> str:
         """Say it in a clause."""
         return (
-            f"at {self.amplitude_rad:.3g} {unit} it loses {self.fitted:.3g} 1/s, the turning points"
-            f" show {self.seen:.3g} +- {self.seen_sd:.1g} 1/s ({100.0 * self.excess:+.0f} %)"
+            f"at {compact(self.amplitude_rad, unit)} it loses {self.fitted:.3g} s⁻¹, the turning"
+            f" points show {with_error(self.seen, self.seen_sd, '1/s', short=True)}"
+            f" ({100.0 * self.excess:+.0f} %)"
         )
 
 
@@ -179,7 +181,7 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
 def loss_of(law: Eq8, amplitude: float) -> float:
     """Relative loss of a law, 1/s, averaged over the cycle in whose middle y is `amplitude`."""
     start = amplitude
-    for _ in range(2):
+    for _ in range(4):
         try:
             cycle = turning_points(law, Release(0.0, start), count=3)
         except ValueError:
@@ -188,9 +190,9 @@ def loss_of(law: Eq8, amplitude: float) -> float:
         if len(cycle.time_s) < 3 or not abs(cycle.angle_rad[2]) > 0.0:
             # It stops within the cycle.
             return _slow_loss(law, amplitude)
-        fall = math.log(start / abs(float(cycle.angle_rad[2])))
-        loss = fall / float(cycle.time_s[2])
-        start = amplitude * math.exp(0.5 * fall)
+        loss = math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])
+        # Friction that does not depend on the speed takes the same from any start: one step.
+        start += amplitude - abs(float(cycle.angle_rad[1]))
     return loss
 
 

@@ -163,7 +163,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
             )
         )
     limit = result.quality_factor_limit
-    if limit is not None and not result["b"].at_bound:
+    if limit is not None and limit.value > 3.0 * limit.sd:
         found.append(_line("Q limit πf/b", with_error(limit.value, limit.sd, short=True)))
     return [*found, "  " + quotable(result)]
 
@@ -202,18 +202,22 @@ def row(file: str, result: FitResult | None) -> tuple[str, ...]:
     if result is None:
         return (file, "refused", *[""] * (len(HEAD) - 2))
     period, large = small_period(result), qualities(result)[0]
-    rates = [
-        with_error(result[name].value, result[name].sd, short=True) if result.light != "red" else ""
-        for name in "abc"
-    ]
+    rates = ["" if result.light == "red" else _bare(result[name]) for name in "abc"]
     return (
         file,
         result.light,
         with_error(period.value, period.sd, short=True),
         *rates,
-        with_error(large.quality_factor.value, large.quality_factor.sd, short=True),
+        ""
+        if result.light == "red"
+        else with_error(large.quality_factor.value, large.quality_factor.sd, short=True),
         compact(large.amplitude_rad, result["amplitude"].unit),
     )
+
+
+def _bare(rate: Estimate) -> str:
+    """Print a rate without its unit, which is in the head of the table."""
+    return rate_with_error(replace(rate, unit="")).removesuffix(" (95 %)").replace("below ", "< ")
 
 
 def table(rows: list[tuple[str, ...]]) -> str:
