@@ -6,13 +6,13 @@ A row a file and a damage: whether the next run names the file, sets it aside an
 again, how many jobs that run has, whether campaign.json ends as it was, byte for byte, and
 whether anything is left to do. All files suffer the same damage in one run, records' files
 in a record each; with ``--apart`` each has a run of its own. What was tried is kept in
-``.evidence`` for as long as the code is the same: a stopped run goes on where it was.
+``.evidence`` for as long as the code is the same: a stopped run goes on where it was. The table
+is written into docs/integrity.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
 import re
@@ -22,12 +22,14 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from benchmarks import journal
 from pendpipe.doctor import examine
-from pendpipe.provenance import code_version
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / ".evidence/torn_files"
 RESULTS = FOLDER / "results"
+GUARDS = ("pendpipe.manifest", "pendpipe.stages.refusal", "workflow/rules/*.smk", "./Snakefile")
+"""What finds and mends damage: other code makes other numbers, and guards nothing."""
 FILES = (
     "calibration/caliper.csv",
     "calibration/sensor.json",
@@ -133,11 +135,9 @@ def main() -> None:
     parser.add_argument("--limit", type=int, help="how many runs to make now")
     parser.add_argument("--seed", type=int, default=0, help="of the random bytes")
     arguments = parser.parse_args()
-    code = code_version("pendpipe.commands.report") + code_version("pendpipe.commands.fit")
     way = "apart" if arguments.apart else "together"
-    journal = FOLDER / f"{code}-{way}-{arguments.seed}.json"
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    rows = json.loads(journal.read_text(encoding="utf-8")) if journal.exists() else []
+    kept = f"torn_files-{way}-{arguments.seed}"
+    rows: list[list[str]] = journal.read(kept, [], GUARDS)
     done = {(row[0], row[1]) for row in rows}
     snakemake()
     for copy in RESULTS.rglob("*.damaged-*"):
@@ -148,13 +148,15 @@ def main() -> None:
     left = [run for run in runs if (run[0][0], run[1]) not in done]
     for names, damage in left[: arguments.limit]:
         rows += tried(names, damage, arguments.seed, before)
-        journal.write_text(json.dumps(rows), encoding="utf-8")
+        journal.keep(kept, rows, GUARDS)
         print(f"{len(rows)} of {len(FILES) * len(DAMAGES)}", file=sys.stderr)
     head = ["file", "damage", "named", "set aside", "made again", "jobs", "campaign.json"]
     head += ["left to do", "s"]
-    for row in (head, ["---"] * len(head), *rows):
-        print(f"| {' | '.join(row)} |")
-    print(f"\n{len(rows)} of {len(FILES) * len(DAMAGES)} tried")
+    lines = [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+    asked = f"{len(rows)} of {len(FILES) * len(DAMAGES)} tried, {way}"
+    table = "\n".join([*lines, "", f"{asked}. Made by commit {journal.commit()}."])
+    print(table)
+    journal.put("integrity.md", "torn", table)
 
 
 if __name__ == "__main__":
