@@ -111,7 +111,7 @@ def anew(one: Kernel) -> Kernel:
     ids=["integers", "every second", "one axis for two"],
 )
 def test_an_array_of_another_kind_is_refused(values: np.ndarray, table: np.ndarray) -> None:
-    with pytest.raises(TypeError, match="contiguous array"):
+    with pytest.raises(TypeError, match=r"needs an array|not C contiguous"):
         fill(values, table, 0.0, 0)
 
 

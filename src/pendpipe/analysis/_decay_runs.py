@@ -57,16 +57,15 @@ def best_runs(cycles: HalfCycles) -> list[Run]:
     count = len(cycles)
     if count < 3:
         return []
-    follows = _follows(cycles)
+    follows, swings = _follows(cycles).tolist(), cycles.swing.tolist()
     runs: list[tuple[int, int]] = []
-    first, floor = 0, float(cycles.swing[0])
+    first, floor = 0, swings[0]
     for leg in range(1, count):
-        swing = float(cycles.swing[leg])
-        allowed = _RISE * floor + _TAIL * float(cycles.swing[first]) + cycles.step
-        if not follows[leg - 1] or swing > allowed:
+        allowed = _RISE * floor + _TAIL * swings[first] + cycles.step
+        if not follows[leg - 1] or swings[leg] > allowed:
             runs.append((first, leg - 1))
-            first, floor = leg, swing
-        floor = min(floor, swing)
+            first, floor = leg, swings[leg]
+        floor = min(floor, swings[leg])
     runs.append((first, count - 1))
     trimmed = [_trimmed(cycles, *run) for run in runs]
     kept = [run for run in _joined(cycles, trimmed) if run.legs >= 3 and _regular(cycles, run)]

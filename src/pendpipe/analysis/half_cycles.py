@@ -18,6 +18,9 @@ from pendpipe.arrays import FloatArray, IntArray
 _PER_HALF_CYCLE: Final = 40
 """Samples a half cycle that are kept: a turning point is then low by 0.03 %."""
 
+_SOME: Final = 4096
+"""Readings, spread over the record, that tell its range and its usual interval."""
+
 
 @dataclass(frozen=True)
 class HalfCycles:
@@ -71,7 +74,7 @@ def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) ->
 def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     """Estimate the half period from the large swings; ``None`` if there are not two."""
     # Not the whole range: a wild reading would hide every swing.
-    low, high = np.percentile(values, (0.5, 99.5))
+    low, high = np.percentile(values[:: max(1, len(values) // _SOME)], (0.5, 99.5))
     span = float(high - low) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
         turns = without_ripples(values, find_extremes(values, share * span)[0])
@@ -89,12 +92,13 @@ def thinned(
     without samples, as between the counts of an encoder, is left out.
     """
     step = half_period_s / _PER_HALF_CYCLE
-    interval = float(np.median(np.diff(time_s)))
+    every = max(1, len(time_s) // _SOME)
+    interval = float(np.median(time_s[1::every] - time_s[:-1:every]))
     if interval > 0.5 * step:
         return time_s, _without_wild(values, math.pi * interval / half_period_s)
     # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
-    cell = np.floor(time_s / step).astype(np.int64)
-    starts = np.flatnonzero(np.diff(cell, prepend=cell[0] - 1))
+    cell = (time_s / step - math.floor(time_s[0] / step)).astype(np.int64)
+    starts = np.append(0, np.flatnonzero(cell[1:] != cell[:-1]) + 1)
     counts = np.diff(np.append(starts, len(values)))
     smooth = _median3(values)
     return np.add.reduceat(time_s, starts) / counts, np.add.reduceat(smooth, starts) / counts

@@ -89,12 +89,11 @@ class Kernel:
             kind, axes = KINDS[name]
             if axes == 0:
                 words.append(argument)
-                continue
-            if argument.dtype != kind or argument.ndim != axes or not argument.flags.c_contiguous:
-                message = f"{self.__name__} needs a contiguous array of {kind}, {axes} axes"
+            elif argument.dtype == kind and argument.ndim == axes:
+                words += (address(argument), *argument.shape)
+            else:
+                message = f"{self.__name__} needs an array of {kind} with {axes} axes"
                 raise TypeError(message)
-            words.append(address(argument))
-            words += argument.shape
         return self.machine_code(*words)
 
     @cached_property
@@ -205,12 +204,13 @@ class Kernel:
 
 
 def address(array: FloatArray | IntArray) -> int:
-    """Return where an array's numbers are (twice as fast as ``array.ctypes.data``)."""
-    if array.size == 0:
-        return 0
-    if not array.flags.writeable:
+    """Return where the numbers of a contiguous array are."""
+    try:  # twice as fast as what follows
+        return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
+    except (TypeError, ValueError):  # it is empty, not to be written, or not contiguous
+        if not array.flags.c_contiguous:
+            raise
         return array.ctypes.data
-    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
 
 
 def folders() -> Iterator[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -90,12 +91,12 @@ class TurningPoints:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    @property
+    @cached_property
     def amplitude_rad(self) -> FloatArray:
         """Angle without the alternating sign; noise may make a small one negative."""
         return self.angle_rad * self.side
 
-    @property
+    @cached_property
     def side(self) -> FloatArray:
         """+1 for the half cycles above the level, -1 for those below; shape (k,)."""
         alternating = 1.0 - 2.0 * ((self.half_cycle - self.half_cycle[0]) % 2)
