@@ -37,7 +37,8 @@ def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
         a, b = 0.5 * (a + b), np.sqrt(a * b)
         power *= 2.0
         total = total + power * difference**2
-        if float(np.max(np.abs(difference), initial=0.0)) < 1e-17:
+        # The next difference is of the order of this one's square.
+        if float(np.max(np.abs(difference), initial=0.0)) < 1e-9:
             break
     k = 0.5 * math.pi / a
     return k, k * (1.0 - total)

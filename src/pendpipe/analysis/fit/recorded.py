@@ -46,7 +46,7 @@ def fit_recording(
         waveform, and the turning points where the waveform's law contradicts the decay.
     restoring
         The restoring torque, ``"linear"`` or ``"sine"``. By default sin x where the turning
-        points of a recording in radians favour it (`swings.start_of`).
+        points of a recording in radians favour it (`swings.restoring_of`).
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
@@ -105,10 +105,10 @@ def _fit(
 
         points = turning_points_of(samples, place)
     if restoring is None:
-        from pendpipe.analysis.fit.swings import start_of
+        from pendpipe.analysis.fit.swings import restoring_of
 
         stated = not any("(--unit)" in guess for guess in recording.weak_guesses)
-        restoring = start_of(points, stated=stated).favoured
+        restoring = restoring_of(points, stated=stated)
     if method == "turning-points":
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)

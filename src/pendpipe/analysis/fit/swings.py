@@ -130,17 +130,28 @@ def start_of(points: TurningPoints, *, stated: bool = True) -> Start:
     >>> start.favoured, round(start.linear.angular_frequency, 3)
     ('linear', 5.485)
     """
-    linear = _law_start(points, "linear")
     coefficient = sine_coefficient(points)
+    sine = _law_start(points, "sine") if _may_be_sine(points) else None
+    favoured = restoring_of(points, coefficient, stated=stated)
+    return Start(_law_start(points, "linear"), sine, favoured, coefficient)
+
+
+def restoring_of(
+    points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
+) -> Restoring:
+    """Which torque the half cycles favour; see `start_of`."""
+    if not _may_be_sine(points):
+        return "linear"
+    coefficient = coefficient or sine_coefficient(points)
+    wide = abs(float(clear(points).angle_rad[0])) > _PENDULUM
+    pendulum = stated and wide and not coefficient.excludes_sine
+    return "sine" if coefficient.agrees or pendulum else "linear"
+
+
+def _may_be_sine(points: TurningPoints) -> bool:
+    """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
-    sine = _law_start(points, "sine") if inside and len(clear(points)) >= _FEWEST else None
-    favoured: Restoring = "linear"
-    if sine is not None and (
-        coefficient.agrees
-        or (stated and abs(sine.angle_rad) > _PENDULUM and not coefficient.excludes_sine)
-    ):
-        favoured = "sine"
-    return Start(linear, sine, favoured, coefficient)
+    return inside and len(clear(points)) >= _FEWEST
 
 
 def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
