@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
 from pendpipe.arrays import FloatArray
 from pendpipe.figures.data import (
@@ -33,6 +33,7 @@ from pendpipe.figures.style import (
     figure_with_residuals,
     key_above,
     new_figure,
+    plain_numbers,
     styled,
 )
 from pendpipe.quantities import axis_unit, prefixed, with_error
@@ -190,9 +191,7 @@ def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
         ylabel="Lengthening of the period (%)",
         xlim=(0.0, None),
     )
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
     axes.tick_params(which="minor", length=0)
     _lowering_on_the_right(axes)
     _keys(axes, names)

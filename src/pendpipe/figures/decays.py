@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
@@ -20,7 +21,9 @@ from pendpipe.figures.style import (
     figure_with_residuals,
     key_above,
     new_figure,
+    plain_numbers,
     plain_text,
+    points,
     styled,
 )
 from pendpipe.quantities import axis_unit, compact
@@ -67,16 +70,7 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
     name = "Sensor output" if unit == "V" else "Motion"
     upper.set(ylabel=f"{name} ({large_unit})")
     key_above(upper, 1)
-    lower.errorbar(
-        decay.time_s,
-        small * misfit,
-        small * misfit_sd,
-        fmt="o",
-        color=BLUE,
-        markersize=2.0,
-        elinewidth=0.6,
-        capsize=0.0,
-    )
+    points(lower, decay.time_s, small * misfit, small * misfit_sd, 2.0)
     lower.set(xlabel="Time (s)", ylabel=f"Turning points\n− envelope ({small_unit})")
     lower.margins(x=0.01, y=0.1)
     return figure
@@ -280,7 +274,8 @@ def draw_decay(decay: Decay) -> Figure:
     lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
     upper.set_yscale("log")
     upper.set_ylim(0.75 * large * lowest, 1.35 * large * float(np.max(y)))
-    _plain_log_labels(upper)
+    plain_numbers(upper.yaxis, _round_steps(*upper.get_ylim()))
+    upper.yaxis.set_minor_locator(NullLocator())
     upper.set_ylabel(f"Amplitude ({large_unit})")
     key_above(upper, 2)
 
@@ -291,19 +286,8 @@ def draw_decay(decay: Decay) -> Figure:
 
 
 def _amplitudes(axes: Axes, time_s: FloatArray, values: FloatArray, errors: FloatArray) -> None:
-    """Draw points with error bars."""
-    axes.errorbar(
-        time_s,
-        values,
-        errors,
-        fmt="o",
-        color=BLUE,
-        markersize=2.4,
-        elinewidth=0.6,
-        capsize=0.0,
-        rasterized=len(time_s) > MANY,
-        label=f"{len(time_s)} turning points",
-    )
+    label = f"{len(time_s)} turning points"
+    points(axes, time_s, values, errors, rasterized=len(time_s) > MANY, label=label)
 
 
 def _rms(misfit: FloatArray, unit: str) -> str:
@@ -311,51 +295,35 @@ def _rms(misfit: FloatArray, unit: str) -> str:
     return compact(float(np.sqrt(np.mean(misfit**2))), unit)
 
 
-def _plain_log_labels(axes: Axes) -> None:
-    """Write 0.5, 1, 2, 5, ... on a logarithmic axis instead of powers of ten."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    low, high = axes.get_ylim()
-    steps: tuple[float, ...] = (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
+def _round_steps(low: float, high: float) -> tuple[float, ...]:
+    """The numbers of a decade that an axis has room for."""
     if high < 8.0 * low:
-        steps = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
-    axes.yaxis.set_major_locator(LogLocator(subs=steps))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_locator(NullLocator())
+        return (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+    return (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
 
 
 def fit_exponential(
-    time_s: FloatArray, amplitude_rad: FloatArray, sd_rad: FloatArray, *, rounds: int = 20
+    time_s: FloatArray, amplitude_rad: FloatArray, sd_rad: FloatArray
 ) -> tuple[float, float]:
     """Weighted least squares of ``y = y0 exp(-beta t)``.
-
-    Eliminating y0 leaves one unknown, which Gauss-Newton finds from the slope of ln y.
 
     Parameters
     ----------
     time_s, amplitude_rad, sd_rad
         Times, amplitudes and their errors; shape (n,).
-    rounds
-        Steps of Gauss-Newton.
 
     Returns
     -------
     tuple of float
         y0 in rad and beta in 1/s.
     """
-    weight = 1.0 / np.maximum(sd_rad, np.max(sd_rad) * 1e-6)
+    from scipy.optimize import curve_fit
+
+    def shape(time_s: FloatArray, start: float, rate: float) -> FloatArray:
+        return np.asarray(start * np.exp(-rate * time_s))
+
     seen = amplitude_rad > 0.1 * np.max(amplitude_rad)
     slope, level = np.polyfit(time_s[seen], np.log(amplitude_rad[seen]), 1)
-    numbers = np.array([np.exp(level), -slope])
-    for _ in range(rounds):
-        shape = np.exp(-numbers[1] * time_s)
-        jacobian = np.column_stack([shape, -numbers[0] * time_s * shape]) * weight[:, np.newaxis]
-        residual = (amplitude_rad - numbers[0] * shape) * weight
-        step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-        # A step that would turn the decay into growth is halved until it does not.
-        while numbers[1] + step[1] <= 0.0 and numbers[1] > 0.0:
-            step = 0.5 * step
-        numbers = numbers + step
-        if np.all(np.abs(step) <= 1e-10 * np.abs(numbers)):
-            break
-    return float(numbers[0]), float(numbers[1])
+    error = np.maximum(sd_rad, np.max(sd_rad) * 1e-6)
+    found, _ = curve_fit(shape, time_s, amplitude_rad, (np.exp(level), -slope), error)
+    return float(found[0]), float(found[1])

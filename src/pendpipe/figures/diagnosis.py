@@ -35,7 +35,10 @@ from pendpipe.figures.style import (
     INK,
     VERMILION,
     WIDTH_IN,
+    framed,
     key_above,
+    plain_numbers,
+    points,
     quantity_of,
     save,
     styled,
@@ -189,15 +192,14 @@ def draw_residual_map(content: Shown) -> Figure:
     maps = [residual_map(content, fit) for _, fit in models]
     largest = max([4.0] + [float(np.nanmax(np.abs(each))) for each in maps])
     norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
-    figure = Figure(figsize=(WIDTH_IN, 2.0 * len(maps) + 0.95))
-    height = figure.get_figheight()
+    height = 2.0 * len(maps) + 0.95
     ticks = _ticks(largest)
-    labels = _signed(ticks)
+    labels = [f"{tick:+.0f}".replace("-", "−") if tick else "0" for tick in ticks]
     right = 0.845 - _CHARACTER * max(max(map(len, labels)) - 3, 0)
-    figure.subplots_adjust(
-        left=0.105, right=right, bottom=0.46 / height, top=1.0 - 0.28 / height, hspace=0.28
-    )
-    rows = figure.subplots(len(maps), 1, sharex=True, squeeze=False)[:, 0]
+    margins = {"bottom": 0.46 / height, "top": 1.0 - 0.28 / height, "hspace": 0.28}
+    margins |= {"left": 0.105, "right": right}
+    figure, panels = framed(height, margins, len(maps), sharex=True, squeeze=False)
+    rows = panels[:, 0]
     for axes, (name, fit), values in zip(rows, models, maps, strict=True):
         image = _panel(axes, content, values, norm)
         rms = math.sqrt(float(np.nanmean(content.residual(fit) ** 2)))
@@ -236,10 +238,6 @@ def _ticks(largest: float) -> list[float]:
     inside = [step for step in steps if step <= largest]
     kept = inside[:: max(1, math.ceil(len(inside) / 4))]
     return sorted([-step for step in kept] + [0.0] + kept)
-
-
-def _signed(ticks: list[float]) -> list[str]:
-    return [f"{tick:+.0f}".replace("-", "−") if tick else "0" for tick in ticks]
 
 
 def residual_map(content: Shown, fit: Fit) -> FloatArray:
@@ -287,9 +285,7 @@ def draw_residual_spectrum(content: Shown) -> Figure:
     factor, unit = axis_unit(
         np.array([float(np.max(each)) for _, each, _, _ in curves]), content.data.unit
     )
-    figure = Figure(figsize=(WIDTH_IN, 3.3))
-    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.14, top=0.8)
-    axes = figure.subplots()
+    figure, axes = framed(3.3, {"bottom": 0.14, "top": 0.8})
     for name, density, colour, width in curves:
         axes.plot(frequency, factor * density, color=colour, linewidth=width, label=name)
     axes.plot(frequency, factor * level, color=INK, linestyle="--", linewidth=1.1, label="noise")
@@ -298,20 +294,12 @@ def draw_residual_spectrum(content: Shown) -> Figure:
     axes.set_xlim(float(frequency[0]), float(frequency[-1]))
     lowest = 0.1 * float(np.min(level))
     axes.set_ylim(factor * lowest, 2.0 * factor * max(float(np.max(each[1])) for each in curves))
-    _plain(axes)
+    for axis in (axes.xaxis, axes.yaxis):
+        plain_numbers(axis)
+    axes.tick_params(which="minor", length=0)
     _mark_harmonics(axes, content)
     key_above(axes, 2, lift=1.06)
     return figure
-
-
-def _plain(axes: Axes) -> None:
-    """Numbers instead of powers of ten."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    axes.tick_params(which="minor", length=0)
 
 
 def _mark_harmonics(axes: Axes, content: Shown) -> None:
@@ -392,34 +380,26 @@ def noise_level(content: Shown, frequency: FloatArray) -> FloatArray:
 @styled
 def draw_damping(content: Shown) -> Figure:
     """Draw 1/Q of each span of cycles, and by how much it differs from the baseline's."""
-    measured = content.measured
+    measured, omega = content.measured, float(content.baseline.value[OMEGA])
+    margins = {"bottom": 0.11, "top": 0.885, "hspace": 0.1}
+    rows = {"sharex": True, "gridspec_kw": {"height_ratios": [1.0, 0.8]}}
+    figure, (upper, lower) = framed(4.2, margins, 2, **rows)
     curves = _models(content)
-    omega = float(content.baseline.value[OMEGA])
-    figure = Figure(figsize=(WIDTH_IN, 4.2))
-    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.11, top=0.885, hspace=0.1)
-    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.0, 0.8]})
-    quality, quality_sd = 2.0 * measured.loss / omega, 2.0 * measured.loss_sd / omega
-    across, unit = axis_unit(measured.amplitude, content.data.unit)
-    x = across * measured.amplitude
-    _points(upper, x, 1e3 * quality, 1e3 * quality_sd, "readings")
-    for name, colour, dashes, spans in curves:
-        upper.plot(
-            x, 2e3 * spans.loss / omega, color=colour, linestyle=dashes, label=name, linewidth=1.2
-        )
-    upper.set_ylabel("Loss 1/Q (10⁻³)")
+    quality_sd = 2.0 * measured.loss_sd / omega
     expected = 2.0 * curves[0][3].loss / omega
-    power, factor = _power(np.concatenate([quality - expected, quality_sd]))
-    _points(lower, x, factor * (quality - expected), factor * quality_sd, "")
-    for _, colour, dashes, spans in curves:
-        lower.plot(
-            x,
-            factor * (2.0 * spans.loss / omega - expected),
-            color=colour,
-            linestyle=dashes,
-            linewidth=1.2,
-        )
+    power, factor = _power(np.concatenate([2.0 * measured.loss / omega - expected, quality_sd]))
+    _against_amplitude(
+        upper, content, curves, lambda spans: 2e3 * spans.loss / omega, 1e3 * quality_sd
+    )
+    upper.set(xlabel="", ylabel="Loss 1/Q (10⁻³)")
+    _against_amplitude(
+        lower,
+        content,
+        curves,
+        lambda spans: factor * (2.0 * spans.loss / omega - expected),
+        factor * quality_sd,
+    )
     lower.set_ylabel(f"1/Q − {content.baseline_name}'s ({power})")
-    _amplitude_axis(lower, x, unit)
     key_above(upper, 3 if content.extended is None else 2)
     figure.align_ylabels([upper, lower])
     return figure
@@ -429,52 +409,48 @@ def draw_damping(content: Shown) -> Figure:
 def draw_frequency(content: Shown) -> Figure:
     """Draw the frequency of each span of cycles, relative to the baseline's omega/(2 pi)."""
     measured = content.measured
-    curves = _models(content)
     origin = float(content.baseline.value[OMEGA]) / (2.0 * math.pi)
-    shift = measured.frequency_hz / origin - 1.0
     shift_sd = measured.frequency_sd_hz / origin
-    power, factor = _power(np.concatenate([shift, shift_sd]))
-    figure = Figure(figsize=(WIDTH_IN, 3.2))
-    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.145, top=0.84)
-    axes = figure.subplots()
-    across, unit = axis_unit(measured.amplitude, content.data.unit)
-    x = across * measured.amplitude
-    _points(axes, x, factor * shift, factor * shift_sd, "readings")
-    for name, colour, dashes, spans in curves:
-        axes.plot(
-            x,
-            factor * (spans.frequency_hz / origin - 1.0),
-            color=colour,
-            linestyle=dashes,
-            label=name,
-            linewidth=1.2,
-        )
+    power, factor = _power(np.concatenate([measured.frequency_hz / origin - 1.0, shift_sd]))
+    figure, axes = framed(3.2, {"bottom": 0.145, "top": 0.84})
+    _against_amplitude(
+        axes,
+        content,
+        _models(content),
+        lambda spans: factor * (spans.frequency_hz / origin - 1.0),
+        factor * shift_sd,
+    )
     axes.set_ylabel(f"Frequency change from {origin:.5g} Hz ({power})")
-    _amplitude_axis(axes, x, unit)
     key_above(axes, 3 if content.extended is None else 2)
     return figure
 
 
-def _models(content: Shown) -> list[tuple[str, str, str, Spans]]:
-    """Name, colour, dashes and spans of the baseline and of the extended model."""
+Curves = list[tuple[str, str, str, Spans]]
+"""Name, colour, dashes and spans of models."""
+
+
+def _models(content: Shown) -> Curves:
+    """The baseline and the extended model."""
     found = [(content.baseline_name, VERMILION, "--", content.of_model(content.baseline))]
     if content.extended is not None:
         found.append((content.extended_name, INK, "-", content.of_model(content.extended)))
     return found
 
 
-def _points(axes: Axes, x: FloatArray, y: FloatArray, sd: FloatArray, label: str) -> None:
-    axes.errorbar(
-        x,
-        y,
-        sd,
-        fmt="o",
-        color=BLUE,
-        markersize=3.2,
-        elinewidth=0.7,
-        capsize=0.0,
-        label=label or None,
-    )
+def _against_amplitude(
+    axes: Axes,
+    content: Shown,
+    curves: Curves,
+    quantity: Callable[[Spans], FloatArray],
+    sd: FloatArray,
+) -> None:
+    """Draw a quantity of the readings' spans, with its error, and of each model's."""
+    across, unit = axis_unit(content.measured.amplitude, content.data.unit)
+    x = across * content.measured.amplitude
+    points(axes, x, quantity(content.measured), sd, 3.2, elinewidth=0.7, label="readings")
+    for name, colour, dashes, spans in curves:
+        axes.plot(x, quantity(spans), color=colour, linestyle=dashes, label=name, linewidth=1.2)
+    _amplitude_axis(axes, x, unit)
 
 
 def _power(values: FloatArray) -> tuple[str, float]:
@@ -492,16 +468,11 @@ def _amplitude_axis(axes: Axes, x: FloatArray, unit: str) -> None:
     axes.set_xlabel(f"Amplitude ({unit})")
     if float(np.max(x)) < 3.0 * float(np.min(x)):
         return
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     axes.set_xscale("log")
     decades = math.log10(float(np.max(x)) / float(np.min(x)))
     between = (1.0, 3.0) if decades > 2.0 else (1.0, 2.0, 5.0)
-    axes.xaxis.set_major_locator(
-        LogLocator(subs=between if decades > 1.0 else (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0))
-    )
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    few = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+    plain_numbers(axes.xaxis, between if decades > 1.0 else few)
     axes.tick_params(which="minor", length=0)
 
 
@@ -513,11 +484,9 @@ def draw_curve(content: Shown) -> Figure:
         raise NothingToDrawError("every effect has a name")
     rows = sum(2 if _exponents(effect) else 1 for effect in unnamed)
     height = 2.7 * rows
-    figure = Figure(figsize=(WIDTH_IN, height))
-    figure.subplots_adjust(
-        left=0.15, right=0.975, bottom=0.5 / height, top=1.0 - 0.45 / height, hspace=0.5
-    )
-    panels = iter(figure.subplots(rows, 1, squeeze=False)[:, 0])
+    margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
+    figure, drawn = framed(height, margins, rows, squeeze=False)
+    panels = iter(drawn[:, 0])
     for effect in unnamed:
         panel = next(panels)
         _curve(panel, effect)
@@ -607,9 +576,7 @@ def draw_codes(content: Shown) -> Figure:
     given, _ = np.histogram(codes, edges)
     wanted, _ = np.histogram(expected, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    figure = Figure(figsize=(WIDTH_IN, 3.0))
-    figure.subplots_adjust(left=0.135, right=0.975, bottom=0.15, top=0.86)
-    axes = figure.subplots()
+    figure, axes = framed(3.0, {"bottom": 0.15, "top": 0.86})
     axes.bar(middle, given, width=group, color=BLUE, linewidth=0.0, label="readings")
     axes.step(middle, wanted, where="mid", color=INK, linewidth=0.9, label="expected")
     for code in marked[:200]:

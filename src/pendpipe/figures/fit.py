@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.analysis.fit.result import FitResult
@@ -17,7 +16,17 @@ from pendpipe.analysis.fit.summary import period_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
-from pendpipe.figures.style import BLUE, GREY, INK, WIDTH_IN, key_above, quantity_of, styled
+from pendpipe.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    WIDTH_IN,
+    key_above,
+    plain_numbers,
+    points,
+    quantity_of,
+    styled,
+)
 from pendpipe.quantities import axis_unit
 from pendpipe.recording import Recording
 
@@ -102,21 +111,12 @@ def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArr
     return time[kept], values[kept]
 
 
-def _draw_residual(axes: Axes, points: TurningPoints, fitted: FloatArray) -> None:
-    residual = points.amplitude_rad - fitted
+def _draw_residual(axes: Axes, turning: TurningPoints, fitted: FloatArray) -> None:
+    residual, sd = turning.amplitude_rad - fitted, turning.angle_sd_rad
     shown = np.isfinite(residual)
-    factor, unit = axis_unit(np.abs(residual[shown]) + points.angle_sd_rad[shown], points.unit)
+    factor, unit = axis_unit(np.abs(residual[shown]) + sd[shown], turning.unit)
     axes.axhline(0.0, color=INK, linewidth=0.9)
-    axes.errorbar(
-        points.time_s[shown],
-        factor * residual[shown],
-        factor * points.angle_sd_rad[shown],
-        fmt="o",
-        color=BLUE,
-        markersize=2.4,
-        elinewidth=0.6,
-        capsize=0.0,
-    )
+    points(axes, turning.time_s[shown], factor * residual[shown], factor * sd[shown])
     axes.set(xlabel="Time (s)", ylabel=f"Amplitude − fit\n({unit})")
 
 
@@ -147,8 +147,6 @@ def _draw_quality(axes: Axes, law: Eq8, result: FitResult, points: TurningPoints
         axes.axhline(limit.value, color=GREY, linestyle=":", label="limit πf/b")
     if amplitude[-1] > 5.0 * amplitude[0]:
         axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        plain_numbers(axes.xaxis, (1.0, 2.0, 5.0))
     axes.set(xlabel=f"Amplitude ({unit})", ylabel="Q", ylim=(0.0, None))
     key_above(axes, 2)
