@@ -4,10 +4,11 @@
 
 A statement's module is drawn by its number of statements, and in it an operator, a comparison, a
 constant, a sign or a statement that is changed or dropped. A clone of the commit in
-``.evidence/mutations`` gets one mutation at a time. The test files nearest to it by imports run
-first; what they miss meets the whole suite. A test counts if it fails twice with the mutation and
-passes without; so do tests that take too long with the mutation only. Each outcome is kept in a
-journal beside the clone, so that a run can be broken off and taken up.
+``.evidence/mutations`` gets one mutation at a time. The test files whose names match the mutated
+file or its package run first, then those nearest to it by imports; what they miss meets the whole
+suite, unless ``--near`` says that it is only listed. A test counts if it fails twice with the
+mutation and passes without; so do tests that take too long with the mutation only. Each outcome is
+kept in a journal beside the clone, so that a run can be broken off and taken up.
 """
 
 from __future__ import annotations
@@ -99,12 +100,17 @@ def mutations(path: str, module: ast.Module) -> Iterator[Mutation]:
 
 
 def mutable(node: ast.AST) -> Iterator[ast.AST]:
-    """Nodes that run: no annotations, no text, nothing of f-strings (they have no position)."""
+    """Nodes that run: no annotations, no text, nothing of f-strings (they have no position).
+
+    Of decorators those only that declare something (`enters` and `follows` of the effects).
+    """
     for name, value in ast.iter_fields(node):
-        if name in ("annotation", "returns", "decorator_list"):
+        if name in ("annotation", "returns"):
             continue
         for child in value if isinstance(value, list) else [value]:
             skipped = isinstance(child, ast.JoinedStr | ast.pattern) or is_text(child)
+            if name == "decorator_list":
+                skipped = not ast.unparse(child).startswith(("enters(", "follows("))
             if isinstance(child, ast.AST) and not skipped:
                 yield child
                 yield from mutable(child)
@@ -153,6 +159,15 @@ def nearest_tests(tree: Path) -> dict[str, list[str]]:
     return found
 
 
+def matching_tests(tree: Path, module: str) -> list[str]:
+    """The test files named like the module or its package."""
+    _, *rooms, name = module.split(".")
+    words = [word.rstrip("s") for word in (*rooms[1:], name)]
+    files = sorted((tree / "tests" / (rooms[0] if rooms else "core")).glob("test_*.py"))
+    named = [path for path in files if any(word in path.stem for word in words)]
+    return [path.relative_to(tree).as_posix() for path in named]
+
+
 def run_tests(tree: Path, words: list[str], seconds: float) -> tuple[int, str]:
     """Run tests in the clone; status -1 where they ran out of their time."""
     environment = {
@@ -175,7 +190,9 @@ def failed(output: str) -> list[str]:
     return re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, re.M)
 
 
-def outcome(tree: Path, mutation: Mutation, nearest: list[str], spoilt: set[str]) -> str:
+def outcome(
+    tree: Path, mutation: Mutation, stages: list[tuple[list[str], float]], spoilt: set[str]
+) -> str:
     """The test that noticed a mutation, or nothing; tests that fail by themselves are added."""
     path = tree / mutation.path
     source, stamp = path.read_text("utf-8"), path.stat()
@@ -188,8 +205,7 @@ def outcome(tree: Path, mutation: Mutation, nearest: list[str], spoilt: set[str]
             path.write_text(source, encoding="utf-8")
             os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
 
-    stages = [(nearest, NEAR_S)] if nearest else []
-    for words, seconds in [*stages, (["tests"], ALL_S)]:
+    for words, seconds in stages:
         while True:
             without = [f"--deselect={name}" for name in sorted(spoilt)]
             status, output = with_it("-x", *without, *words, seconds=seconds)
@@ -212,6 +228,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--commit", default="HEAD", help="whose library is mutated (%(default)s)")
     parser.add_argument("--count", type=int, default=40, help="how many (%(default)s)")
+    parser.add_argument("--near", action="store_true", help="without the whole suite")
     arguments = parser.parse_args()
     commit = git("rev-parse", arguments.commit).decode().strip()
     tree, journal = PLACE / commit, PLACE / f"{commit}.jsonl"
@@ -228,7 +245,11 @@ def main() -> None:
         entry = known.get(mutation.text)
         if entry is None:
             began = time.monotonic()
-            by = outcome(tree, mutation, tests[module_name(tree / mutation.path)], spoilt)
+            module = module_name(tree / mutation.path)
+            near = [files for files in (matching_tests(tree, module), tests[module]) if files]
+            stages = [(files, NEAR_S) for files in near]
+            stages += [] if arguments.near else [(["tests"], ALL_S)]
+            by = outcome(tree, mutation, stages, spoilt)
             entry = {
                 "mutation": mutation.text,
                 "by": by,
