@@ -1,7 +1,7 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test report bench evidence proof check clean wheel
+.PHONY: campaign test report bench evidence integrity proof check clean wheel
 
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
@@ -29,6 +29,15 @@ evidence: .venv/installed-bench
 	$(RUN) python -m benchmarks.acquisition
 	$(RUN) python -m benchmarks.evidence
 	$(RUN) python -m benchmarks.diagnosis
+
+# What interruptions and hostile input cost (docs/integrity.md): hours; goes on where it was stopped.
+integrity: .venv/installed
+	$(RUN) python -m benchmarks.acquisition live kill flips disk
+	$(RUN) python -m benchmarks.kills
+	$(RUN) python -m benchmarks.torn_files --apart
+	$(RUN) python -m benchmarks.fit_honesty
+	$(RUN) python -m benchmarks.hostile
+	$(RUN) python -m benchmarks.fuzz --inputs 100000
 
 # Conceal, solve, open, score, and write docs/proof.md; goes on where it was interrupted.
 # A set is made once: SET=another makes another, with a seed of its own.

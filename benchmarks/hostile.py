@@ -16,6 +16,7 @@ import os
 import re
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
@@ -115,6 +116,8 @@ def rows() -> Iterator[Row]:
         name = "id " + " beside ".join(i if len(i) < 99 else f"of {len(i)} letters" for i in ids)
         lines = "".join(f"{i}\tsimulated\n" for i in ids).encode()
         yield Row(name, lambda f, t=lines: _table(f, b"record\tsource\n" + t))  # type: ignore[misc]
+    if hasattr(os, "mknod") and os.geteuid() == 0:
+        yield Row("output that is a device", _device, (0,), _no_device)
     for odd in ODD_FOLDERS:
         yield Row(f"refused, from {odd}/", lambda f, o=odd: _refused(f, o), (0,), _names_folder)  # type: ignore[misc]
     for number in (signal.SIGTERM, signal.SIGHUP):
@@ -295,6 +298,17 @@ def _changed(folder: Path, value: object, *keys: str) -> list[str]:
 def _table(folder: Path, content: bytes) -> list[str]:
     (folder / "records.tsv").write_bytes(content)
     return _changed(folder, str(folder / "records.tsv"), "records")
+
+
+def _device(folder: Path) -> list[str]:
+    """A null device of our own: a file in its place would be the end of it."""
+    os.mknod(folder / "null.csv", stat.S_IFCHR | 0o666, os.makedev(1, 3))
+    return ["convert", "examples/string-pendulum.csv", str(folder / "null.csv")]
+
+
+def _no_device(folder: Path) -> str:
+    there = stat.S_ISCHR((folder / "null.csv").stat().st_mode)
+    return "" if there else "it was replaced by a file"
 
 
 ODD_FOLDERS = ("my data", "a, b", "c;d (1)", "e'f\"g", "two  blanks", "été")
