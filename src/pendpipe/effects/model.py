@@ -300,25 +300,33 @@ class Model:
         """Return readings, and what the derivatives need."""
         pieces = self.follow(value)
         motion = pieces[-1][1]
-        times = self.time_s
-        for effect, place in self.places():
-            delay = effect.delay(self.time_s, value[place])
-            if delay is not None:
-                times = times + delay
-        sampled = sample_pieces(pieces, times)
+        sampled = sample_pieces(pieces, self.taken_at(value))
         turned = sampled.phase[[0, -1]]
         if not np.all(np.isfinite(sampled.phase)) or np.ptp(turned) > 4.0 * np.pi * len(
             motion.time_s
         ):
             raise NoMotionError("the readings' clock is out of reach")
+        tangent = Tangent(lambda m: self.acceleration(m, value), motion)
+        return Evaluated(self.read(sampled, value), sampled, tangent, self.span(value, sampled))
+
+    def taken_at(self, value: FloatArray) -> FloatArray:
+        """When the readings are really taken, shape (n,)."""
+        times = self.time_s
+        for effect, place in self.places():
+            delay = effect.delay(self.time_s, value[place])
+            if delay is not None:
+                times = times + delay
+        return times
+
+    def read(self, sampled: Sampled, value: FloatArray) -> FloatArray:
+        """What the sensor makes of the sampled motion, shape (n,)."""
         pendulum = self.pendulum(value)
-        reading = value[OFFSET] + self._averaging(value) * sampled.angle
+        reading = np.asarray(value[OFFSET] + self._averaging(value) * sampled.angle)
         for effect, place in self.places():
             extra = effect.reading(sampled, pendulum, value[place])
             if extra is not None:
                 reading = reading + extra
-        tangent = Tangent(lambda m: self.acceleration(m, value), motion)
-        return Evaluated(reading, sampled, tangent, self.span(value, sampled))
+        return reading
 
     def _averaging(self, value: FloatArray) -> float:
         """What a mean over `fold` neighbouring readings leaves of the fundamental."""

@@ -18,7 +18,7 @@ from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 from pendpipe.simulation.effects import Given, read_effects
-from pendpipe.simulation.instrument import Instrument, clipped, quantised
+from pendpipe.simulation.instrument import Instrument
 
 
 class PendulumModel(Section):
@@ -201,8 +201,9 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
         return Recording(time, volts, "volts", metadata=metadata)
     metadata |= {"bits": str(converter.bits), "range_volts": repr(converter.range_volts)}
     step = 2.0 * converter.range_volts / 2.0**converter.bits
-    volts = quantised(clipped(volts, converter.range_volts, step), step)
-    volts = step * instrument.given_codes(np.round(volts / step))
+    # The codes of an offset-binary converter: from -range to +range less a step.
+    codes = np.round(np.clip(volts, -converter.range_volts, converter.range_volts - step) / step)
+    volts = step * instrument.given_codes(codes)
     return Recording(time, volts, "volts", metadata=metadata, resolution=step)
 
 

@@ -51,18 +51,10 @@ def angles(
     interval = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0
     model = Model(time_s, interval, effects, order)
     pieces = _longest(model, value, equation.angular_frequency, place)
-    stamps = time_s
-    for one in given:
-        late = one.effect.delay(time_s, one.values)
-        stamps = stamps if late is None else stamps + late
+    stamps = model.taken_at(value)
     end = float(pieces[-1][1].time_s[-1, -1])
     sampled = replace(sample_pieces(pieces, np.minimum(stamps, end)), time_s=stamps)
-    constants = model.pendulum(value)
-    reading = sampled.angle
-    for one in given:
-        extra = one.effect.reading(sampled, constants, one.values)
-        reading = reading if extra is None else reading + extra
-    return np.asarray(reading)
+    return model.read(sampled, value)
 
 
 def _longest(model: Model, value: FloatArray, omega: float, place: str) -> Pieces:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,10 @@ class SimulatedRecord:
     device: Device
     rate_hz: float
     duration_s: float
+
+    def angle(self, time_s: FloatArray) -> FloatArray:
+        """Return the true angle in rad at ascending times since the record's start."""
+        return sample(self.model, self.release, time_s)
 
 
 def generator(campaign: Campaign, name: str) -> np.random.Generator:
@@ -129,16 +134,16 @@ class SensorVolts:
     depend on the size of the pieces in which the device asks for it.
     """
 
-    def __init__(self, record: SimulatedRecord, random: np.random.Generator) -> None:
-        self.record = record
-        self.random = random
-
-    def angle(self, time_s: FloatArray) -> FloatArray:
-        """Return the true angle in rad at ascending times since the record's start."""
-        return sample(self.record.model, self.record.release, time_s)
+    def __init__(
+        self,
+        angle: Callable[[FloatArray], FloatArray],
+        sensor: Sensor,
+        random: np.random.Generator,
+    ) -> None:
+        self.angle, self.sensor, self.random = angle, sensor, random
 
     def __call__(self, time_s: FloatArray) -> FloatArray:
         """Return volts at ascending times since the record's start; shape (n,)."""
-        sensor = self.record.sensor
-        noise = sensor.noise_volts * self.random.standard_normal(len(time_s))
-        return sensor.offset_volts + sensor.volts_per_radian * self.angle(time_s) + noise
+        noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
+        signal = self.sensor.offset_volts + self.sensor.volts_per_radian * self.angle(time_s)
+        return signal + noise

@@ -64,9 +64,9 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
     from pendpipe.simulation.record import SensorVolts, generator, simulated_record
 
     truth = simulated_record(campaign, record)
-    signal = SensorVolts(truth, generator(campaign, record.record))
+    signal = SensorVolts(truth.angle, truth.sensor, generator(campaign, record.record))
     # The engine is compiled on its first call on a machine; a device must not wait for it.
-    signal.angle(np.zeros(1))
+    truth.angle(np.zeros(1))
     recording = acquire_simulated(
         truth.device.kind,
         signal,

@@ -9,31 +9,13 @@ import numpy as np
 from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
-from pendpipe.configuration.models import CaliperRun, Sensor
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
-from pendpipe.simulation.record import generator
+from pendpipe.simulation.record import SensorVolts, generator
 
 RATE_HZ = 200.0
 SETTLING = 0.1
 """Part of each dwell that is left out at either end, where the caliper is moved."""
-
-
-class Staircase:
-    """The sensor's volts while the caliper holds one position after the other."""
-
-    def __init__(self, run: CaliperRun, sensor: Sensor, angles: FloatArray, seed: int) -> None:
-        self.dwell_s = run.samples / RATE_HZ / (1.0 - 2.0 * SETTLING)
-        self.sensor = sensor
-        self.angles = angles
-        self.random = np.random.default_rng([seed, len(angles)])
-
-    def __call__(self, time_s: FloatArray) -> FloatArray:
-        """Return volts at ascending times; shape (n,)."""
-        position = np.floor(time_s / self.dwell_s).astype(np.int64)
-        angle = self.angles[np.clip(position, 0, len(self.angles) - 1)]
-        noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
-        return self.sensor.offset_volts + self.sensor.volts_per_radian * angle + noise
 
 
 def run_caliper(campaign: Campaign, table: Path) -> None:
@@ -53,15 +35,22 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
     random = generator(campaign, "caliper run")
     displacement = np.linspace(-run.travel_m, run.travel_m, run.points)
     reading = displacement + run.displacement_sd_m * random.standard_normal(run.points)
-    signal = Staircase(run, truth.sensor, displacement / run.arm_m, settings.seed)
+    dwell_s = run.samples / RATE_HZ / (1.0 - 2.0 * SETTLING)
+
+    def held(time_s: FloatArray) -> FloatArray:
+        """The rod's angle while the caliper holds one position after the other."""
+        position = np.floor(time_s / dwell_s).astype(np.int64)
+        return np.asarray(displacement[np.clip(position, 0, run.points - 1)] / run.arm_m)
+
+    noise = np.random.default_rng([settings.seed, run.points])
     recording = acquire_simulated(
         truth.device.kind,
-        signal,
+        SensorVolts(held, truth.sensor, noise),
         rate_hz=RATE_HZ,
-        duration_s=run.points * signal.dwell_s,
+        duration_s=run.points * dwell_s,
         clock_scale=truth.device.clock_scale,
     )
-    dwells = recording.time_s / signal.dwell_s
+    dwells = recording.time_s / dwell_s
     steps, settled = np.floor(dwells), np.abs(dwells % 1.0 - 0.5) < 0.5 - SETTLING
     with replaced(table) as stream:
         stream.write(f"# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n")
