@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+
+def number(value: float | None) -> float:
+    """A number of a result file; NaN where it holds null."""
+    return float("nan") if value is None else float(value)
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,14 @@ class Estimate:
             "at_bound": self.at_bound,
             "unit": self.unit,
         }
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> Estimate:
+        """Read what `as_json` (or `dataclasses.asdict`) has made; null stands for NaN."""
+        interval = entry.get("interval95")
+        ends = None if interval is None else (number(interval[0]), number(interval[1]))
+        sizes = number(entry["value"]), number(entry["sd"])
+        return cls(*sizes, entry["unit"], ends, bool(entry["at_bound"]))
 
     def __str__(self) -> str:
         from pendpipe.quantities import with_error

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, number
 
 
 @dataclass(frozen=True)
@@ -104,36 +104,21 @@ class Calibration:
         points = content["points"]
         curve = content["linear"]
         return cls(
-            volts_per_radian=_estimate(content["volts_per_radian"]),
-            offset=_estimate(content["offset_volts"]),
-            covariance=_number(content["covariance"]),
-            angle_rad=np.array([_number(point["angle_rad"]) for point in points]),
-            volts=np.array([_number(point["volts"]) for point in points]),
-            volts_sd=np.array([_number(point["volts_sd"]) for point in points]),
-            angle_sd_rad=np.array([_number(point["angle_sd_rad"]) for point in points]),
-            residual_sd_volts=_number(content["residual_sd_volts"]),
-            chi2_p_value=_number(content["chi2_p_value"]),
+            volts_per_radian=Estimate.from_json(content["volts_per_radian"]),
+            offset=Estimate.from_json(content["offset_volts"]),
+            covariance=number(content["covariance"]),
+            angle_rad=np.array([number(point["angle_rad"]) for point in points]),
+            volts=np.array([number(point["volts"]) for point in points]),
+            volts_sd=np.array([number(point["volts_sd"]) for point in points]),
+            angle_sd_rad=np.array([number(point["angle_sd_rad"]) for point in points]),
+            residual_sd_volts=number(content["residual_sd_volts"]),
+            chi2_p_value=number(content["chi2_p_value"]),
             linearity=None
             if curve is None
             else Linearity(
-                _estimate(curve["quadratic"]),
-                _estimate(curve["cubic"]),
-                _number(curve["p_value"]),
-                _number(curve["largest_deviation"]),
+                Estimate.from_json(curve["quadratic"]),
+                Estimate.from_json(curve["cubic"]),
+                number(curve["p_value"]),
+                number(curve["largest_deviation"]),
             ),
         )
-
-
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
-
-
-def _estimate(content: dict[str, Any]) -> Estimate:
-    low, high = map(_number, content["interval95"])
-    return Estimate(
-        _number(content["value"]),
-        _number(content["sd"]),
-        content["unit"],
-        (low, high),
-        content["at_bound"],
-    )

@@ -33,22 +33,6 @@ class RecordResult:
         return self.fit.parameters[name]
 
 
-def estimate(content: dict[str, Any]) -> Estimate:
-    """Read an estimate back; what has no finite value is NaN."""
-    value, sd = (
-        float("nan") if content.get(key) is None else float(content[key]) for key in ("value", "sd")
-    )
-    interval = content.get("interval95")
-    both = interval and None not in interval
-    return Estimate(
-        value,
-        sd,
-        content.get("unit", ""),
-        (float(interval[0]), float(interval[1])) if interval and both else None,
-        bool(content.get("at_bound", False)),
-    )
-
-
 def record_files(campaign: Campaign, *names: str) -> list[Path]:
     """The files of these names in every record's folder."""
     return [campaign.folder / row.record / name for row in campaign.records for name in names]

@@ -15,7 +15,7 @@ from pendpipe.configuration.records import Record
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
-from pendpipe.stages.results import RecordResult, estimate, read_results, record_files
+from pendpipe.stages.results import RecordResult, read_results, record_files
 from pendpipe.stages.theory import record_theory
 
 
@@ -127,7 +127,7 @@ def _separated(content: dict[str, Any]) -> SeparatedRecord:
 
     def fields(entries: dict[str, Any]) -> dict[str, Any]:
         return {
-            name: estimate(entry) if isinstance(entry, dict) else entry
+            name: Estimate.from_json(entry) if isinstance(entry, dict) else entry
             for name, entry in entries.items()
         }
 

@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.analysis.fit.decrement import Decrement, Light
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, number
 from pendpipe.files import read_json
 
 if TYPE_CHECKING:
@@ -232,13 +232,15 @@ class FitResult:
         return cls(
             method=content["method"],
             baseline=content["baseline"],
-            parameters={name: _estimate(entry) for name, entry in content["parameters"].items()},
-            quality_factor_limit=None if limit["value"] is None else _estimate(limit),
+            parameters={
+                name: Estimate.from_json(entry) for name, entry in content["parameters"].items()
+            },
+            quality_factor_limit=None if limit["value"] is None else Estimate.from_json(limit),
             covariance_order=tuple(covariance["order"]),
             covariance=np.array(covariance["matrix"], dtype=np.float64),
-            noise_rms_rad=_number(content["noise_rms_rad"]),
-            residual_rms_rad=_number(content["residual_rms_rad"]),
-            chi2_per_dof=_number(content["chi2_per_dof"]),
+            noise_rms_rad=number(content["noise_rms_rad"]),
+            residual_rms_rad=number(content["residual_rms_rad"]),
+            chi2_per_dof=number(content["chi2_per_dof"]),
             samples=content["samples"],
             turning_points=content["turning_points"],
             quality_factor_hysteretic=_maybe(content["quality_factor_hysteretic"]),
@@ -274,20 +276,5 @@ def _optional(estimate: Estimate | None) -> dict[str, Any] | None:
     return None if estimate is None else estimate.as_json()
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
-
-
 def _maybe(entry: Mapping[str, Any] | None) -> Estimate | None:
-    return None if entry is None else _estimate(entry)
-
-
-def _estimate(entry: Mapping[str, Any]) -> Estimate:
-    low, high = (_number(end) for end in entry["interval95"])
-    return Estimate(
-        _number(entry["value"]),
-        _number(entry["sd"]),
-        entry["unit"],
-        (low, high),
-        bool(entry["at_bound"]),
-    )
+    return None if entry is None else Estimate.from_json(entry)
