@@ -12,6 +12,8 @@ import re
 import stat
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -80,38 +82,25 @@ class Line:
 
     def set_baudrate(self, baudrate: int) -> None:
         """Change the speed of the open line."""
-        try:
+        with self._watched():
             self._serial.baudrate = baudrate
-        except (OSError, termios_error) as fault:
-            raise self._lost(fault) from None
 
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
-        try:
+        with self._watched():
             self._serial.write(data)
-        except OSError as fault:
-            raise self._lost(fault) from None
 
     def receive(self, limit_s: float) -> bytes:
         """Return what has arrived; if nothing has, wait for it at most `limit_s`."""
-        try:
-            self._serial.timeout = limit_s
-            first: bytes = self._serial.read(1)
-            if not first:
-                return b""
-            # With no time to wait, pyserial's read makes one system call and returns.
-            self._serial.timeout = 0
-            return first + bytes(self._serial.read(1 << 16))
-        except OSError as fault:
-            raise self._lost(fault) from None
+        first = self.read(1, limit_s)
+        # With no time to wait, pyserial's read makes one system call and returns.
+        return first + self.read(1 << 16, 0.0) if first else b""
 
     def read(self, size: int, limit_s: float) -> bytes:
         """Return `size` bytes, or the fewer that came within `limit_s`."""
-        try:
+        with self._watched():
             self._serial.timeout = limit_s
             return bytes(self._serial.read(size))
-        except OSError as fault:
-            raise self._lost(fault) from None
 
     def read_until(self, end: bytes, limit_s: float) -> bytes:
         """Return everything up to and with `end`, or what came within `limit_s`."""
@@ -139,17 +128,18 @@ class Line:
         if connection is not None:
             connection.close()
 
-    def _lost(self, fault: Exception) -> LineLostError:
-        return LineLostError(
-            self.port,
-            f"the line was lost ({_text(fault)})",
-            "check cable and power, and that no other program uses the port",
-        )
-
-
-def _text(fault: BaseException) -> str:
-    """One short clause out of pyserial's messages, which wrap one another."""
-    return " ".join(str(fault).split())[:160]
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Turn a fault of the line into one line."""
+        try:
+            yield
+        except (OSError, termios_error) as fault:
+            # pyserial's messages wrap one another.
+            raise LineLostError(
+                self.port,
+                f"the line was lost ({' '.join(str(fault).split())[:160]})",
+                "check cable and power, and that no other program uses the port",
+            ) from None
 
 
 _LIST: Final = "pendpipe acquire --list shows the ports"

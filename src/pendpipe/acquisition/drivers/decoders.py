@@ -24,9 +24,6 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray
 
-_BLOCK: Final = 1 << 15
-"""Words decoded at a time: few enough to stay in the processor's cache."""
-
 
 @dataclass(frozen=True)
 class Loss:
@@ -109,7 +106,8 @@ class SyncBitDecoder:
         whole = len(data) - len(data) % self.bytes_per_scan
         words = np.frombuffer(data, dtype="<u2", count=whole // 2).reshape(-1, len(self._marks))
         rest = data[whole:]
-        if self._discarded or not self._begins_scan(rest) or not self._in_step(words):
+        in_step = self._begins_scan(rest) and bool(((words & 0x0101) == self._marks).all())
+        if self._discarded or not in_step:
             return self._resynchronise(data)
         self._pending = rest
         self._scans += len(words)
@@ -127,24 +125,10 @@ class SyncBitDecoder:
         """Whether these bytes can be the beginning of a scan (nothing at all can)."""
         return all((byte & 1) == (place > 0) for place, byte in enumerate(rest))
 
-    def _in_step(self, words: AnyArray) -> bool:
-        """Whether every byte has the mark that its place asks for."""
-        rows = max(1, _BLOCK // words.shape[1])
-        return all(
-            bool(((words[first : first + rows] & 0x0101) == self._marks).all())
-            for first in range(0, len(words), rows)
-        )
-
     def _counts(self, words: AnyArray) -> AnyArray:
         """Take the samples out of words that are in step; shape (scans, channels)."""
-        counts = np.empty(words.shape, dtype=np.int16)
-        rows = max(1, _BLOCK // words.shape[1])
-        for first in range(0, len(words), rows):
-            part = words[first : first + rows]
-            code = part & 0x00FF
-            code >>= 15 - self._bits
-            code |= (part >> 9) << (self._bits - 7)
-            np.subtract(code.view("<i2"), 1 << (self._bits - 1), out=counts[first : first + rows])
+        code = (words & 0x00FF) >> (15 - self._bits) | (words >> 9) << (self._bits - 7)
+        counts: AnyArray = code.astype(np.int16) - np.int16(1 << (self._bits - 1))
         return counts
 
     def _resynchronise(self, data: bytes) -> Scans:
