@@ -142,6 +142,8 @@ class Line:
             ) from None
 
 
+_ARE_BUSY: Final = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
+_FORBID: Final = (errno.EACCES, errno.EPERM)
 _LIST: Final = "pendpipe acquire --list shows the ports"
 _WINDOWS: Final = re.compile(r"Error\(\d+, .*, None, (\d+)\)")
 _BUSY: Final = {
@@ -164,28 +166,25 @@ def cannot_open(port: str, fault: Exception, platform: str = sys.platform) -> In
     number = getattr(fault, "errno", None)
     found = _WINDOWS.search(text)
     windows = int(found[1]) if found else None
-    if number == errno.ENOENT or windows in (2, 3):
-        return InputError(port, "there is no such port", _LIST)
-    # Windows lets one program at a time have a port, and calls that a denied access.
-    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK) or windows in (5, 32):
-        remedy = _BUSY.get(platform, _BUSY["darwin"]).format(port=port)
-        return InputError(port, "the port is busy", remedy)
-    if number in (errno.EACCES, errno.EPERM):
-        return InputError(port, "you may not open the port", _permission(port, platform))
-    if number in (errno.ENXIO, errno.ENODEV, errno.EIO) or windows in (31, 121, 433, 995):
-        remedy = _NO_DRIVER.get(platform, _NO_DRIVER["darwin"])
-        return InputError(port, "no working device is behind the port", remedy)
-    if windows == 87:
-        return InputError(
-            port,
-            "the port's driver refuses the setting of the line",
-            "check that it is the instrument's port; if so, install its driver anew",
-        )
-    if "refused" in text:
-        return InputError(port, "nothing listens there", "start the device, or correct the address")
-    if "configure port" in text:
-        return InputError(port, "this is no serial port", _LIST)
-    return InputError(port, f"the port can't be opened ({text})", _LIST)
+    no_device = _NO_DRIVER.get(platform, _NO_DRIVER["darwin"])
+    busy = _BUSY.get(platform, _BUSY["darwin"]).format(port=port)
+    no_setting = "check that it is the instrument's port; if so, install its driver anew"
+    cases = (
+        (number == errno.ENOENT or windows in (2, 3), "there is no such port", _LIST),
+        # Windows lets one program at a time have a port, and calls that a denied access.
+        (number in _ARE_BUSY or windows in (5, 32), "the port is busy", busy),
+        (number in _FORBID, "you may not open the port", _permission(port, platform)),
+        (
+            number in (errno.ENXIO, errno.ENODEV, errno.EIO) or windows in (31, 121, 433, 995),
+            "no working device is behind the port",
+            no_device,
+        ),
+        (windows == 87, "the port's driver refuses the setting of the line", no_setting),
+        ("refused" in text, "nothing listens there", "start the device, or correct the address"),
+        ("configure port" in text, "this is no serial port", _LIST),
+        (True, f"the port can't be opened ({text})", _LIST),
+    )
+    return next(InputError(port, problem, remedy) for met, problem, remedy in cases if met)
 
 
 def _permission(port: str, platform: str) -> str:
