@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -35,12 +34,11 @@ from pendpipe.recording import read_plain
 Comparison = Mapping[str, Any]
 
 
-@dataclass
-class Drawn:
+class Drawn(NamedTuple):
     """What was drawn, and what was left out and why."""
 
-    files: list[Path] = field(default_factory=list)
-    left_out: dict[str, str] = field(default_factory=dict)
+    files: list[Path]
+    left_out: dict[str, str]
 
 
 def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int = 1) -> Drawn:
@@ -63,67 +61,57 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         A campaign with theory leaves a file for each of figures 3 to 10, with the reason
         in it where there was nothing to draw; one without leaves them out.
     """
-    names = list(_campaign_figures(comparison, folder))
     tasks = [
-        *(partial(draw_figure, comparison, folder, out, name) for name in names),
-        *(partial(draw_record, folder, entry) for entry in comparison["records"]),
+        *(
+            partial(_figure, comparison, folder, out, name)
+            for name in _campaign_figures(comparison)
+        ),
+        *(partial(_decay, folder, entry) for entry in comparison["records"]),
     ]
     if processes < 2:
-        return _together([task() for task in tasks])
-    with ProcessPoolExecutor(processes) as pool:
-        return _together([draw.result() for draw in [pool.submit(task) for task in tasks]])
+        parts = [task() for task in tasks]
+    else:
+        with ProcessPoolExecutor(processes) as pool:
+            parts = [draw.result() for draw in [pool.submit(task) for task in tasks]]
+    return Drawn(
+        [path for part in parts for path in part.files],
+        dict(reason for part in parts for reason in part.left_out.items()),
+    )
 
 
-def draw_record(folder: Path, entry: Entry) -> Drawn:
+def _decay(folder: Path, entry: Entry) -> Drawn:
     """Draw one record's decay (for the page: a drawing in pixels would take as long again)."""
-    drawn, name = Drawn(), entry["record"]
+    name = f"{entry['record']}, decay"
     if entry.get("refused"):
-        drawn.left_out[f"{name}, decay"] = "the record was refused"
-        return drawn
-    stem = folder / name / "figures" / "decay"
-    _draw(drawn, f"{name}, decay", _decay_of(folder, entry), stem, forms=("svg",))
-    return drawn
+        return Drawn([], {name: "the record was refused"})
+    stem = folder / entry["record"] / "figures" / "decay"
+    return _drawn(name, lambda: draw_decay(read_decay(folder, entry)), stem, forms=("svg",))
 
 
-def draw_figure(comparison: Comparison, folder: Path, out: Path, name: str) -> Drawn:
+def _figure(comparison: Comparison, folder: Path, out: Path, name: str) -> Drawn:
     """Draw one of figures 3 to 10, or the tail figure."""
-    drawn = Drawn()
     keep_place = bool(comparison.get("has_theory")) and name.startswith("fig")
-    draw = _campaign_figures(comparison, folder)[name]
-    _draw(drawn, name, draw, out / name, keep_place=keep_place)
-    return drawn
+    draw = _campaign_figures(comparison)[name]
+    return _drawn(name, lambda: draw(comparison, folder), out / name, keep_place=keep_place)
 
 
-def _together(parts: list[Drawn]) -> Drawn:
-    """What several have drawn, in their order."""
-    whole = Drawn()
-    for part in parts:
-        whole.files += part.files
-        whole.left_out |= part.left_out
-    return whole
-
-
-def _campaign_figures(comparison: Comparison, folder: Path) -> dict[str, Callable[[], Figure]]:
-    """The drawing of each figure, not yet done."""
-    figures: dict[str, Callable[[], Figure]] = {
-        "fig03": lambda: draw_fig03(comparison.get("calibration")),
-        "fig04": lambda: draw_fig04(comparison),
-        "fig07": lambda: _typical_decay(comparison, folder),
-        "fig08": lambda: draw_fig08(read_decay(folder, _typical(comparison))),
-        "tail": lambda: draw_tail(comparison.get("tail")),
+def _campaign_figures(comparison: Comparison) -> dict[str, Callable[[Comparison, Path], Figure]]:
+    """The drawing of each figure from the comparison and the campaign's results, by name."""
+    figures: dict[str, Callable[[Comparison, Path], Figure]] = {
+        "fig03": lambda comparison, _: draw_fig03(comparison.get("calibration")),
+        "fig04": lambda comparison, _: draw_fig04(comparison),
+        "fig07": _typical_decay,
+        "fig08": lambda comparison, folder: draw_fig08(read_decay(folder, _typical(comparison))),
+        "tail": lambda comparison, _: draw_tail(comparison.get("tail")),
     }
     if comparison.get("has_theory"):
         figures |= {
-            "fig05": lambda: draw_fig05(comparison),
-            "fig06": lambda: draw_fig06(comparison),
-            "fig09": lambda: draw_fig09(comparison),
-            "fig10": lambda: draw_fig10(comparison),
+            "fig05": lambda comparison, _: draw_fig05(comparison),
+            "fig06": lambda comparison, _: draw_fig06(comparison),
+            "fig09": lambda comparison, _: draw_fig09(comparison),
+            "fig10": lambda comparison, _: draw_fig10(comparison),
         }
     return dict(sorted(figures.items()))
-
-
-def _decay_of(folder: Path, entry: Entry) -> Callable[[], Figure]:
-    return lambda: draw_decay(read_decay(folder, entry))
 
 
 def _typical(comparison: Comparison) -> Entry:
@@ -147,21 +135,17 @@ def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
     return draw_fig07(read_decay(folder, entry), recording, constant)
 
 
-def _draw(
-    drawn: Drawn,
+def _drawn(
     name: str,
     draw: Callable[[], Figure],
     stem: Path,
     *,
     keep_place: bool = False,
     forms: Sequence[str] = ("svg", "png"),
-) -> None:
+) -> Drawn:
     """Draw and save one figure, or note why not (and say it in the figure's place)."""
     try:
-        figure = draw()
-    except NothingToDrawError as reason:
-        drawn.left_out[name] = str(reason)
-        if not keep_place:
-            return
-        figure = placeholder(str(reason))
-    drawn.files += save(figure, stem, forms=forms)
+        return Drawn(save(draw(), stem, forms=forms), {})
+    except NothingToDrawError as fault:
+        reason = str(fault)
+    return Drawn(save(placeholder(reason), stem) if keep_place else [], {name: reason})
