@@ -108,7 +108,14 @@ def test_words_where_there_is_no_reading(read_as: Callable[..., Recording]) -> N
 
 
 @pytest.mark.parametrize(
-    "told", ["Sampling: 50 Hz", "# interval between samples: 20 ms", "Abtastrate;50 Hz"]
+    "told",
+    [
+        "Sampling: 50 Hz",
+        "# interval between samples: 20 ms",
+        "Abtastrate;50 Hz",
+        "in air, sampled at 50 Hz",
+        "in air, 50 Hz",
+    ],
 )
 def test_a_rate_in_a_remark(read_as: Callable[..., Recording], told: str) -> None:
     same(read_as(f"Pendulum 3\n{told}\nAngle (deg)\n" + rows(DEGREES, form=".3f")))
@@ -120,6 +127,18 @@ def test_days_of_a_spreadsheet(read_as: Callable[..., Recording]) -> None:
     )
     same(recording)
     assert any("in days" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "per_second", "begin"),
+    [("micros", 1e6, 987654321), ("timestamp", 1e9, 54321987654321)],
+)
+def test_ticks_since_the_start_are_none_since_1970(
+    read_as: Callable[..., Recording], name: str, per_second: float, begin: int
+) -> None:
+    ticks = begin + np.rint(per_second * TIME).astype(np.int64)
+    text = "".join(f"{t},{x:.3f}\n" for t, x in zip(ticks.tolist(), DEGREES, strict=True))
+    same(read_as(f"{name},angle (deg)\n" + text))
 
 
 def test_rows_out_of_order_are_sorted_and_two_clocks_are_not(
@@ -183,6 +202,34 @@ def test_a_bob_seen_from_a_pivot_that_is_tracked_too(read_as: Callable[..., Reco
 def test_rows_that_were_printed_as_lists(read_as: Callable[..., Recording]) -> None:
     text = rows(TIME, ANGLE, sign=", ").replace("\n", ")\n").splitlines()
     same(read_as("\n".join("(" + line for line in text) + "\n", "a.txt"))
+
+
+def test_counts_of_an_encoder_are_no_degrees_and_go_on_beyond_its_zero(
+    read_as: Callable[..., Recording],
+) -> None:
+    few = np.rint(ANGLE * 400 / (2 * np.pi))
+    recording = read_as("t (s),Right encoder\n" + rows(TIME, few, form=".6g"))
+    assert recording.unit == "counts"
+    assert "whole numbers" in recording.weak_guesses[0]
+    counts = np.rint(ANGLE * 4096 / (2 * np.pi))
+    recording = read_as("t (s),raw_angle\n" + rows(TIME, np.mod(counts, 4096), form=".6g"))
+    same(recording, counts, "counts")
+    assert any("jump by a turn of 4096" in note for note in recording.notes)
+
+
+def test_decimal_commas_between_commas(read_as: Callable[..., Recording]) -> None:
+    text = "".join(
+        f"{t:.2f},{x:.3f}\n".replace(".", "_") for t, x in zip(TIME, DEGREES, strict=True)
+    )
+    same(read_as("Zeit (s),Winkel (Grad)\n" + text.replace("_", ",")))
+
+
+def test_a_degree_sign_that_was_decoded_twice(read_as: Callable[..., Recording]) -> None:
+    same(read_as("Time (s),Angle [Â°]\n" + rows(TIME, DEGREES, form=".3f")))
+
+
+def test_remarks_with_a_number_are_no_names(read_as: Callable[..., Recording]) -> None:
+    same(read_as("mass 0.15\nlength 0.60\n" + rows(TIME, ANGLE, sign=" ")))
 
 
 # --- oscilloscopes, LabVIEW, Audacity --------------------------------------------------------

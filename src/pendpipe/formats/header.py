@@ -14,7 +14,7 @@ from pendpipe.formats.words import split_header, unit_of
 
 _RATE_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
-    r"|messrate|rate[\s_]*\(?hz",
+    r"|messrate|rate[\s_]*\(?hz|sampled at",
     re.I,
 )
 _INTERVAL_WORD: Final = re.compile(
@@ -121,7 +121,7 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
                 continue
             if len(cells) < layout.width and not is_comment(line):
                 continue
-            if candidates and any(map(layout.is_number, cells)):
+            if (candidates or layout.width < 4) and any(map(layout.is_number, cells)):
                 continue
             if _are_units(cells) and candidates and candidates[-1][0] == len(cells):
                 continue
@@ -195,6 +195,9 @@ def _interval(lines: Sequence[str]) -> float | None:
             return number * (
                 1e-3 if "ms" in unit else 1e-6 if "us" in unit or "µs" in unit else 1.0
             )
+    alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)Hz\b", " ".join(lines))
+    if len(alone) == 1 and float(alone[0][0]) > 0.0:
+        return 1.0 / (float(alone[0][0]) * (1e3 if alone[0][1] else 1.0))
     return None
 
 

@@ -65,6 +65,8 @@ def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatAr
     notes: tuple[str, ...] = ()
     if guess.unit.kind == "angle":
         values, notes = _from_below(values)
+    elif guess.unit.name == "counts":
+        values, notes = _over_the_turn(values)
     found = Readings(
         values, _QUANTITIES[guess.unit.kind], guess.unit.factor, guess.unit.name, notes
     )
@@ -111,7 +113,8 @@ def _unit(
     # Whole numbers are an instrument's counts where degrees or millimetres would not be: a
     # pendulum seldom goes beyond 180 degrees.
     few = {"volts": 20.0, "signal": 20.0, "angle": 180.0, "length": 400.0, "unknown": 400.0}
-    if whole and reach > few.get(role, np.inf):
+    counted = re.search(r"(?i)enc|count|tick|raw", column.name) is not None
+    if whole and (counted or reach > few.get(role, np.inf)):
         return _Guess(
             Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
         )
@@ -303,6 +306,19 @@ def _jumps_of_a_turn(values: FloatArray) -> bool:
         return False
     jumps = np.abs(np.diff(values))
     return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
+
+
+def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Undo the jumps of an absolute encoder of 2^k counts that hangs near its zero."""
+    finite = np.isfinite(values)
+    low, high = np.min(values[finite], initial=0.0), np.max(values[finite], initial=0.0)
+    turn = 2.0 ** np.ceil(np.log2(high + 1.0)) if high > 0.0 else 1.0
+    jumps = np.abs(np.diff(values[finite])) > 0.8 * turn
+    if low < 0.0 or turn < 256.0 or not jumps.any():
+        return values, ()
+    values = values.copy()
+    values[finite] = np.unwrap(values[finite], period=turn)
+    return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
 
 
 def _from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:

@@ -60,6 +60,8 @@ def decode(data: bytes) -> str:
 
 def _unified(text: str) -> str:
     """Give line ends, minus signs and blanks one form each."""
+    for wrong in "°µ²³":  # UTF-8 that a program took for Windows-1252, and wrote anew
+        text = text.replace(f"Â{wrong}", wrong)
     text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     return text.replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", " ")
 
@@ -76,10 +78,16 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
     lines = text.split("\n")
-    for form_of in (_without_cassy_limits, _without_arrows, _without_brackets, _without_panel):
+    _refuse_long(place, lines)
+    for form_of in (
+        _without_cassy_limits,
+        _without_arrows,
+        _without_brackets,
+        _without_panel,
+        _without_split_decimals,
+    ):
         lines = form_of(lines)
     lines = _without_labels(lines)
-    _refuse_long(place, lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
     if first > _LONGEST_HEADER:
@@ -123,7 +131,9 @@ def _without_cassy_limits(lines: list[str]) -> list[str]:
 
 
 _ARROW: Final = re.compile(r"\s*(\d{1,2}:\d\d:\d\d(?:\.\d+)?)\s*->\s*")
-_LABELLED: Final = re.compile(r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;\s]?")
+_LABELLED: Final = re.compile(
+    r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;|]?\s*"
+)
 
 
 def _without_arrows(lines: list[str]) -> list[str]:
@@ -159,6 +169,26 @@ def _without_panel(lines: list[str]) -> list[str]:
     across, up = told.get("Horizontal Units", "s"), told.get("Vertical Units", "V")
     names = f"time ({across}),{told.get('Source', 'CH1')} ({up}),"
     return [names, *(row[4] if row is not None else "" for row in rows)]
+
+
+def _without_split_decimals(lines: list[str]) -> list[str]:
+    """Mend rows with commas in the numbers and between them: as many again as there are names."""
+    head = next((row for row, line in enumerate(lines[:50]) if _SPLIT.fullmatch(line)), 0)
+    cells = lines[head].split(",")
+    names = lines[head - 1].split(",") if head else []
+    if len(names) < 2 or len(cells) != 2 * len(names):
+        return lines
+    if not all(
+        _SPLIT.fullmatch(line) and line.count(",") == len(cells) - 1
+        for line in lines[head : head + 100]
+        if line
+    ):
+        return lines
+    rows = [re.sub(r"(\d+),(\d+)(,|$)", r"\1.\2\3", line) for line in lines[head:]]
+    return [*lines[:head], *rows]
+
+
+_SPLIT: Final = re.compile(r"[+-]?\d+,\d+(,[+-]?\d+,\d+)+")
 
 
 def _without_labels(lines: list[str]) -> list[str]:

@@ -17,6 +17,8 @@ from pendpipe.formats.words import plain, unit_of
 
 _EPOCH: Final = 3e8
 """Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
+_LATEST: Final = 1e10
+"""Seconds since 1970 that no recording has reached: the unit in the header is wrong."""
 _EPOCHS: Final = ((3e17, 1e-9, "nanoseconds"), (3e14, 1e-6, "microseconds"),
                   (3e11, 1e-3, "milliseconds"), (_EPOCH, 1.0, "seconds"))  # fmt: skip
 _LONGEST_S: Final = 300.0
@@ -127,25 +129,31 @@ def _unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float,
         return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
-    for least, factor, name in _EPOCHS:
-        if largest > least and not (factor < 1.0 and float(np.ptp(values)) > 0.1 * largest):
-            return factor, f"'{column.label}' counts {name} since 1970", False
+    period = _period(reading, values)
     for word in (column.unit, column.name):
         unit = unit_of(word) if word else None
-        if unit is None or unit.kind != "time":
+        if unit is None or unit.kind != "time" or largest * unit.factor > _LATEST:
             continue
         if word == column.unit or plain(word) not in ("t", "h", "min"):
             return unit.factor, "", False
-    return _unit_by_size(column, reading, values)
+    for least, factor, name in _EPOCHS:
+        ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
+        if largest > least and not ticks and factor * period < _LONGEST_S:
+            return factor, f"'{column.label}' counts {name} since 1970", False
+    return _unit_by_size(column, period, values)
 
 
-def _unit_by_size(column: Column, reading: Column, values: FloatArray) -> tuple[float, str, bool]:
+def _period(reading: Column, values: FloatArray) -> float:
+    """Period of the reading on a clock, in the clock's unit; 0 where nothing swings."""
+    cycle = swing_of(reading.values).samples_per_cycle
+    span = float(np.ptp(values)) if len(values) else 0.0
+    return cycle * span / max(1, len(values) - 1)
+
+
+def _unit_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, str, bool]:
     """Take seconds, unless no pendulum would be so slow."""
     step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
     whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
-    cycle = swing_of(reading.values).samples_per_cycle
-    span = float(np.ptp(values)) if len(values) else 0.0
-    period = cycle * span / max(1, len(values) - 1)
     if period > _LONGEST_S or (not period and whole and step >= 500):
         factor, name = 1e-3, "milliseconds"
         if (period or 50.0 * step) > 3e4:
