@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from pendpipe.analysis.turning_points.table import Cut
 from pendpipe.arrays import FloatArray
-
-
-@dataclass(frozen=True)
-class Cut:
-    """A part of the recording that is left out, and why."""
-
-    start_s: float
-    stop_s: float
-    reason: str
 
 
 def stretches(

@@ -14,6 +14,7 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.loops import find_extremes
 from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.kernel import kernel
 
 _PER_HALF_CYCLE: Final = 40
 """Samples a half cycle that are kept: a turning point is then low by 0.03 %."""
@@ -97,11 +98,34 @@ def thinned(
     if interval > 0.5 * step:
         return time_s, _without_wild(values, math.pi * interval / half_period_s)
     # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
-    cell = (time_s / step - math.floor(time_s[0] / step)).astype(np.int64)
-    starts = np.append(0, np.flatnonzero(cell[1:] != cell[:-1]) + 1)
-    counts = np.diff(np.append(starts, len(values)))
-    smooth = _median3(values)
-    return np.add.reduceat(time_s, starts) / counts, np.add.reduceat(smooth, starts) / counts
+    thin_time, thin_values = np.empty(len(values)), np.empty(len(values))
+    count = _thin(time_s, values, step, thin_time, thin_values)
+    return thin_time[:count].copy(), thin_values[:count].copy()
+
+
+@kernel
+def _thin(
+    time_s: FloatArray,
+    values: FloatArray,
+    step: float,
+    thin_time: FloatArray,
+    thin_values: FloatArray,
+) -> int:
+    """Write the means of times, and of medians of three, in cells of a grid; return how many."""
+    count, readings, cell, last = 0, 0, 0, values.size - 1
+    when, total = 0.0, 0.0
+    for i in range(values.size):
+        x = values[i]
+        if 0 < i < last:
+            before, after = values[i - 1], values[i + 1]
+            x = max(min(before, x), min(max(before, x), after))
+        here = math.floor(time_s[i] / step)
+        if i > 0 and here != cell:
+            thin_time[count], thin_values[count] = when / readings, total / readings
+            count, readings, when, total = count + 1, 0, 0.0, 0.0
+        cell, readings, when, total = here, readings + 1, when + time_s[i], total + x
+    thin_time[count], thin_values[count] = when / readings, total / readings
+    return count + 1
 
 
 def _without_wild(values: FloatArray, turn: float) -> FloatArray:

@@ -17,25 +17,27 @@ from pendpipe.dynamics.layout import DEGREE
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
 
-NODES: FloatArray = -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
-"""The nodes from -1 to 1."""
+
+def lobatto_nodes(degree: int) -> FloatArray:
+    """Return the nodes from -1 to 1, shape (degree + 1,)."""
+    return np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
 
 
-def _analysis() -> FloatArray:
+def lobatto_analysis(degree: int) -> FloatArray:
     """Return the matrix that turns values at the nodes into Chebyshev coefficients."""
-    index = np.arange(DEGREE + 1)
-    ends = np.where((index == 0) | (index == DEGREE), 0.5, 1.0)
+    index = np.arange(degree + 1)
+    ends = np.where((index == 0) | (index == degree), 0.5, 1.0)
     # The nodes ascend, z_j = -cos(pi j/n), hence the sign (-1)^k.
-    cosines = np.cos(np.pi * np.outer(index, index) / DEGREE) * (-1.0) ** index[:, None]
-    return np.ascontiguousarray(2.0 / DEGREE * ends[:, None] * cosines * ends[None, :])
+    cosines = np.cos(np.pi * np.outer(index, index) / degree) * (-1.0) ** index[:, None]
+    return np.asarray(2.0 / degree * ends[:, None] * cosines * ends[None, :])
 
 
-def _integration(analysis: FloatArray) -> FloatArray:
+def lobatto_integration(degree: int) -> FloatArray:
     """Return the matrix that integrates from -1 to each node."""
-    integral = chebyshev.chebint(np.eye(DEGREE + 1), lbnd=-1.0, axis=0)
-    matrix = chebyshev.chebvander(NODES, DEGREE + 1) @ integral @ analysis
+    integral = chebyshev.chebint(np.eye(degree + 1), lbnd=-1.0, axis=0)
+    matrix = chebyshev.chebvander(lobatto_nodes(degree), degree + 1) @ integral
     matrix[0] = 0.0
-    return np.ascontiguousarray(matrix)
+    return np.asarray(matrix @ lobatto_analysis(degree))
 
 
 def powers_of_chebyshev(count: int) -> FloatArray:
@@ -59,10 +61,9 @@ def gauss_analysis(count: int) -> FloatArray:
     return np.ascontiguousarray(matrix)
 
 
-ANALYSIS: FloatArray = _analysis()
-INTEGRATION: FloatArray = _integration(ANALYSIS)
+NODES: FloatArray = lobatto_nodes(DEGREE)
 # Transposed, so that a product runs along contiguous columns.
-ANALYSIS_T: FloatArray = np.ascontiguousarray(ANALYSIS.T)
-INTEGRATION_T: FloatArray = np.ascontiguousarray(INTEGRATION.T)
-POWERS_T: FloatArray = np.ascontiguousarray(ANALYSIS.T @ powers_of_chebyshev(DEGREE + 1))
+ANALYSIS_T: FloatArray = np.ascontiguousarray(lobatto_analysis(DEGREE).T)
+INTEGRATION_T: FloatArray = np.ascontiguousarray(lobatto_integration(DEGREE).T)
+POWERS_T: FloatArray = np.ascontiguousarray(ANALYSIS_T @ powers_of_chebyshev(DEGREE + 1))
 """Values at the nodes to the coefficients of 1, z, ..., z^16 (transposed)."""

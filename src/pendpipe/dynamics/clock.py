@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.chebyshev import lobatto_integration, lobatto_nodes
 
 
 @dataclass(frozen=True)
@@ -70,17 +71,10 @@ def _phases(count: int, order: int) -> tuple[FloatArray, FloatArray, FloatArray,
 @lru_cache
 def _nodes(order: int) -> FloatArray:
     """Chebyshev-Lobatto points on [0, 1]."""
-    return np.asarray(0.5 - 0.5 * np.cos(math.pi * np.arange(order + 1) / order))
+    return np.asarray(0.5 + 0.5 * lobatto_nodes(order))
 
 
 @lru_cache
 def _integration(order: int) -> FloatArray:
     """The matrix that integrates from the first node to each, over a half turn."""
-    # The polynomial through the values is integrated exactly; Chebyshev's basis keeps the
-    # matrix well conditioned.
-    from numpy.polynomial import chebyshev
-
-    z = 2.0 * _nodes(order) - 1.0
-    analysis = np.linalg.inv(chebyshev.chebvander(z, order))
-    integrals = np.stack([chebyshev.chebint(column, lbnd=-1.0) for column in analysis.T], axis=1)
-    return np.asarray(0.5 * math.pi * chebyshev.chebvander(z, order + 1) @ integrals)
+    return np.asarray(0.5 * math.pi * lobatto_integration(order))

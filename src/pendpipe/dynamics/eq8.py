@@ -88,7 +88,9 @@ def turning_points(
     if not end_s >= release.time_s:
         message = f"until_s is {end_s}, before the release at {release.time_s}"
         raise ValueError(message)
-    room = 1024 if math.isinf(end_s) else _half_cycles(model, release, end_s) + 16
+    # Damping makes the half cycles fewer.
+    half_cycles = (end_s - release.time_s) * model.angular_frequency / math.pi
+    room = 1024 if math.isinf(end_s) else math.ceil(half_cycles) + 16
     while True:
         turning = np.empty((2, min(most, room)))
         found, stopped = _run(model, release, most=min(most, room), until_s=end_s, turning=turning)
@@ -97,11 +99,6 @@ def turning_points(
         room *= 4
     time_s, angle_rad = turning[0, :found], turning[1, :found]
     return TurningPoints(time_s, angle_rad, stopped, float(angle_rad[-1]) if stopped else math.nan)
-
-
-def _half_cycles(model: Eq8, release: Release, until_s: float) -> int:
-    """Return about how many half cycles there are until a time; damping makes them fewer."""
-    return max(0, math.ceil((until_s - release.time_s) * model.angular_frequency / math.pi))
 
 
 def turning_points_with_jacobian(

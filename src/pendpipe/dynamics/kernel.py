@@ -144,8 +144,9 @@ class Kernel:
         """Compile, and keep the machine code."""
         from pendpipe.dynamics import machine_code, numba_side
 
-        with _progress(self.__name__, len(self.parts())):
-            made = numba_side.compiled(self)
+        if sys.stderr.isatty():
+            print(f"compiling, once: {self.__name__} (march: half a minute)", file=sys.stderr)
+        made = numba_side.compiled(self)
         for folder in folders():
             try:
                 machine_code.keep(folder / name, made.inspect_llvm(), made.native_name)
@@ -235,35 +236,3 @@ def shipped_name(name: str) -> str:
     """Return the name of the code for many machines that belongs to one for this machine."""
     stem, _, sources = name.rsplit("-", 2)
     return f"{stem}-{sources}"
-
-
-@contextlib.contextmanager
-def _progress(name: str, functions: int) -> Iterator[None]:
-    """Show on a terminal how far the compiler is; elsewhere nothing."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from numba.core import event
-
-    register: Any = event.register
-    unregister: Any = event.unregister
-
-    class Listener(event.Listener):
-        done = 0
-
-        def on_start(self, event: Any) -> None:
-            pass
-
-        def on_end(self, event: Any) -> None:  # noqa: ARG002
-            self.done += 1
-            part = min(self.done / functions, 1.0)
-            bar = ("#" * round(20 * part)).ljust(20)
-            print(f"\rcompiling, once: [{bar}] {name}", end="", file=sys.stderr, flush=True)
-
-    listener = Listener()
-    register("numba:compile", listener)
-    try:
-        yield
-    finally:
-        unregister("numba:compile", listener)
-        print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)

@@ -11,7 +11,8 @@ from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.kernel import kernel
 
 _CHANCE: Final = 5.0
 _COARSE: Final = 12.0
@@ -59,11 +60,22 @@ def _slow(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: fl
     readings = np.diff(edges)
     if len(middles) < 10 or readings.min() < 3:
         return 1.0
-    inside, starts = slice(edges[0], edges[-1]), edges[:-1] - edges[0]
-    since = time[inside] - np.repeat(middles[:-1], readings)
-    share = since / np.repeat(np.diff(middles), readings)
-    parabola = share * (1.0 - share)
-    product = np.add.reduceat(residual[inside] * parabola, starts)
-    square = np.add.reduceat(parabola**2, starts)
-    ratio = float(np.mean(product**2 / square)) / rms**2
-    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(square)) else 1.0
+    ratio = _mean_square(middles, edges, time, residual) / rms**2
+    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(readings)) else 1.0
+
+
+@kernel(any_order=True)
+def _mean_square(
+    middles: FloatArray, edges: IntArray, time_s: FloatArray, residual: FloatArray
+) -> float:
+    """Return the mean square of the half cycles' residual amplitudes; see `_slow`."""
+    total = 0.0
+    for k in range(middles.size - 1):
+        inverse, product, square = 1.0 / (middles[k + 1] - middles[k]), 0.0, 0.0
+        for i in range(edges[k], edges[k + 1]):
+            share = (time_s[i] - middles[k]) * inverse
+            parabola = share * (1.0 - share)
+            product += residual[i] * parabola
+            square += parabola * parabola
+        total += product * product / square
+    return total / (middles.size - 1)

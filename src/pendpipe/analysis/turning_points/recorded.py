@@ -9,7 +9,7 @@ from typing import Any
 
 from pendpipe.analysis.free_decay import find_free_decay
 from pendpipe.analysis.turning_points.find import find_turning_points
-from pendpipe.analysis.turning_points.table import Cut, TurningPoints
+from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.recording import Recording
 
 
@@ -36,7 +36,6 @@ def measure_recording(
     part = decay.of(recording)
     points = find_turning_points(part, place)
     notes = (*decay.notes, *points.notes)
-    cuts = tuple(Cut(cut.start_s, cut.stop_s, cut.reason) for cut in decay.cuts)
     metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}
     metadata = {**points.metadata, **metadata}
-    return replace(points, cuts=cuts, metadata=metadata, notes=notes), part
+    return replace(points, cuts=tuple(decay.cuts), metadata=metadata, notes=notes), part
