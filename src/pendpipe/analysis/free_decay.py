@@ -16,9 +16,10 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from pendpipe.analysis._decay_runs import Run, best_runs
-from pendpipe.analysis._stretches import Cut, stretches
+from pendpipe.analysis._stretches import stretches
 from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.turning_points.table import Cut
 from pendpipe.analysis.two_modes import BEAT, two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError
