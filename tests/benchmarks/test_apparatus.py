@@ -151,10 +151,14 @@ def test_an_effect_is_absent_at_size_nought_and_changes_the_reading_otherwise(na
 def test_a_row_is_written_where_the_count_changes() -> None:
     there = scene(step=5e-3, event_driven=True)
     columns = _events(np.random.default_rng(1), there, [])
-    y, _ = there.reading([], time_s=columns["time_s"])
+    y, seen = there.reading([], time_s=columns["time_s"])
     assert set(np.abs(np.round(np.diff(columns["angle_rad"]) / 5e-3))) <= {0.0, 1.0}
-    # The count says where the angle is to a count and the scatter of its edges.
-    assert np.ptp(columns["angle_rad"] - y) < 2.5 * 5e-3
+    # An edge that is passed upwards gives the count above it, and downwards the count below.
+    ahead = (columns["angle_rad"] - y) / 5e-3
+    fast = np.abs(seen.v) > 0.3 * there.omega * np.abs(seen.turn)
+    upwards, downwards = (ahead[fast & (side * seen.v > 0)] for side in (1, -1))
+    assert upwards.mean() - downwards.mean() == pytest.approx(1.0, abs=0.05)
+    assert max(upwards.std(), downwards.std()) < 0.1
 
 
 def test_an_item_is_a_function_of_its_set_and_its_number(tmp_path) -> None:
