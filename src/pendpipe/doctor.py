@@ -125,8 +125,16 @@ def _undecoded(raw: Path) -> Iterator[Finding]:
     table = raw.parent.parent / "recording.csv" if in_campaign else raw.with_suffix(".csv")
     if table.is_file() and not table.read_bytes().startswith(b"# refused:"):
         return
-    safe = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
-    yield Finding("raw", str(raw), f"there is no {table.name} of it", f"{safe} makes it")
+    from pendpipe.acquisition.attempts import read_attempts
+
+    call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
+    problem, safe = f"there is no {table.name} of it", f"{call} makes it"
+    try:
+        if not read_attempts([raw]):
+            problem, safe = "it holds no scan", "delete it"
+    except InputError as fault:
+        problem, safe = fault.problem, fault.remedy
+    yield Finding("raw", str(raw), problem, safe)
 
 
 def _of_snakemake(folder: Path) -> Iterator[Finding]:

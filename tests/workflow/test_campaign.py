@@ -130,6 +130,16 @@ def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
     assert "Nothing to be done" in campaign.snakemake("-n")
 
 
+def test_a_lost_result_is_made_again(campaign: Campaign) -> None:
+    """Even one that no job to be run declares: Snakemake alone would not miss it."""
+    path = campaign.results / "air-07/calibration.json"
+    path.rename(path.with_name("lost"))
+    try:
+        assert campaign.planned()["calibrate"] == 1
+    finally:
+        path.with_name("lost").rename(path)
+
+
 def test_forcing_the_fit_reruns_it_and_what_follows(campaign: Campaign) -> None:
     planned = campaign.planned("--forcerun", "fit")
     records = len(campaign.records.read_text(encoding="utf-8").splitlines()) - 1

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from benchmarks.acquisition_live import recorded_bytes
 
 from pendpipe import manifest
+from pendpipe.acquisition.raw import lock
 from pendpipe.cli import main
 from pendpipe.doctor import examine
 from pendpipe.files import sha256, write_json
@@ -100,6 +102,26 @@ def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) ->
     assert main(["doctor", str(results), "--json"]) == 0
     findings = json.loads(capsys.readouterr().out)["findings"]
     assert {"kind", "path", "problem", "safe"} == set(findings[0])
+
+
+def test_a_raw_file_is_decoded_left_alone_or_deleted(
+    results: Path,
+) -> None:
+    """What is safe depends on whether it holds a scan, and on whether it still grows."""
+    pytest.importorskip("fcntl", reason="this system has no such lock")
+    raw = results / "decay.raw"
+
+    def advice() -> str:
+        (found,) = (each for each in examine(results) if each.kind == "raw")
+        return str(found)
+
+    raw.write_bytes(recorded_bytes("di2108"))
+    assert f"pendpipe acquire --recover {raw}" in advice()
+    with raw.open("ab") as stream:
+        lock(stream)
+        assert "wait for its end" in advice()
+    raw.write_bytes(raw.read_bytes().partition(b"\n")[0] + b"\n")
+    assert "it holds no scan; delete it" in advice()
 
 
 def test_a_lock_is_named_before_there_are_results(
