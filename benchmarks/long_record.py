@@ -68,30 +68,29 @@ def sum_up(values: FloatArray) -> None:
 
 
 def contend(name: str, samples: int) -> None:
-    """In a process of its own: print CPU and wall time of some calls, s."""
+    """In a process of its own: print the CPU time of some calls, s."""
     whole = record(samples)
     small = Samples(whole.time_s[:_SMALL], whole.values[:_SMALL], "rad", None, NOISE)
     run = {
         "ours": lambda part: turning_points_of(part),
-        "ours on all cores": lambda part: turning_points_of(part),
         "pieces": lambda part: peaks_in_pieces(part.values),
         "whole": lambda part: peaks_of_the_whole(part.values),
         "sum": lambda part: sum_up(part.values),
     }[name]
-    if name != "ours on all cores" and hasattr(os, "sched_setaffinity"):
+    if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     run(small)  # libraries are loaded
     times = []
     for _ in range(CALLS):
-        cpu, wall = time.process_time(), time.perf_counter()
+        before = time.process_time()
         run(whole)
-        times.append((time.process_time() - cpu, time.perf_counter() - wall))
+        times.append(time.process_time() - before)
     print(json.dumps(times))
 
 
 def measured(samples: int) -> dict[str, FloatArray]:
-    """Times of the contenders, which take turns: shape (processes, calls, 2) each."""
-    names = ("ours", "pieces", "whole", "ours on all cores", "sum")
+    """Times of the contenders, which take turns: shape (processes, calls) each."""
+    names = ("ours", "pieces", "whole", "sum")
     found: dict[str, list[object]] = {name: [] for name in names}
     for _ in range(PROCESSES):
         for name in names:
@@ -122,8 +121,8 @@ def spread(times: FloatArray) -> str:
 def rows(samples: int = SAMPLES) -> list[Row]:
     """Measure everything."""
     times = measured(samples)
-    first = {name: each[:, 0, 0] for name, each in times.items()}
-    later = {name: each[:, 1:, 0] for name, each in times.items()}
+    first = {name: each[:, 0] for name, each in times.items()}
+    later = {name: each[:, 1:] for name, each in times.items()}
     middle = {name: float(np.median(each)) for name, each in later.items()}
     once = {name: float(np.median(each)) for name, each in first.items()}
     whole = record(samples)
@@ -135,7 +134,6 @@ def rows(samples: int = SAMPLES) -> list[Row]:
     number = np.round((points.time_s / INTERVAL_S * RATE + 0.3) / math.pi)
     turning = (number * math.pi - 0.3) / RATE
     error = points.amplitude_rad - AMPLITUDE * np.exp(-turning / samples)
-    wall = float(np.median(times["ours on all cores"][:, 1:, 1]))
     shown = f"{PROCESSES} processes, {CALLS} calls in each; one core; CPU time, median (range)"
     return [
         Row(f"{samples:.0e} readings, {len(points)} turning points", shown),
@@ -152,7 +150,6 @@ def rows(samples: int = SAMPLES) -> list[Row]:
             f"{spread(first['whole'])}; {spread(later['whole'])}",
         ),
         Row("`np.sum` of the readings, the later calls: the floor", spread(later["sum"])),
-        Row("ours on all cores, the later calls, wall time", f"{wall:.3f} s"),
         at_least("over `find_peaks` in pieces, first call", once["pieces"] / once["ours"], 6.0),
         at_least("the same, later calls", middle["pieces"] / middle["ours"], 6.0),
         at_least(

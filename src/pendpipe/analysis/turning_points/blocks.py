@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Final
 
@@ -23,7 +21,6 @@ BLOCK: Final = 1 << 21
 """Readings in a piece; its working memory is some MB."""
 _OVERLAP: Final = 3.0
 """Half cycles that neighbouring pieces share, so that none is cut in two."""
-_CORES: Final = 4
 _PIECEWISE: Final = "a long record: the level is one number within a piece only"
 _PLAIN: Final = 1.03
 _LARGEST: Final = 0.2
@@ -68,76 +65,51 @@ def in_blocks(
 def _tracked(
     samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int
 ) -> TurningPoints | None:
-    """Follow a plain, evenly sampled record in one pass; None if it isn't one.
-
-    Every core takes a part of the record; all write into one table.
-    """
+    """Follow a plain, evenly sampled record in one pass; None if it isn't one."""
     interval = even_interval(samples.time_s)
-    if interval is None:
+    head = None if interval is None else _start(samples, measure_block, block // 64)
+    if interval is None or head is None:
         return None
-    cores = min(_cores(), _CORES, max(1, len(samples) // (2 * block)))
-    starts = [len(samples) * k // cores for k in range(cores)]
-    heads = [_start(samples, start, measure_block, block // 64) for start in starts]
-    known = [head for head in heads if head is not None]
-    if len(known) < cores:
-        return None
-    half_period = 0.5 / known[0].apparent_frequency_hz
-    overlap = int(8.0 * half_period / interval)
-    room = int(1.02 * len(samples) * interval / half_period / cores) + 64
-    columns = np.empty((5, cores * room))
-
-    def follow(k: int) -> tuple[int, float, float]:
-        head, start = known[k], starts[k]
-        stop = (*starts, len(samples))[k + 1] + overlap
-        begin = [
-            float(samples.time_s[start]), interval, float(head.time_s[1]),
-            0.5 / head.apparent_frequency_hz, float(head.side[1]), float(head.level_rad[0]),
-            known[0].noise_rms_rad, *_rates(head),
-        ]  # fmt: skip
-        return track(samples.values[start:stop], np.array(begin), columns, k * room, room)
-
-    with ThreadPoolExecutor(cores) as pool:
-        parts = list(pool.map(follow, range(cores)))
-    count = _closed_up(columns, room, [part[0] for part in parts], half_period)
+    half_period = 0.5 / head.apparent_frequency_hz
+    columns = np.empty((5, int(1.02 * len(samples) * interval / half_period) + 64))
+    begin = [
+        float(samples.time_s[0]),
+        interval,
+        float(head.time_s[1]),
+        half_period,
+        float(head.side[1]),
+        float(head.level_rad[0]),
+        head.noise_rms_rad,
+        *_rates(head),
+    ]
+    count, square, freedom = track(samples.values, np.array(begin), columns)
     if count < 16:
         return None
-    square, freedom = (sum(part[j] for part in parts) for j in (1, 2))
     noise = max(float(np.sqrt(square / freedom)), quantisation_rms(samples.step))
-    for row in (1, 3):
-        columns[row, :count] *= noise / known[0].noise_rms_rad
+    columns[[1, 3], :count] *= noise / head.noise_rms_rad
     time, time_sd, angle, angle_sd, level = columns[:, :count]
     # A half cycle alone tells 0.19 of what its readings would say of a level alone.
     told = 0.19 * half_period / interval * min(LEVEL_BLOCK, count)
     return replace(
-        known[0], half_cycle=np.arange(count), time_s=time, time_sd_s=time_sd, angle_rad=angle,
-        angle_sd_rad=angle_sd, level_rad=level, level_sd_rad=noise / math.sqrt(told),
+        head,
+        half_cycle=np.arange(count),
+        time_s=time,
+        time_sd_s=time_sd,
+        angle_rad=angle,
+        angle_sd_rad=angle_sd,
+        level_rad=level,
+        level_sd_rad=noise / math.sqrt(told),
         noise_rms_rad=noise,
-    )  # fmt: skip
-
-
-def _cores() -> int:
-    """How many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    )
 
 
 def _start(
-    samples: Samples,
-    start: int,
-    measure_block: Callable[[Samples], TurningPoints],
-    length: int,
+    samples: Samples, measure_block: Callable[[Samples], TurningPoints], length: int
 ) -> TurningPoints | None:
-    """The turning points from which a part is followed; None if it isn't plain there."""
-    head = slice(start, start + length)
-    try:
-        first = measure_block(
-            replace(samples, time_s=samples.time_s[head], values=samples.values[head])
-        )
-    except NotAnalysableError:
-        if start == 0:
-            raise
-        return None
+    """The turning points from which a record is followed; None if it isn't plain there."""
+    first = measure_block(
+        replace(samples, time_s=samples.time_s[:length], values=samples.values[:length])
+    )
     plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
     amplitude = float(first.amplitude_rad[0])
     if not plain or amplitude > _LARGEST or len(first) < 16:
@@ -148,27 +120,6 @@ def _start(
 
 def _rates(points: TurningPoints) -> LossRates:
     return loss_rates(points.time_s, points.amplitude_rad, points.angle_sd_rad)
-
-
-def _closed_up(columns: FloatArray, room: int, counts: list[int], half_period: float) -> int:
-    """Move the parts together, without what they share; return how many there are in all.
-
-    Where a part ends early (its lock is lost), the table ends.
-    """
-    total = counts[0]
-    for k in range(1, len(counts)):
-        part = columns[:, k * room : k * room + counts[k]]
-        last_s, side = columns[0, total - 1], math.copysign(1.0, columns[2, total - 1])
-        skip = int(np.searchsorted(part[0], last_s + 0.5 * half_period))
-        if skip == counts[k] or abs(part[0, skip] - last_s - half_period) > 0.2 * half_period:
-            break
-        if part[2, skip] * side > 0.0:
-            break
-        added = counts[k] - skip
-        for row in range(len(columns)):
-            columns[row, total : total + added] = part[row, skip:].copy()
-        total += added
-    return total
 
 
 def even_interval(time_s: FloatArray) -> float | None:

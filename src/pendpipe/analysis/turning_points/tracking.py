@@ -123,9 +123,7 @@ def _fill_tables(reach: int, step: float, tables: Matrix) -> tuple[float, float,
     return flat, even, odd
 
 
-def track(
-    values: FloatArray, start: FloatArray, columns: Matrix, first: int, room: int
-) -> tuple[int, float, float]:
+def track(values: FloatArray, start: FloatArray, columns: Matrix) -> tuple[int, float, float]:
     """Fit half cycle after half cycle of evenly spaced readings, each placed by those before it.
 
     Parameters
@@ -137,9 +135,8 @@ def track(
         level) and level of the first half cycle; rms of one reading; a, b, c of Eq. 13, so
         small that they shift times only (see `shape.py`).
     columns
-        To be filled from column `first` on, `room` columns at most: time, its sd, signed
-        angle, its sd, level; shape (5, n). The level is estimated anew every
-        `LEVEL_BLOCK` half cycles.
+        To be filled: time, its sd, signed angle, its sd, level; shape (5, n). The level is
+        estimated anew every `LEVEL_BLOCK` half cycles.
 
     Returns
     -------
@@ -151,7 +148,7 @@ def track(
     result = np.empty(2)
     tables = np.empty((3, int(1.5 * start[3] / start[1]) + 2 * _LANES))
     values = np.ascontiguousarray(values, dtype=np.float64)
-    count = _track(values, start, columns, first, room, result, np.empty((3, _BATCH)), tables)
+    count = _track(values, start, columns, result, np.empty((3, _BATCH)), tables)
     return count, float(result[0]), float(result[1])
 
 
@@ -160,8 +157,6 @@ def _track(
     values: FloatArray,
     start: FloatArray,
     table: Matrix,
-    first: int,
-    room: int,
     result: FloatArray,
     found: Matrix,
     tables: Matrix,
@@ -169,7 +164,7 @@ def _track(
     """Do what `track` does; the loop ends if the half period outgrows its `tables`."""
     start_s, interval_s, centre_s, half_period_s = start[0], start[1], start[2], start[3]
     side, level, noise, rates = start[4], start[5], start[6], start[7:10]
-    end, count, residual, freedom = first + room, first, 0.0, 0.0
+    end, count, residual, freedom = table.shape[1], 0, 0.0, 0.0
     period, locked = half_period_s, True
     while locked and count < end:
         w = math.pi / half_period_s
@@ -194,7 +189,7 @@ def _track(
                 min(_BATCH, end - count),
                 found,
             )
-            if size > 0 and (count - first) % _SAMPLED == 0:
+            if size > 0 and count % _SAMPLED == 0:
                 lo = math.floor(at + 0.5) - reach
                 residual += _squares(values[lo : lo + number], level)
                 # About the reading, where cosine and sine are orthogonal: turned back.
@@ -233,4 +228,4 @@ def _track(
                 table[4, k] = level
         half_period_s = period
     result[0], result[1] = residual, freedom
-    return count - first
+    return count
