@@ -37,6 +37,8 @@ from pendpipe.dynamics import turning_points_with_jacobian
 _GROWTH: Final = 1.6
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
+_TOLERANCE: Final = 1e-2
+"""Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
 _FEW: Final = 12
 """Turning points from which a window grows."""
@@ -188,7 +190,7 @@ def _fit(
             value,
             waveform.BOUNDS,
             held=held,
-            chi2_only=problem.chi2,
+            tolerance=_TOLERANCE,
             predict_remaining=problem.predict_remaining,
         )
         if used >= len(points):
@@ -217,7 +219,7 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
         noise = best_noise(problem.residual(value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
         minimum = minimise(
-            problem.evaluate, value, waveform.BOUNDS, held=fitted.held, chi2_only=problem.chi2
+            problem.evaluate, value, waveform.BOUNDS, held=fitted.held, tolerance=_TOLERANCE
         )
         if not math.isfinite(minimum.quadratic.chi2):
             return fitted

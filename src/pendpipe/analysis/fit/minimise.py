@@ -15,8 +15,6 @@ from pendpipe.analysis.fit.quadratic import Bounds, bounded_step
 from pendpipe.arrays import FloatArray
 
 _DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
-_SMALL: Final = 1e4
-_KEPT: Final = 1e-3
 _PREDICTED: Final = 1e-2
 """Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
 
@@ -49,7 +47,6 @@ def minimise(
     *,
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
-    chi2_only: Callable[[FloatArray], float] | None = None,
     predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
     most: int = 60,
 ) -> Minimum:
@@ -66,10 +63,6 @@ def minimise(
     tolerance
         The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
         standard deviations. That step is still accepted, unverified.
-    chi2_only
-        chi^2 at a point, where that costs less. A step that lowers chi^2 by 1 +- e times
-        what it promised is itself off by about e, and leaves e^2 of that to be gained: if
-        this is below 1e-3 (0.03 standard deviations), it needs no new derivatives.
     predict_remaining
         What a step leaves to be gained, from its two ends, the quadratic at the first and
         what that promises. Below 1e-2 the step is accepted unverified.
@@ -90,17 +83,12 @@ def minimise(
                 bounds.clip(value + step), _moved(now, step), True, spent, value, promised
             )
         trial = bounds.clip(value + step)
-        near = level == 0 and promised < _SMALL
         if (
             predict_remaining is not None
-            and near
+            and level == 0
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
             return Minimum(trial, _moved(now, step), True, spent, value, promised)
-        if chi2_only is not None and near:
-            reached = now.chi2 - chi2_only(trial)
-            if (reached - promised) ** 2 < _KEPT * promised:
-                return Minimum(trial, _moved(now, step), True, spent, trial)
         then = evaluate(trial)
         spent += 1
         if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:

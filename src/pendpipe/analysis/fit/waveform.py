@@ -28,7 +28,8 @@ PRIOR_INVERSE: Final = 12.0
 """Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
 _SLIGHT: Final = 0.1
 """Of chi^2 in a half cycle: a smaller misfit is not seen in the noise."""
-_STEPS: Final = 12
+_ENDS: Final = 10.0
+"""By which the square of a phase's change is greater at the record's end than its mean."""
 
 
 @dataclass(frozen=True)
@@ -97,25 +98,19 @@ class Waveform:
     ) -> float:
         """Predict what chi^2 a Gauss-Newton step leaves to be gained (too high rather than low).
 
-        The model is as linear as the motion stays what it was: where its phase or its
-        amplitude change by a part e, the step is wrong by about e of itself. And b's share
-        lengthens the period by 0.4 (b/omega)^2 times the square of its change, which the
-        linear model does not know. Infinite where the residuals from which the step begins
-        would not do for those at its end.
+        The model is as linear as the motion stays what it was: where the step changes it by a part
+        e, rms, it is wrong by about e of itself. And b's share lengthens the period by
+        0.4 (b/omega)^2 times the square of its change, which the linear model does not know.
+        Infinite where the residuals from which the step begins would not do for those at its end.
         """
-        first, last = float(self.time_s[0]), float(self.time_s[-1])
         omega, b = float(trial[OMEGA]), float(trial[B])
-        half_cycles = omega * (last - first) / np.pi
-        ends = [_amplitude_at(each, last) for each in (value, trial)]
-        if self.step != 0.0 or promised > _SLIGHT * half_cycles or not min(ends) > 0.0:
+        half_cycles = omega * float(self.time_s[-1] - self.time_s[0]) / np.pi
+        if self.step != 0.0 or promised > _SLIGHT * half_cycles:
             return np.inf
-        begun = [abs(float(each[ANGLE])) for each in (value, trial)]
-        change = max(abs(one - other) / other for one, other in (ends, begun))
-        for time in (first, last):
-            early, late = (float(each[OMEGA] * (time - each[TIME])) for each in (value, trial))
-            change = max(change, abs(late - early))
+        signal = len(self.values) * float(np.var(self.values)) / self.noise_rms**2
         slower = 0.4 * b**2 / omega * float(trial[SHARE] - value[SHARE]) ** 2
-        return change**2 * promised + float(quadratic.normal[OMEGA, OMEGA]) * slower**2
+        at_ends = _ENDS * promised**2 / signal
+        return at_ends + float(quadratic.normal[OMEGA, OMEGA]) * slower**2
 
     def _weighed(self, residual: FloatArray) -> tuple[float, FloatArray, FloatArray | float]:
         """chi^2 (or -2 ln likelihood), its slope by the model, and the readings' weights."""
@@ -185,13 +180,3 @@ class Waveform:
         likelihood.gradient[SHARE] -= PRIOR_INVERSE * off
         likelihood.normal[SHARE, SHARE] += PRIOR_INVERSE
         return likelihood._replace(chi2=likelihood.chi2 + PRIOR_INVERSE * off**2)
-
-
-def _amplitude_at(value: FloatArray, time_s: float) -> float:
-    """Amplitude by Eq. 13 in a few steps: to some per cent, and its changes likewise."""
-    a, b, c, y = (float(value[index]) for index in (A, B, C, ANGLE))
-    y, step = abs(y), (time_s - float(value[TIME])) / _STEPS
-    for _ in range(_STEPS):
-        middle = y - 0.5 * step * ((a * y + b) * y + c)
-        y -= step * ((a * middle + b) * middle + c)
-    return y
