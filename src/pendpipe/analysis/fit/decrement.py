@@ -29,8 +29,9 @@ _FEWEST: Final = 5
 """Turning points of a window: a parabola, the level's error, and one to judge the scatter."""
 _FALL: Final = 0.4
 """Of ln amplitude in a window; beyond, a parabola does not follow Coulomb's straight line."""
-_STEEP: Final = 1.0
-"""The same over the fewest turning points: nearer to the stop no decrement can be seen."""
+_STEEP: Final = 0.5
+"""The same over the fewest turning points: of Coulomb's straight line they show 2 % too little, and
+ever less nearer to the stop."""
 _SEEN: Final = 8.0
 """Standard deviations that a turning point must stand out."""
 _STEPS: Final = 4.0
