@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.acquisition.timebase import measure_rate
+from pendpipe.acquisition.timebase import find_clock_losses, measure_rate
 
 
 @given(
@@ -66,3 +66,17 @@ def test_too_few_arrivals_measure_nothing() -> None:
     found = measure_rate(scans / 100.0, scans, 90.0)
     assert np.isnan(found.measured_hz)
     assert found.rate_hz == 90.0
+
+
+@pytest.mark.parametrize("step_s", [0.02, 0.1])
+def test_a_clock_that_wanders_has_lost_nothing(step_s: float) -> None:
+    """Only a delay that stays, and that the usual steps do not explain, is a loss."""
+    scans = np.arange(10.0, 4000.0)
+    for seed in range(30):
+        steps = np.random.default_rng(seed).normal(0.0, step_s, len(scans) // 20 + 1)
+        arrival = scans / 100.0 + np.repeat(np.cumsum(steps), 20)[: len(scans)]
+        assert find_clock_losses(arrival, scans, 100.0)[0] == []
+    # A second without scans, and many times the usual step, is one.
+    arrival[2000:] += 50.0 * step_s + 1.0
+    (loss,) = find_clock_losses(arrival, scans, 100.0)[0]
+    assert abs(loss.first_arrival - 2000) <= 50

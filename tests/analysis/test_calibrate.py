@@ -226,3 +226,16 @@ def test_a_bad_table_is_one_line_and_status_2(
 def test_a_point_far_beyond_the_others_ends_in_no_traceback() -> None:
     points = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 1e12])
     assert calibrate(points, points).volts_per_radian.value == pytest.approx(1.0)
+
+
+def test_a_line_takes_two_of_the_points() -> None:
+    """Without errors given the scatter is that of n - 2: neither too small nor too large."""
+    angle = np.linspace(-0.2, 0.2, 5)
+    random, noise = np.random.default_rng(11), 2e-3
+    found = [calibrate(angle, 3.85 * angle + noise * random.standard_normal(5)) for _ in range(600)]
+    variance = np.mean([each.residual_sd_volts**2 for each in found])
+    # The mean of 600 chi^2 of 3 degrees of freedom is known to sqrt(2/3/600) = 3.3 %.
+    assert variance == pytest.approx(noise**2, rel=0.1)
+    slopes = np.array([each.volts_per_radian.value for each in found])
+    given = np.mean([each.volts_per_radian.sd**2 for each in found])
+    assert given == pytest.approx(slopes.var(), rel=0.2)

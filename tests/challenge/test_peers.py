@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks import peers_diagnosis as peers
 
+from benchmarks import peers_diagnosis as peers
 from pendpipe_challenge import peers as judges
 from pendpipe_challenge.answers import read_items
 from pendpipe_challenge.motion import Motion

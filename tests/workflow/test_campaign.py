@@ -104,6 +104,17 @@ def test_the_summary_has_the_contracts_keys(campaign: Campaign) -> None:
     assert all(names <= set(record) for record in summary["records"])
 
 
+def test_the_inertia_has_twice_the_relative_error_of_its_frequency(campaign: Campaign) -> None:
+    """I = K/(2 pi f)^2."""
+    comparison = json.loads((campaign.results / "comparison.json").read_text())
+    measured = [entry for entry in comparison["records"] if not entry["refused"]]
+    for entry in measured:
+        inertia, frequency = entry["moment_of_inertia_from_frequency"], entry["frequency"]
+        relative = frequency["sd"] / frequency["value"]
+        assert inertia["sd"] / inertia["value"] == pytest.approx(2.0 * relative)
+    assert measured
+
+
 def test_a_refused_record_is_told_of_and_stops_nobody(campaign: Campaign) -> None:
     refused = json.loads((campaign.results / "broken/refused.json").read_text())
     assert refused["record"] == "broken"

@@ -11,8 +11,10 @@ import pytest
 
 from pendpipe.configuration import document, jobs
 from pendpipe.configuration.load import load_campaign, read_configuration
-from pendpipe.configuration.records import COLUMNS, read_records
+from pendpipe.configuration.records import COLUMNS, Record, read_records
 from pendpipe.errors import InputError
+from pendpipe.stages.results import RecordResult
+from pendpipe.stages.separate import common_relative_sd
 
 ROOT = Path(__file__).parents[2]
 
@@ -160,6 +162,30 @@ def test_a_faulty_table_is_refused_with_its_line(
     with pytest.raises(InputError, match=r"records\.tsv") as caught:
         read_records(table(tmp_path, *rows, header=header))
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("stop_s", ["2.9", "3", "3.1"])
+def test_a_part_of_a_record_ends_after_it_has_begun(
+    content: dict[str, Any], tmp_path: Path, stop_s: str
+) -> None:
+    header = "record\tsource\tstart_s\tstop_s"
+    rows = table(tmp_path, f"x\tfile.csv\t3\t{stop_s}", header=header)
+    content = {"title": "one part", "records": str(rows)}
+    if stop_s == "3.1":
+        assert load_campaign(content, "here").record("x").stop_s == 3.1
+        return
+    with pytest.raises(InputError, match=r"record x: stop_s is not after start_s"):
+        load_campaign(content, "here")
+
+
+def test_records_share_the_relative_error_of_their_sensor() -> None:
+    """One caliper run, one error of the scale: no record averages it away."""
+    own = {"volts_per_radian": {"value": 2.0, "sd": 0.5}, "from": "the table of records"}
+    run = {"volts_per_radian": {"value": -3.85, "sd": 0.0077}, "from": "the caliper run"}
+    record = Record("x", "simulated")
+    results = [RecordResult(record, None, calibration) for calibration in (own, run, run)]
+    assert common_relative_sd(results) == pytest.approx(0.002)
+    assert common_relative_sd(results[:1]) == 0.0
 
 
 def test_the_jobs_get_numbers_where_the_command_line_gave_text(
