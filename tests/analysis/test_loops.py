@@ -16,8 +16,9 @@ from pendpipe.analysis.turning_points.loops import (
     find_extremes,
     smooth_times,
 )
+from pendpipe.analysis.turning_points.measure import _solved
 from pendpipe.analysis.turning_points.shape import HARMONICS
-from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums, solve_half_cycles
+from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums
 
 FIT = """
 import sys
@@ -94,7 +95,7 @@ def test_sums_and_solutions_are_those_of_least_squares(
         square,
         block,
     )
-    solution, _ = solved(gram, right)
+    solution, _ = _solved(gram, right, np.zeros(half_cycles))
     for k in range(half_cycles):
         used = slice(edges[k, 0], edges[k, 1], stride)
         phase = rate[k] * (time_s[used] - centre_s[k])
@@ -115,17 +116,8 @@ def test_sums_and_solutions_are_those_of_least_squares(
             np.testing.assert_allclose(solution[k, :, 0], expected, rtol=1e-4, atol=1e-4)
 
 
-def solved(gram: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the normal equations of each half cycle, without prior knowledge."""
-    count, size = len(gram), right.shape[1] - 1
-    solution, inverse = np.full((count, size, 2), np.nan), np.full((count, size, size), np.nan)
-    room = np.empty((size, size)), np.empty(size)
-    solve_half_cycles(gram, right, np.zeros(count), solution, inverse, *room)
-    return solution, inverse
-
-
 def test_a_half_cycle_without_readings_has_no_solution() -> None:
-    solution, inverse = solved(np.zeros((1, 3, 3)), np.zeros((1, 3)))
+    solution, inverse = _solved(np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros(1))
     assert np.isnan(solution).all()
     assert np.isnan(inverse).all()
 

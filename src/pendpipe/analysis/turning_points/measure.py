@@ -8,7 +8,7 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.shape import HARMONICS
-from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums, solve_half_cycles
+from pendpipe.analysis.turning_points.sums import BLOCK, ROWS, half_cycle_sums
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 _ONE_SIDED: Final = 0.3
@@ -129,8 +129,8 @@ def measure(
         Known before; it holds the phase of a half cycle of which only a side is there.
     """
     number = len(places.number)
-    size = 2 + free
-    gram, right = np.zeros((number, 1 + size, 1 + size)), np.zeros((number, 1 + size))
+    terms = 3 + free
+    gram, right = np.zeros((number, terms, terms)), np.zeros((number, terms))
     square = np.zeros(number)
     half_cycle_sums(
         samples.time_s,
@@ -153,9 +153,7 @@ def measure(
         known = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (known * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(one_sided, held, 0.0)
-    solution = np.full((number, size, 2), np.nan)
-    inverse = np.full((number, size, size), np.nan)
-    solve_half_cycles(gram, right, prior, solution, inverse, np.empty((size, size)), np.empty(size))
+    solution, inverse = _solved(gram, right, prior)
     flat = gram[:, 1:, 0]
     best = solution[:, :, 0]
     return Measured(
@@ -174,6 +172,38 @@ def measure(
         one_sided=one_sided,
         single=np.zeros(number, dtype=bool),
     )
+
+
+def _solved(
+    gram: FloatArray, right: FloatArray, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Solve each half cycle for amplitude, sine and harmonics at a given level.
+
+    Parameters
+    ----------
+    gram, right
+        From `half_cycle_sums`; row 0 is the level.
+    prior
+        Added to the sine's diagonal (an inverse variance about zero, over the noise's).
+
+    Returns
+    -------
+    solution
+        Shape (k, size, 2): for a level that is right, and minus the change per unit of level; NaN
+        for half cycles without readings.
+    inverse
+        Of the Gram matrix without the level, (k, size, size).
+    """
+    system = gram[:, 1:, 1:].copy()
+    diagonal = np.arange(system.shape[1])
+    # A hair of regularisation: few samples can't tell harmonics apart.
+    system[:, diagonal, diagonal] *= 1.0 + 1e-9
+    system[:, 1, 1] += prior + 1e-12
+    empty = gram[:, 0, 0] == 0.0
+    system[empty] = np.eye(system.shape[1])
+    inverse = np.linalg.inv(system)
+    inverse[empty] = np.nan
+    return inverse @ np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2), inverse
 
 
 def _peak(

@@ -1,10 +1,9 @@
-"""The sums over the readings of every half cycle, and the small systems they make."""
+"""The sums over the readings of every half cycle."""
 
 from __future__ import annotations
 
 import math
 
-from pendpipe.analysis.turning_points.loops import solve_in_place
 from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
@@ -152,54 +151,3 @@ def half_cycle_sums(
         for p in range(terms):
             for q in range(p):
                 gram[k, q, p] = gram[k, p, q]
-
-
-@kernel
-def solve_half_cycles(
-    gram: Stack,
-    right: Matrix,
-    prior: FloatArray,
-    solution: Stack,
-    inverse: Stack,
-    system: Matrix,
-    column: FloatArray,
-) -> None:
-    """Solve each half cycle for amplitude, sine and harmonics at a given level.
-
-    Parameters
-    ----------
-    gram, right
-        From `half_cycle_sums`; row 0 is the level.
-    prior
-        Added to the sine's diagonal (an inverse variance about zero, over the noise's).
-    solution
-        To be filled, but for half cycles without samples: shape (k, size, 2), for a level that
-        is right, and minus the change per unit of level.
-    inverse
-        Likewise: the inverse of the reduced Gram matrix, (k, size, size).
-    system, column
-        Room for a matrix and a column.
-    """
-    size = column.size
-    for k in range(prior.size):
-        if gram[k, 0, 0] == 0.0:
-            continue
-        for job in range(size + 2):
-            for p in range(size):
-                for q in range(size):
-                    system[p, q] = gram[k, 1 + p, 1 + q]
-                if job == 0:
-                    column[p] = right[k, 1 + p]
-                elif job == 1:
-                    column[p] = gram[k, 1 + p, 0]
-                else:
-                    column[p] = 1.0 if p == job - 2 else 0.0
-                # A hair of regularisation: few samples can't tell harmonics apart.
-                system[p, p] *= 1.0 + 1e-9
-            system[1, 1] += prior[k] + 1e-12
-            solve_in_place(system, column, size)
-            for p in range(size):
-                if job < 2:
-                    solution[k, p, job] = column[p]
-                else:
-                    inverse[k, p, job - 2] = column[p]
