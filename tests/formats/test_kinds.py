@@ -476,7 +476,7 @@ def test_phyphox_as_zip_and_as_workbook(tmp_path: Path) -> None:
         (b"<?xml version='1.0'?><svg/>", "a.svg", "no reader knows"),
         (b"<?xml version='1.0'?><cassylab><a>", "a.labx", "the XML is damaged"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600, "a.xls", "can't be read"),
-        (b"\x89HDF\r\n\x1a\n" + b"\0" * 600, "a.mat", "hdf5 file can't be read"),
+        (b"\x89HDF\r\n\x1a\n" + b"\0" * 600, "a.mat", "file of arrays can't be read"),
         (b"TDSm" + b"\0" * 600, "a.tdms", "a TDMS file of LabVIEW.*export it"),
     ],
 )

@@ -6,7 +6,6 @@ import io
 import re
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -40,7 +39,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         return _of_workbook(place, data, options)
     if not data.startswith(b"PK"):
         raise NotThisFormatError("the file is no zip archive")
-    with _one_line_errors(place), zipfile.ZipFile(io.BytesIO(data)) as archive:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = archive.infolist()
         whole = sum(part.file_size for part in parts)
         if whole > most_unpacked(len(data)):
@@ -51,19 +50,6 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     if any(name.startswith("xl/") for name in names):
         return _of_workbook(place, data, options)
     return _of_members(place, members, options)
-
-
-@contextmanager
-def _one_line_errors(place: Path) -> Iterator[None]:
-    """Whatever a damaged archive makes its readers raise becomes one clear line."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as fault:  # zipfile and openpyxl raise whatever they stumble on
-        raise InputError(
-            place, f"the archive can't be read ({str(fault)[:200]})", "save it again, or export CSV"
-        ) from None
 
 
 def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str, bytes]:
@@ -110,8 +96,7 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
 
 def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the sheet with most numbers as the text that it would export."""
-    with _one_line_errors(place):
-        sheets = dict(_old_sheets(data) if data.startswith(_OLD_EXCEL) else _sheets(data))
+    sheets = dict(_old_sheets(data) if data.startswith(_OLD_EXCEL) else _sheets(data))
     numbers = {
         title: sum(_is_number(cell) for row in rows for cell in row)
         for title, rows in sheets.items()

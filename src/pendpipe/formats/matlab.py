@@ -16,7 +16,6 @@ from math import prod
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.errors import InputError
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import NotThisFormatError, Table
 from pendpipe.formats.trees import table_of_tree
@@ -191,9 +190,10 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     NotThisFormatError
         When the file is none of MATLAB's, or of version 7.3 (which is HDF5).
     InputError
-        When it is damaged, or holds no numbers.
+        When it holds no numbers.
+    Exception
+        Whatever scipy's parser raises that stumbles on a damaged file.
     """
-    remedy = "save it again in MATLAB with save(..., '-v7')"
     form, names = "matlab-v5", None
     if not data.startswith(b"MATLAB 5.0") and data[126:128] not in (b"IM", b"MI"):
         form, names = "matlab-v4", _version_4(data)
@@ -201,20 +201,12 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
             raise NotThisFormatError("the file does not begin with 'MATLAB 5.0'")
     if b"MATLAB 7.3" in data[:128]:
         raise NotThisFormatError("version 7.3 is HDF5")
-    try:
-        names = names or sound_variables(data)
-    except DamagedError as fault:
-        raise InputError(place, f"the MATLAB file can't be read: {fault}", remedy) from None
+    names = names or sound_variables(data)
     from scipy.io import loadmat
 
     stream: Any = io.BytesIO(data)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            loaded = loadmat(stream, squeeze_me=True, variable_names=names)
-    except Exception as fault:  # scipy raises whatever its parser stumbles on
-        raise InputError(
-            place, f"the MATLAB file can't be read: {str(fault)[:200]}", remedy
-        ) from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        loaded = loadmat(stream, squeeze_me=True, variable_names=names)
     tree = {name: value for name, value in loaded.items() if not name.startswith("__")}
     return table_of_tree(place, tree, form, options)

@@ -40,6 +40,9 @@ _OTHERS: Final = (
 )
 """What some give that holds no table, or none that is read; by its first bytes."""
 
+_BY_LIBRARIES: Final = ("MATLAB file", "file of arrays", "zip archive")
+"""Of these a library takes the file apart, and raises whatever it stumbles on."""
+
 Reader = Callable[[Path, bytes, ReadOptions], Table]
 
 
@@ -54,10 +57,10 @@ def readers() -> Iterator[tuple[str, Reader]]:
     yield "WinDaq", windaq.read_table
     from pendpipe.formats import matlab
 
-    yield "MATLAB", matlab.read_table
+    yield "MATLAB file", matlab.read_table
     from pendpipe.formats import trees
 
-    yield "named arrays", trees.read_table
+    yield "file of arrays", trees.read_table
     from pendpipe.formats import archives
 
     yield "zip archive", archives.read_table
@@ -166,11 +169,21 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
         if data.startswith(mark):
             raise InputError(place, f"this is {what}", remedy)
     reason: NotThisFormatError | None = None
-    for _, reader in readers():
+    for name, reader in readers():
         try:
             return reader(place, data, options)
         except NotThisFormatError as fault:
             reason = fault
+        except InputError:
+            raise
+        except Exception as fault:
+            if name not in _BY_LIBRARIES:
+                raise
+            raise InputError(
+                place,
+                f"the {name} can't be read ({' '.join(str(fault).split())[:200]})",
+                "save it again, or export CSV",
+            ) from None
     # The last reader takes any text, and so it knows what is wrong.
     raise InputError(
         place,

@@ -454,8 +454,6 @@ def _checked(
             "repair it with the vendor's tool, or give another copy",
         )
     whole = available // unit * unit
-    from dataclasses import replace
-
     cause = "is still being written" if not header.data_bytes else "is cut short"
     note = f"the file {cause}: {whole // unit} whole scans are there (of {header.scans} promised)"
     left = available - whole

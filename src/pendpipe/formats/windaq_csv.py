@@ -16,7 +16,7 @@ from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
 from pendpipe.formats.text import decode, table_of_text
 from pendpipe.formats.words import unit_of
 
-_CLOCK_NAMES = ("date", "time stamp", "timestamp", "clock")
+_CLOCKS = ("time stamp", "timestamp", "clock")
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -44,26 +44,43 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     time = next((column for column in table.columns if column.number == 1), None)
     if time is None or time.fault is not None or not np.isfinite(time.values).all():
         return table
-    seconds, pauses = _with_pauses(_evened(time.values), names, rows)
-    events = _events(names, rows, seconds)
+    events, clock, date = (_cells(names, rows, words) for words in (("event",), _CLOCKS, ("date",)))
+    seconds, pauses = _with_pauses(_evened(time.values), events, clock)
     columns: list[Column] = []
     for column in table.columns:
         label = names[column.number - 1] if column.number <= len(names) else ""
-        if column is time or label.lower().startswith(_CLOCK_NAMES) or "event" in label.lower():
+        if (
+            column is time
+            or label.lower().startswith(("date", *_CLOCKS))
+            or "event" in label.lower()
+        ):
             continue
         place_of = len(columns) + 1
         unit = label if unit_of(label) else ""
         columns.append(
             replace(column, name=f"channel {place_of}", unit=unit or label, time_s=seconds)
         )
-    start = _recorded_at(names, rows)
+    metadata = dict(table.metadata)
+    if date and clock and date[0] and clock[0]:
+        metadata["recorded_at"] = f"{date[0]} {clock[0]}"
     return replace(
         table,
         columns=tuple(columns),
-        markers=events,
-        metadata={**table.metadata, **({"recorded_at": start} if start else {})},
+        markers=tuple(
+            Marker(row, float(seconds[row]), text) for row, text in enumerate(events) if text
+        ),
+        metadata=metadata,
         notes=(*table.notes, *pauses),
     )
+
+
+def _cells(names: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[str]) -> list[str]:
+    """Cells of the first column, but for Relative Time, whose name has one of the words."""
+    found = (i for i, name in enumerate(names) if i and any(word in name.lower() for word in words))
+    place = next(found, None)
+    if place is None:
+        return [""] * len(rows)
+    return [row[place] if place < len(row) else "" for row in rows]
 
 
 def _evened(time: FloatArray) -> FloatArray:
@@ -83,56 +100,17 @@ def _evened(time: FloatArray) -> FloatArray:
     return time
 
 
-def _column_of(names: Sequence[str], words: Sequence[str]) -> int | None:
-    found = (i for i, name in enumerate(names) if any(word in name.lower() for word in words))
-    return next(found, None)
-
-
-def _clock(names: Sequence[str], rows: Sequence[Sequence[str]]) -> FloatArray | None:
-    """Read the time-of-day column."""
-    place = _column_of(names[1:], ("time stamp", "timestamp", "clock"))
-    if place is None or any(len(row) <= place + 1 for row in rows):
-        return None
-    return column_of_clock_times([row[place + 1] for row in rows])
-
-
 def _with_pauses(
-    time: FloatArray, names: Sequence[str], rows: Sequence[Sequence[str]]
+    time: FloatArray, events: Sequence[str], clock: Sequence[str]
 ) -> tuple[FloatArray, list[str]]:
     """Put the pauses back at rows marked ``Resume``, from the clock column's seconds."""
-    place = _column_of(names, ("event",))
-    clock = _clock(names, rows) if place is not None else None
-    if place is None or clock is None:
-        return time, []
-    time = time.copy()
-    notes = []
-    for row in range(1, len(rows)):
-        cells = rows[row]
-        if len(cells) <= place or cells[place].lower() != "resume":
+    clock_s = column_of_clock_times(clock)
+    time, notes = time.copy(), []
+    for row, event in enumerate(events):
+        if row == 0 or clock_s is None or event.lower() != "resume":
             continue
-        missing = (clock[row] - clock[row - 1]) - (time[row] - time[row - 1])
+        missing = (clock_s[row] - clock_s[row - 1]) - (time[row] - time[row - 1])
         if missing > 1.0:
             time[row:] += missing
             notes.append(f"pause of {missing:.0f} s before row {row + 1}, by the clock column")
     return time, notes
-
-
-def _events(
-    names: Sequence[str], rows: Sequence[Sequence[str]], time: FloatArray
-) -> tuple[Marker, ...]:
-    place = _column_of(names, ("event",))
-    if place is None:
-        return ()
-    return tuple(
-        Marker(row, float(time[row]), cells[place])
-        for row, cells in enumerate(rows)
-        if len(cells) > place and cells[place]
-    )
-
-
-def _recorded_at(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    date = _column_of(names, ("date",))
-    clock = _column_of(names[1:], ("time stamp", "timestamp", "clock"))
-    if date is None or clock is None or not rows or len(rows[0]) <= max(date, clock + 1):
-        return ""
-    return f"{rows[0][date]} {rows[0][clock + 1]}"
