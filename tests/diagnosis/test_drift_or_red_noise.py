@@ -26,9 +26,9 @@ def named(readings: FloatArray, seed: int) -> set[str]:
 
 
 def test_weak_drifts_of_the_offset_in_white_noise_are_distinguished_from_red_noise() -> None:
-    """Delta chi^2 = (slope/sigma)^2 sum (t - mean t)^2 = 64; found in most of twelve."""
+    """Delta chi^2 = (slope/sigma)^2 sum (t - mean t)^2 = 196; found in most of twelve."""
     centred = TIME_S - TIME_S.mean()
-    slope = 8.0 * NOISE_RAD / np.sqrt(centred @ centred)
+    slope = 14.0 * NOISE_RAD / np.sqrt(centred @ centred)
     found = [bool(named(CLEAN + slope * centred, seed) & SLOW) for seed in range(12)]
     assert np.mean(found) > 0.5
 

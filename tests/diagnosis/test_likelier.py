@@ -110,9 +110,10 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     assert found.steps[0].winner.identifier == leads
 
 
-def test_the_likelier_of_two_curves_is_reported() -> None:
-    step, own, mates, _ = led(magnet(), "unnamed-measurement")
-    assert step.winner.identifier == "unnamed-restoring"
+def test_the_likelier_of_a_curve_and_a_name_is_reported() -> None:
+    named = magnet().search.steps[0].winner.identifier
+    step, own, mates, _ = led(magnet(), "unnamed-restoring")
+    assert step.winner.identifier == named != "unnamed-restoring"
     assert own > max(mates.values())
 
 

@@ -48,9 +48,12 @@ def pulled() -> FloatArray:
     return model.reading(np.append(TRUTH, [0.02, 0.04]))
 
 
-def test_a_magnet_is_a_restoring_torque_without_a_name() -> None:
+def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
+    """Friction of some other form leaves only noise as well: no name is sure."""
     found = diagnose_recording(recording(pulled(), 5)).diagnosis
-    assert [effect.identifier for effect in found.effects] == ["unnamed-restoring"]
+    (effect,) = found.effects
+    assert "unnamed-restoring" in {effect.identifier, *dict(effect.indistinguishable)}
+    assert effect.probability < 0.9
     assert found.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
 
 

@@ -14,7 +14,7 @@ from pendpipe.diagnosis.chance import DRAWS, FEW_DRAWS, Chance, Trials, draw_cha
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values
+from pendpipe.diagnosis.scores import Bank, build_bank
 from pendpipe.diagnosis.spectrum import Band, ToneScan, ToneScans, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
@@ -118,10 +118,10 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     smallest = 1.0
     scores = bank.scores(residual) if bank.candidates else np.zeros(0)
     if bank.candidates:
-        smallest = float(local_p_values(scores, bank.freedom).min())
+        smallest = float(bank.p_values(scores).min())
     tones = scanner.tones.scores(residual)
-    for scan in tones:
-        smallest = min(smallest, math.exp(-0.5 * float(scan.max())))
+    for scan, found in zip(scanner.tones.scans, tones, strict=True):
+        smallest = min(smallest, float(scan.p_values(found).min()))
     few = None if known is None else known.chance
     chance = few or draw_chance(bank, scanner.tones, seed, FEW_DRAWS)
     if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _CLEARLY_CHANCE:
@@ -141,11 +141,11 @@ def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
 
 def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[Lead]:
     leads = []
+    p_values = bank.p_values(scores)
     for name, rows in bank.rows().items():
-        index = rows[int(np.argmax(scores[rows]))]
+        index = min(rows, key=lambda row: (p_values[row], -scores[row]))
         candidate = bank.candidates[index]
-        score = float(scores[index])
-        local = float(local_p_values(np.array([score]), np.array([float(candidate.width)]))[0])
+        score, local = float(scores[index]), float(p_values[index])
         p_value = own[name].global_p_value(local) if name in own else local
         leads.append(Lead(candidate.effect, candidate.shape, score, p_value))
     return leads
@@ -159,12 +159,13 @@ def _tone_leads(scanner: Scanner, tones: Sequence[FloatArray]) -> list[Lead]:
         for scan, dying, scores in zip(
             scanner.tones.scans, (None, *_DECAY_TIMES), tones, strict=False
         ):
-            index = int(np.argmax(scores))
+            p_values = scan.p_values(scores)
+            index = int(np.argmin(p_values))
             score = float(scores[index])
             decay = math.inf if dying is None else dying * scanner.duration_s
             shape = effect.tone(float(scan.frequency_hz[index]), decay)
             if shape is not None:
-                local = Trials(0.5 * len(scores), 0.0).global_p_value(math.exp(-0.5 * score))
+                local = Trials(0.5 * len(scores), 0.0).global_p_value(float(p_values[index]))
                 found.append(Lead(effect, tuple(shape), score, local))
         leads += sorted(found, key=lambda lead: lead.p_value)[:1]
     return leads

@@ -6,17 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials
-from pendpipe.diagnosis.colour import REFERENCE_HZ
-from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.naming import refit_leads
-from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.state import State, settled
 from pendpipe.effects import Effect
 
@@ -56,10 +51,8 @@ def reconsider_red_noise(
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.held)
-    gained = _minus_twice_log_likelihood(
-        state.fit, state.data, state.noise
-    ) - _minus_twice_log_likelihood(extended, data, noise)
-    by_chance = math.exp(0.5 * min(_charge(state, rivals[0]) - gained, 0.0))
+    gained = state.fit.chi2 + state.noise.cost - extended.chi2 - noise.cost
+    by_chance = math.exp(0.5 * min(_charge(state, rivals) - gained, 0.0))
     if by_chance > share:
         return
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
@@ -71,31 +64,16 @@ def reconsider_red_noise(
     state.first = state.now if not state.steps else state.first
 
 
-def _charge(state: State, rival: Rival) -> float:
-    """Return the charge for the shapes that were tried and the precision of the size.
+def _charge(state: State, rivals: Sequence[Rival]) -> float:
+    """Return the charge for the effects and shapes that were tried, and for the fitted sizes.
 
-    chi^2 of one size exceeds g with a probability below exp(-g/2), so that an effect of one size
-    that acts throughout is charged for its shapes only. Red noise contains a step or a slow wave
-    at any instant or frequency: there the size, known to one part in g^(1/2), is charged too
-    (Laplace). Tones are scanned at every second cosine.
+    A size is known to one part in g^(1/2) of it, for a gain of g in chi^2 (Laplace). Tones are
+    scanned at every second cosine.
     """
     assert state.now is not None
-    effect, gain = rival.lead.effect, max(rival.gain, 1.0)
+    effect, gain = rivals[0].lead.effect, max(rivals[0].gain, 1.0)
     by_frequency = Trials(0.5 * len(state.data), 0.0)
     own = state.now.chance.own.get(effect.key)
     trials = own or (by_frequency if effect.spectral else Trials(1.0, 0.0))
-    sought = effect.local or effect.spectral
-    charged = effect.sizes if sought else effect.sizes - 1
-    return 2.0 * math.log(trials.number_at(-0.5 * gain)) + charged * math.log(gain)
-
-
-def _minus_twice_log_likelihood(fit: Fit, data: Data, noise: Noise) -> float:
-    """Return -2 ln L with the normalisation of the noise, and the charge for its colour.
-
-    Strength and slope are determined by the cosines below the reference frequency (Schwarz).
-    """
-    found = fit.chi2 + float(np.sum(np.log(noise.variance)))
-    if noise.red <= 0.0:
-        return found
-    slow = 2.0 * REFERENCE_HZ * float(data.time_s[-1] - data.time_s[0])
-    return found + 2.0 * math.log(max(slow, 1.0))
+    tried = trials.number_at(-0.5 * gain) * len(rivals)
+    return 2.0 * math.log(tried) + effect.sizes * math.log(gain)

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, refine
@@ -17,6 +17,9 @@ from pendpipe.dynamics.any_law import NoMotionError
 
 _BLOCK_CYCLES: Final = 10
 _FOLDS: Final = 2
+_PRECISE: Final = 1e-8
+"""Square of the relative error to which missing readings are filled in."""
+_MOST_STEPS: Final = 400
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,21 @@ def held_out(
     return HeldOut(float(before.sum()), float(after.sum()), sd)
 
 
+def predicts_worse(
+    before: Fit,
+    after: Fit,
+    data: Data,
+    noise: Noise,
+    held_before: Sequence[int],
+    held_after: Sequence[int],
+) -> bool:
+    """Return whether a model predicts cycles that it was not fitted to worse than another.
+
+    Then what it has more than the other describes the noise of the readings and no law.
+    """
+    return held_out(before, after, data, noise, held_before, held_after).gain < 0.0
+
+
 def _blocks(fit: Fit) -> IntArray:
     """Return the number of each reading's block: ten cycles, or fewer in a short record."""
     turns = (fit.at.sampled.phase - fit.at.sampled.phase[0]) / (2.0 * math.pi)
@@ -70,22 +88,54 @@ def _densities(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], block: IntArray
 ) -> FloatArray:
     """Return the log density of each reading, given the other half of the blocks."""
-    variance = np.full(len(data), noise.rms**2) if noise.uniform else noise.variance
-    found = np.zeros(len(data))
+    used = data.weight > 0.0
+    unmasked = replace(noise, weight=np.ones(len(data)))
+    usual = -0.5 * float(np.mean(np.log(noise.variance))) - 0.5 * math.log(2.0 * math.pi)
+    found = np.where(used, usual + np.log(unmasked.scale), 0.0)
     for fold in range(_FOLDS):
         out = block % _FOLDS == fold
-        known = data.masked(out | (data.weight == 0.0))
+        known = data.masked(out | ~used)
         part = replace(noise, weight=known.weight)
         try:
             value = refine(fit.model, known, part, fit.value, held=held, rounds=6).value
             predicted = fit.model.reading(value)
         except NoMotionError:
             predicted = fit.at.reading
-        wanted = out & (data.weight > 0.0)
         # A curve may diverge where blocks are missing: limit the error to that of no prediction.
         largest = 2.0 * fit.at.span.first_amplitude
-        off = np.clip(data.residual(predicted)[wanted], -largest, largest)
-        found[wanted] = -0.5 * (
-            off**2 / variance[wanted] + np.log(2.0 * math.pi * variance[wanted])
-        )
+        off = np.clip(data.residual(predicted), -largest, largest)
+        found -= np.where(out, 0.5 * _squared_error(off, unmasked, out, used), 0.0)
+    return np.where(used, found, 0.0)
+
+
+def _squared_error(
+    residual: FloatArray, noise: Noise, out: BoolArray, used: BoolArray
+) -> FloatArray:
+    """Return each reading's share of the squared whitened error of prediction, shape (n,).
+
+    Coloured noise is predicted too, from the readings that are known: its mean is what makes the
+    sum of squares of the whole the smallest.
+    """
+    if not noise.coloured:
+        return noise.whiten(residual) ** 2
+    complete = residual if used.all() else _completed(residual, noise, ~used)
+    error = complete - _completed(complete, noise, out | ~used)
+    return np.asarray(error * noise.adjoint(noise.whiten(error)))
+
+
+def _completed(residual: FloatArray, noise: Noise, missing: BoolArray) -> FloatArray:
+    """Replace missing numbers by their mean, given the others (by conjugate gradients)."""
+    found = np.where(missing, 0.0, residual)
+    left = np.where(missing, -noise.adjoint(noise.whiten(found)), 0.0)
+    way, size = left.copy(), float(left @ left)
+    enough = _PRECISE * size
+    for _ in range(_MOST_STEPS):
+        if size <= enough:
+            break
+        curvature = np.where(missing, noise.adjoint(noise.whiten(way)), 0.0)
+        step = size / float(way @ curvature)
+        found += step * way
+        left -= step * curvature
+        last, size = size, float(left @ left)
+        way = left + size / last * way
     return found

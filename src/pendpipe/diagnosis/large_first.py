@@ -96,7 +96,7 @@ def _extended(part: State, state: State) -> tuple[Fit, Data, Noise] | None:
     for cut in range(_MOST_CUTS):
         data = whole.first(int(len(whole) * _CUT**cut))
         model = part.fit.model.at_times(data.time_s)
-        noise = replace(state.noise, variance=state.noise.variance[: len(data)], weight=data.weight)
+        noise = state.noise.first(len(data), data.weight)
         try:
             value = progressive_start(
                 model,

@@ -1,80 +1,181 @@
-"""The noise of the readings and its colour, from frequencies free of misfits of the motion."""
+"""The noise of the readings: its spectrum and its level, estimated between the harmonics."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.colour import fit_colour
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.log_variance import Smooth, Squares, log_variance
 from pendpipe.diagnosis.numerics import cosines, from_cosines
 
 _HARMONICS: Final = 7
 _HARMONIC_HALF_WIDTH: Final = 0.08
 """Half width of the band about each harmonic that a misfit may fill, over the frequency."""
-_FIRST_COSINE: Final = 1
-"""The lowest cosine that is noise: the offset itself is fitted."""
+_SLOPES: Final = (0.0, 1.5, 4.0)
+"""Rms slopes of ln S against ln f that are tried, at the slowest cosine. Known noises have 0
+(white), 1 (flicker) and 2 (random walk), and steeper ones where a drift is filtered."""
+_CORNERS: Final = 25
+"""Frequencies at which the slope may change, evenly spaced in ln f."""
+_FILTERS: Final = (0.0, 0.3, 1.0, 4.0)
+"""Rms first cepstral coefficients of ln S that are tried: a memory phi of one reading has 2 phi, a
+running mean 2."""
+_TAPS: Final = 32
+"""Readings over which a filter may reach; a running mean of m has coefficients to some 3 m."""
+_LEVELS: Final = (0.0, 0.3, 1.0, 3.0)
+"""Rms first coefficients of ln level^2 that are tried; a level that falls by 3 has 0.9."""
+_LEVEL_WAVES: Final = 16
+_LEVEL_BINS: Final = 64
+_FEWEST_IN_BIN: Final = 8
+_LARGEST_SQUARE: Final = 20.0
+"""Of a whitened reading, over the median (3 standard deviations of normal noise): single large
+errors don't make a level."""
+_BINS: Final = 128
+_RELATIVE_BIN: Final = 0.1
+_READINGS_AT_ENDS: Final = 100.0
+"""Readings over which the leakage of the ends of a filtered record adds up."""
+_SLOWEST_LINE: Final = 6
+"""The cosine with three cycles in the record: what is slower is a drift and no line."""
+_ORDER: Final = 4
+"""Of the differences that measure fast noise, as in `analysis.noise`."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The variance of each cosine (DCT-II, orthonormal) of the readings.
+    """The variance of each cosine (DCT-II, orthonormal) of the readings over their level.
 
     Parameters
     ----------
     variance
-        Shape (n,): S_k; for unevenly spaced readings, of each reading itself.
-    uniform
-        Whether `variance` is over cosines (evenly spaced readings) or over readings.
-    white_rms
-        Standard deviation of the white part of one reading.
-    red, slope
-        Variance of the red part at 0.05 Hz over the white part's, and its exponent:
-        S = white (1 + red (0.05 Hz/f)^slope).
-    memory
-        Correlation of neighbouring readings by a first-order low-pass (0 for white noise).
+        Shape (n,): S_k.
     weight
         1 where a reading counts; shape (n,).
+    level
+        The relative standard deviation of each reading, shape (n,); None where it is constant.
+    starts, uncertainty
+        The first cosine of each bin, and the covariance of ln S in the bins; empty where S is
+        exactly known.
+    charge
+        By how much -2 ln of the cosines' probability density is larger since S was estimated.
+    harmonics
+        The cosines about the harmonics, from which S was not estimated, shape (n,).
     """
 
     variance: FloatArray
-    uniform: bool
-    white_rms: float
     weight: FloatArray
-    red: float = 0.0
-    slope: float = 0.0
-    memory: float = 0.0
+    level: FloatArray | None = None
+    starts: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    uncertainty: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    charge: float = 0.0
+    harmonics: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def whiten(self, columns: FloatArray) -> FloatArray:
         """Turn readings (or columns of them) into numbers of unit variance, shape kept."""
         scale = 1.0 / np.sqrt(self.variance)
         if not self.coloured:
-            return np.asarray((columns.T * (self.weight * scale)).T)
+            return np.asarray((columns.T * (self.scale * scale)).T)
         # The transform is much faster on contiguous memory.
-        rows = np.multiply(columns.T, self.weight, order="C")
+        rows = np.multiply(columns.T, self.scale, order="C")
         return np.asarray((cosines(rows) * scale).T)
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
         """Apply the transpose of `whiten`: from white numbers back to weights of readings."""
         scale = 1.0 / np.sqrt(self.variance)
         if not self.coloured:
-            return np.asarray((columns.T * (self.weight * scale)).T)
+            return np.asarray((columns.T * (self.scale * scale)).T)
         rows = np.multiply(columns.T, scale, order="C")
-        return np.asarray((from_cosines(rows) * self.weight).T)
+        return np.asarray((from_cosines(rows) * self.scale).T)
+
+    @property
+    def scale(self) -> FloatArray:
+        """What each reading is multiplied by before its cosines are taken, shape (n,)."""
+        return self.weight if self.level is None else self.weight / self.level
 
     @property
     def coloured(self) -> bool:
-        """Whether cosines differ in variance; else the readings are white too."""
-        return self.uniform and bool(self.red or self.memory)
+        """Whether cosines differ in variance; else the readings are white."""
+        return bool(np.any(self.variance != self.variance[0]))
+
+    @property
+    def cost(self) -> float:
+        """-2 ln of its probability density, less chi^2 and constants."""
+        logs = float(np.mean(np.log(self.variance))) * float(np.count_nonzero(self.weight))
+        if self.level is not None:
+            logs += 2.0 * float(np.sum(np.log(self.level[self.weight > 0.0])))
+        return logs + self.charge
+
+    @property
+    def memory(self) -> float:
+        """Correlation of neighbouring readings."""
+        turn = np.cos(math.pi * np.arange(len(self.variance)) / len(self.variance))
+        return float(turn @ self.variance / self.variance.sum())
 
     @property
     def rms(self) -> float:
         """Standard deviation of one reading, its colour included."""
-        return math.sqrt(float(np.mean(self.variance)))
+        level = 1.0 if self.level is None else float(np.mean(self.level**2))
+        return math.sqrt(float(np.mean(self.variance)) * level)
+
+    @property
+    def white_rms(self) -> float:
+        """Standard deviation of the white noise whose differences are as large.
+
+        It is what `analysis.noise.noise_rms` measures, which no slow motion can touch.
+        """
+        passed = np.sin(0.5 * math.pi * np.arange(len(self.variance)) / len(self.variance))
+        passed = passed ** (2 * _ORDER)
+        level = 1.0 if self.level is None else float(np.mean(self.level**2))
+        return math.sqrt(float(passed @ self.variance / passed.sum()) * level)
+
+    def rms_at(self, frequency: float) -> float:
+        """Standard deviation of white noise with the density at a frequency in cycles a reading."""
+        cosine = min(int(2.0 * len(self.variance) * frequency), len(self.variance) - 1)
+        return self.rms * math.sqrt(float(self.variance[cosine] / np.mean(self.variance)))
+
+    @property
+    def sd(self) -> FloatArray:
+        """Standard deviation of each reading, shape (n,)."""
+        mean = math.sqrt(float(np.mean(self.variance)))
+        return np.full(len(self.variance), mean) if self.level is None else mean * self.level
+
+    def log_scale_variance(self, rows: FloatArray) -> FloatArray:
+        """Return the variance of the logarithm of the noise that unit columns meet.
+
+        Parameters
+        ----------
+        rows
+            Whitened columns of unit length, shape (k, n or more).
+        """
+        if not len(self.starts):
+            return np.zeros(len(rows))
+        rows = rows[:, : len(self.variance)]
+        rows = rows if self.coloured else cosines(rows)
+        energy = np.add.reduceat(rows**2, self.starts, axis=1)
+        return np.asarray(np.einsum("km,mn,kn->k", energy, self.uncertainty, energy, optimize=True))
+
+    def misfit(self, residual: FloatArray) -> float:
+        """Return the mean square about the harmonics of a whitened residual: 1 for noise alone."""
+        white = residual[: len(self.variance)]
+        white = white if self.coloured else cosines(white)
+        return float(np.mean(white[self.harmonics] ** 2)) if self.harmonics.any() else 1.0
+
+    def log_variance_at(self, cosine: FloatArray) -> FloatArray:
+        """Return the variance of ln S at each (not whole) number of a cosine."""
+        if not len(self.starts):
+            return np.zeros(len(cosine))
+        return np.asarray(np.interp(cosine, self.starts, np.diag(self.uncertainty)))
+
+    def first(self, count: int, weight: FloatArray) -> Noise:
+        """Return the noise of the first `count` readings."""
+        whole = np.arange(len(self.variance)) / len(self.variance)
+        variance = np.interp(np.arange(count) / count, whole, self.variance)
+        level = None if self.level is None else self.level[:count]
+        return Noise(variance, weight, level)
 
 
 def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Noise:
@@ -90,10 +191,10 @@ def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Nois
         If the error is in the time: the speed at each reading.
     """
     variance = np.full(len(data), rms * rms)
-    if slope is not None:
-        usual = math.sqrt(float(np.mean(slope**2)))
-        variance = rms * rms * (0.25 + (slope / usual) ** 2)
-    return Noise(variance, False if slope is not None else data.uniform, rms, data.weight)
+    if slope is None:
+        return Noise(variance, data.weight)
+    usual = math.sqrt(float(np.mean(slope**2)))
+    return Noise(variance, data.weight, np.sqrt(0.25 + (slope / usual) ** 2))
 
 
 def estimate_noise(
@@ -102,8 +203,7 @@ def estimate_noise(
     """Estimate the noise from a residual.
 
     Bands about the harmonics of the motion and the slowest cosine are left out, since misfits lie
-    there. The rest is described by white noise, with a red part or a first-order memory if the
-    (Whittle) likelihood is clearly better with it.
+    there. Readings that are not evenly spaced are taken as they follow each other.
 
     Parameters
     ----------
@@ -114,34 +214,130 @@ def estimate_noise(
     floor
         The smallest rms that is plausible.
     red
-        Whether the noise may be red.
+        Whether the noise may grow to low frequencies.
     """
-    if not data.uniform:
-        rms = max(_robust_rms(residual[data.weight > 0.0]), floor)
-        return white_noise(data, rms)
-    count = len(data)
-    filled = count / max(data.used, 1)
-    power = cosines(residual * data.weight) ** 2 * filled
-    frequency = np.arange(count) / (2.0 * count * data.interval_s)
-    noise_only = _noise_only(frequency, frequency_hz)
-    if np.count_nonzero(noise_only) < 40:
-        noise_only = np.arange(count) >= _FIRST_COSINE
-    colour = fit_colour(power[noise_only], frequency[noise_only], data.interval_s, red=red)
-    variance = colour.spectrum(frequency, data.interval_s)
-    white = math.sqrt(colour.white)
-    low = floor * floor / variance.mean()
-    if low > 1.0:
-        variance, white = variance * low, white * math.sqrt(low)
-    return Noise(variance, True, white, data.weight, colour.red, colour.slope, colour.memory)
+    spacing = float(data.time_s[-1] - data.time_s[0]) / (len(data) - 1)
+    noise_only = _noise_only(len(data), frequency_hz * spacing)
+    noise = Noise(np.ones(len(data)), data.weight, harmonics=~noise_only)
+    noise.harmonics[0] = False
+    noise = _with_spectrum(noise, residual, noise_only, red=red)
+    level, charge = _level(noise, residual, noise_only)
+    if level is not None:
+        noise = replace(noise, level=level)
+        noise = _with_spectrum(noise, residual, noise_only, red=red)
+        noise = replace(noise, charge=noise.charge + charge)
+    return replace(noise, variance=noise.variance * max((floor / noise.rms) ** 2, 1.0))
 
 
-def _robust_rms(values: FloatArray) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+def _with_spectrum(
+    noise: Noise, residual: FloatArray, noise_only: BoolArray, *, red: bool
+) -> Noise:
+    """Estimate the spectrum for a given level."""
+    count = len(residual)
+    starts = _bins(count)
+    slow, fast = _smooth_spectra(count)
+    smooth = [slow if red else Smooth(slow.columns, (0.0,)), fast]
+    filled = count / max(float(np.sum(noise.weight > 0.0)), 1.0)
+    power = cosines(residual * noise.scale) ** 2 * filled
+    found = log_variance(Squares(power, noise_only, starts, _SLOWEST_LINE), smooth)
+    if found.constant > 0.5:
+        width = np.diff(np.append(starts, count))
+        variance = np.full(count, math.exp(float(found.mean @ width) / count))
+    else:
+        middle = 0.5 * (starts + np.append(starts[1:], count) - 1)
+        logs = np.maximum(found.mean, _largest_beside(found.mean, middle) + _leakage(count))
+        variance = np.exp(np.interp(np.arange(count), middle, logs))
+    return replace(
+        noise,
+        variance=variance,
+        starts=starts,
+        uncertainty=found.covariance,
+        charge=found.charge,
+    )
 
 
-def _noise_only(frequency: FloatArray, motion_hz: float) -> BoolArray:
-    """Return which cosines contain noise alone."""
-    noise_only = np.arange(len(frequency)) >= _FIRST_COSINE
+def _leakage(count: int) -> float:
+    """Return ln of the part of its neighbours' variance below which a cosine's can't be told.
+
+    The ends of the record leak into all cosines, all in one pattern.
+    """
+    return min(math.log(_READINGS_AT_ENDS / count), 0.0)
+
+
+def _largest_beside(logs: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return the largest of each bin and those within an octave."""
+    apart = np.abs(np.subtract.outer(np.log(middle + 1.0), np.log(middle + 1.0)))
+    return np.asarray(np.max(np.where(apart < math.log(2.0), logs, -np.inf), axis=1))
+
+
+def _level(
+    noise: Noise, residual: FloatArray, noise_only: BoolArray
+) -> tuple[FloatArray | None, float]:
+    """Return the relative level, None if it is constant, and the charge for its estimate.
+
+    The whitened residual between the harmonics is turned back into a series, whose squares show
+    the level. Squares of heavy-tailed noise scatter more than those of normal numbers.
+    """
+    count = len(residual)
+    bins: int = min(_LEVEL_BINS, count // _FEWEST_IN_BIN)
+    if bins < 4:
+        return None, 0.0
+    white = cosines(residual * noise.scale) / np.sqrt(noise.variance)
+    used = noise.weight > 0.0
+    share = float(np.mean(noise_only))
+    square = from_cosines(white * noise_only) ** 2
+    square = np.minimum(square / np.median(square[used]), _LARGEST_SQUARE)
+    kept = square[used]
+    independent = share * min(2.0 * float(np.mean(kept)) ** 2 / float(np.var(kept)), 1.0)
+    starts = np.linspace(0, count, bins, endpoint=False).astype(np.int64)
+    middle = (np.arange(bins) + 0.5) / bins
+    order = np.arange(1, _LEVEL_WAVES + 1)
+    waves = np.cos(math.pi * np.outer(middle, order)) / order
+    found = log_variance(
+        Squares(square, used, starts, count, independent), [Smooth(waves, _LEVELS)]
+    )
+    if found.constant > 0.5:
+        return None, 0.0
+    log = np.interp(np.arange(count) + 0.5, middle * count, found.mean)
+    return np.exp(0.5 * (log - float(np.mean(log)))), found.charge
+
+
+def _noise_only(count: int, motion: float) -> BoolArray:
+    """Return which cosines contain noise alone; the offset itself is fitted.
+
+    `motion` is the frequency in cycles per reading.
+    """
+    frequency = np.arange(count) / (2.0 * count)
+    noise_only = np.arange(count) >= 1
     for harmonic in range(1, _HARMONICS):
-        noise_only &= np.abs(frequency - harmonic * motion_hz) > _HARMONIC_HALF_WIDTH * motion_hz
+        noise_only &= np.abs(frequency - harmonic * motion) > _HARMONIC_HALF_WIDTH * motion
+    if np.count_nonzero(noise_only) < 40:
+        noise_only = np.arange(count) >= 1
     return np.asarray(noise_only)
+
+
+@lru_cache(maxsize=8)
+def _bins(count: int) -> IntArray:
+    """Return the first cosine of each bin: single slow ones, then a tenth of f, then equal bins."""
+    starts = [0, 1]
+    while starts[-1] < count:
+        width = min(max(1, int(_RELATIVE_BIN * starts[-1])), max(1, count // _BINS))
+        starts.append(starts[-1] + width)
+    return np.array(starts[:-1])
+
+
+@lru_cache(maxsize=8)
+def _smooth_spectra(count: int) -> tuple[Smooth, Smooth]:
+    """Return the two ways in which a spectrum may change.
+
+    Towards low frequencies the slope of ln S against ln f may change at any frequency, softly (as
+    where a steeper noise takes over): white noise that some slower one joins. A filter over some
+    readings has cepstral coefficients that fall as 1/m.
+    """
+    starts = _bins(count)
+    middle = np.maximum(0.5 * (starts + np.append(starts[1:], count) - 1), 1.0)
+    corner = np.linspace(0.0, math.log(count), _CORNERS)
+    below = 0.5 * np.log1p(np.exp(2.0 * (corner - np.log(middle)[:, None])))
+    order = np.arange(1, _TAPS + 1)
+    waves = np.cos(math.pi * np.outer(middle / count, order)) / order
+    return Smooth(below / math.sqrt(_CORNERS), _SLOPES), Smooth(waves, _FILTERS)

@@ -115,8 +115,7 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
 
 def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
     """Return the residual in standard deviations of a reading."""
-    sd = noise.white_rms if noise.uniform else np.sqrt(noise.variance)
-    return np.asarray(data.residual(fit.at.reading) * data.weight / sd)
+    return np.asarray(data.residual(fit.at.reading) * data.weight / noise.sd)
 
 
 def by_cycle(

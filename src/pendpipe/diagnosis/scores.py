@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pendpipe.analysis.distributions import chi2_beyond
+from pendpipe.analysis.distributions import beta_below, chi2_beyond
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, pulled
@@ -33,6 +33,8 @@ _RESOLVED_SD = 4.0
 
 
 _COLUMNS_AT_ONCE = 32
+_KNOWN = 1e-6
+"""Variance of ln S below which it is known."""
 
 
 class Candidate(NamedTuple):
@@ -59,12 +61,15 @@ class Bank:
     lengths
         Length of each candidate's first column for a unit of its size, shape (candidates,):
         it converts a score to a size.
+    log_scale_variance
+        Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
     """
 
     basis: FloatArray
     columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
     lengths: FloatArray
+    log_scale_variance: FloatArray
 
     def scores(self, residual: FloatArray) -> FloatArray:
         """Return the sum of squares of each candidate's inner products; shape (candidates, ...).
@@ -77,6 +82,10 @@ class Bank:
         squares = products.astype(np.float64) ** 2
         starts = [candidate.first for candidate in self.candidates]
         return np.asarray(np.add.reduceat(squares, starts, axis=0))
+
+    def p_values(self, scores: FloatArray) -> FloatArray:
+        """Return the probability that chance alone does better, for each candidate by itself."""
+        return local_p_values(scores, self.freedom, self.log_scale_variance)
 
     def rows(self) -> dict[str, list[int]]:
         """Return the indices of the candidates of each effect, by its key."""
@@ -113,7 +122,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     """
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
-    kept = _Kept(tangent_basis(fit), most)
+    kept = _Kept(tangent_basis(fit), noise, most)
     for effect, rows in zip(effects, shapes, strict=True):
         if isinstance(effect, ReleasedParameter):
             kept.add(effect, rows, effect.sensitivity(fit)[None])
@@ -148,13 +157,14 @@ def _whitened(
 class _Kept:
     """Collects the unit columns that differ from the model's own."""
 
-    def __init__(self, basis: FloatArray, most: int) -> None:
-        self.basis = basis
+    def __init__(self, basis: FloatArray, noise: Noise, most: int) -> None:
+        self.basis, self._noise = basis, noise
         self._single = basis.astype(np.float32)
         self._rows = np.empty((most, len(basis)), dtype=np.float32)
         self._filled = 0
         self._candidates: list[Candidate] = []
         self._lengths: list[float] = []
+        self._log_scale_variance: list[float] = []
 
     def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
         """Project out the model's tangent space, and keep the rest at unit length."""
@@ -175,10 +185,11 @@ class _Kept:
         if width > 1:
             # The difference of two almost parallel rows is small, so that rounding matters again.
             self._project(unit)
+        unsure = self._noise.log_scale_variance(unit)
         for index in np.flatnonzero(seen).tolist():
             own = slice(index * width, (index + 1) * width)
             size = float(length[own][0] * before[own][0])
-            self._keep(effect, shapes[index], unit[own], size)
+            self._keep(effect, shapes[index], unit[own], size, unsure[own])
 
     def _project(self, unit: NDArray[np.float32]) -> FloatArray:
         """Project out the basis in place and normalise; return the length that remained."""
@@ -193,21 +204,34 @@ class _Kept:
         curve, part = _visible(curve, left)
         if len(part):
             unit = np.linalg.qr(part.T)[0].T
-            self._keep(curve, shape, unit, float(np.linalg.norm(part[0])))
+            unsure = self._noise.log_scale_variance(unit)
+            self._keep(curve, shape, unit, float(np.linalg.norm(part[0])), unsure)
 
     def _keep(
-        self, effect: Effect, shape: tuple[float, ...], unit: NDArray[Any], length: float
+        self,
+        effect: Effect,
+        shape: tuple[float, ...],
+        unit: NDArray[Any],
+        length: float,
+        unsure: FloatArray,
     ) -> None:
         first, last = self._filled, self._filled + len(unit)
         self._rows[first:last] = unit
         self._filled = last
         self._candidates.append(Candidate(effect, shape, first, len(unit)))
         self._lengths.append(length)
+        self._log_scale_variance.append(float(unsure.mean()))
 
     def bank(self) -> Bank:
         """Return everything that was kept."""
         columns = self._rows[: self._filled].T
-        return Bank(self.basis, columns, tuple(self._candidates), np.array(self._lengths))
+        return Bank(
+            self.basis,
+            columns,
+            tuple(self._candidates),
+            np.array(self._lengths),
+            np.array(self._log_scale_variance),
+        )
 
 
 def _orthogonal(first: NDArray[np.float32], second: NDArray[np.float32]) -> BoolArray:
@@ -237,11 +261,22 @@ def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     return curve.reduced(mixing), mixing.T @ part
 
 
-def local_p_values(scores: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return the probability that chance alone does better, for each candidate by itself."""
+def local_p_values(
+    scores: FloatArray, freedom: FloatArray, log_scale_variance: FloatArray | None = None
+) -> FloatArray:
+    """Return the probability that chance alone does better, for each candidate by itself.
+
+    Where the variance of the noise is uncertain, by v in its logarithm, as if it were estimated
+    from 2/v squares: by Fisher's distribution instead of chi^2.
+    """
     found = np.empty_like(scores)
     for width in np.unique(freedom).astype(int).tolist():
         found[freedom == width] = chi2_beyond(scores[freedom == width], width)
+    if log_scale_variance is not None:
+        unsure = log_scale_variance > _KNOWN
+        squares = 2.0 / log_scale_variance[unsure]
+        share = squares / (squares + scores[unsure])
+        found[unsure] = beta_below(0.5 * squares, 0.5 * freedom[unsure], share)
     return found
 
 

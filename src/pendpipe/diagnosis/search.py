@@ -241,7 +241,7 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
     gross, threshold, progress = is_gross(state.fit, state.data), task.threshold, task.progress
     effects = task.scanned(state)
     assert state.now is not None
-    if state.now.p_value > threshold and state.noise.red > 0.0 and not gross:
+    if state.now.p_value > threshold and state.noise.coloured and not gross:
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
     if state.now.p_value > threshold or _ends_with_curve(state):
         return False

@@ -38,12 +38,23 @@ class ToneScan:
     inverse
         Of the 2x2 Gram matrices of projected cosine and sine, shape (m, 3): entries 11, 12, 22;
         zero where nothing remains.
+    log_scale_variance
+        Variance of the logarithm of the noise at each frequency, shape (m,).
     """
 
     envelope: FloatArray
     frequency_hz: FloatArray
     inverse: FloatArray
+    log_scale_variance: FloatArray
     size: int
+
+    def p_values(self, scores: FloatArray) -> FloatArray:
+        """Return the probability that chance alone does better at each frequency by itself.
+
+        It is that of `scores.local_p_values` for two degrees of freedom.
+        """
+        half = np.maximum(0.5 * self.log_scale_variance, 1e-12)
+        return np.asarray(np.exp(-0.5 / half * np.log1p(half * scores)))
 
     def scores(self, weights: FloatArray) -> FloatArray:
         """Return chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
@@ -81,17 +92,23 @@ def tone_scan(
     size = int(2 ** np.ceil(np.log2(_OVERSAMPLING * count)))
     frequency = np.asarray(np.fft.rfftfreq(size, data.interval_s)[1:], dtype=np.float64)
     keep = slice(1, len(frequency) + 1)
-    variance = _variance_at(noise, frequency, data)
-    # Products of tones follow from the Fourier transform of the squared envelope.
-    square = noise.weight * envelope**2
-    double = np.fft.rfft(square, n=size)
-    total = float(np.sum(square))
+    cosine = 2.0 * count * data.interval_s * frequency
+    # Products of tones follow from the Fourier transform of the squared envelope, and their
+    # power from its autocorrelation: a tone leaks to where the noise may be far less.
+    swell = noise.scale * envelope
+    double = np.fft.rfft(swell**2, n=size) / float(swell @ swell)
+    together = np.fft.irfft(np.abs(np.fft.rfft(swell, n=size)) ** 2, n=size)
+    heard = np.fft.irfft(1.0 / np.append(noise.variance, noise.variance[-1]))[:count]
+    together[:count] *= heard
+    together[count : size - count + 1] = 0.0
+    together[size - count + 1 :] *= heard[:0:-1]
+    power = 0.5 * np.maximum(np.fft.rfft(together).real[keep], 0.0)
     index = 2 * np.arange(1, len(frequency) + 1)
     folded = np.where(index <= size // 2, index, size - index)
     lines = np.where(index <= size // 2, double[folded], np.conj(double[folded]))
-    g11 = 0.5 * (total + lines.real) / variance
-    g22 = 0.5 * (total - lines.real) / variance
-    g12 = -0.5 * lines.imag / variance
+    g11 = power * (1.0 + lines.real)
+    g22 = power * (1.0 - lines.real)
+    g12 = -power * lines.imag
     rows = np.multiply(noise.adjoint(basis[:-1]).T, envelope, order="C")
     known = np.fft.rfft(rows, n=size).T[keep]
     real, imaginary = known.real, -known.imag
@@ -107,9 +124,4 @@ def tone_scan(
     )
     safe = np.where(seen, determinant, 1.0)
     inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
-    return ToneScan(envelope, frequency, inverse, size)
-
-
-def _variance_at(noise: Noise, frequency: FloatArray, data: Data) -> FloatArray:
-    cosines = np.arange(len(data)) / (2.0 * len(data) * data.interval_s)
-    return np.interp(frequency, cosines, noise.variance)
+    return ToneScan(envelope, frequency, inverse, noise.log_variance_at(cosine), size)

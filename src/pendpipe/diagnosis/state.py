@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -131,16 +131,20 @@ def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Estimate the noise again if the model is good enough, and refit with it."""
-    if data.time_noise or fit.max_phase_error_rad > _LARGE_PHASE_ERROR:
+    if data.time_noise:
         return fit, data, noise
     finer = with_lattice(data, fit.at.reading)
     left = noise_of_residual(fit, finer, red=red)
+    # Differences of phase within the noise at the motion's frequency are none.
+    turns = fit.value[OMEGA] / (2.0 * np.pi) * float(data.time_s[-1] - data.time_s[0])
+    finer = replace(finer, noise_rms=left.rms_at(turns / (len(data) - 1)))
     misjudged = not fit.model.effects and left.white_rms < _MISJUDGED * noise.white_rms
     if is_gross(fit, data) and not misjudged:
         return fit, data, noise
     better = refine(fit.model, finer, left, fit.value, held=held)
     # A misfit that is gross for the first estimate of the noise may itself be noise.
-    if is_gross(fit, data) and is_gross(better, finer):
+    gross = is_gross(better, finer) or left.misfit(better.residual) > GROSS
+    if is_gross(fit, data) and gross:
         return fit, data, noise
     for _ in range(_ROUNDS):
         again = noise_of_residual(better, finer, red=red)

@@ -371,10 +371,9 @@ def noise_level(content: Shown, frequency: FloatArray) -> FloatArray:
     """The noise's density that the diagnosis has used, rad/sqrt(Hz), at given frequencies."""
     noise, data = content.noise, content.data
     interval = float(data.time_s[-1] - data.time_s[0]) / (len(data) - 1)
-    if not noise.uniform:
-        return np.full(len(frequency), noise.rms * math.sqrt(2.0 * interval))
-    known = np.arange(len(noise.variance)) / (2.0 * len(noise.variance) * data.interval_s)
-    return np.sqrt(2.0 * data.interval_s * np.interp(frequency, known, noise.variance))
+    known = np.arange(len(noise.variance)) / (2.0 * len(noise.variance) * interval)
+    found = noise.rms**2 * np.interp(frequency, known, noise.variance) / np.mean(noise.variance)
+    return np.sqrt(2.0 * interval * found)
 
 
 @styled

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
-from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Location
@@ -19,63 +17,51 @@ from pendpipe.estimate import Estimate
 
 _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
-_HARMONIC_HALF_WIDTH: Final = 0.15
-"""Half width left out about each harmonic, over the frequency: a misfit may lie there."""
-_HARMONICS: Final = 7
 _LOWEST: Final = 0.1
 """Lowest frequency used, over the motion's: slower noise is a drift, allowed for elsewhere."""
+_MISFIT: Final = 1.3
+"""chi^2 per reading from which a misfit of the motion may leak between its harmonics."""
 _NEAR_BAND: Final = (0.3, 3.0)
-_LINES_PER_HANN: Final = 35.0 / 18.0
-"""Lines of a Hann window's spectrum per independent line."""
-
-
-class Spectrum(NamedTuple):
-    """Densities of the noise; shape (m,)."""
-
-    frequency_hz: FloatArray
-    power: FloatArray
-    near: BoolArray
 
 
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the density near the pendulum's frequency differs from the mean by over 1.5.
 
-    ln(S_near/S_mean) from a Hann-windowed spectrum, bands about the harmonics left out; its
-    error is that of means of exponentially distributed lines. The null is composite: any
-    ratio between 1/1.5 and 1.5. Noise that is red only below a tenth of the frequency is not
-    reported.
+    Density and error are those of the spectrum that the readings were weighed with. The null is
+    composite: any ratio between 1/1.5 and 1.5. Noise that is red only below a tenth of the
+    frequency is not reported.
     """
-    if not data.uniform or data.time_noise or data.used < 200:
+    if not data.uniform or not noise.coloured or fit.chi2 > _MISFIT * data.used:
         return nothing("coloured-noise")
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
-    spectrum = _spectrum(data, residual_of(data, fit), frequency_hz)
-    lines = np.count_nonzero(spectrum.near) / _LINES_PER_HANN
-    others = np.count_nonzero(~spectrum.near) / _LINES_PER_HANN
-    if lines < 10.0 or others < 10.0:
+    edges = np.append(noise.starts, len(data)) / (2.0 * len(data) * data.interval_s)
+    middle, number = 0.5 * (edges[1:] + edges[:-1]), np.diff(np.append(noise.starts, len(data)))
+    heard = middle > _LOWEST * frequency_hz
+    near = (middle > _NEAR_BAND[0] * frequency_hz) & (middle < _NEAR_BAND[1] * frequency_hz)
+    if np.count_nonzero(near) < 3 or np.array_equal(near, heard):
         return nothing("coloured-noise")
-    near, rest = _mean(spectrum.power[spectrum.near]), _mean(spectrum.power[~spectrum.near])
-    share = lines / (lines + others)
-    whole = share * near + (1.0 - share) * rest
-    log_ratio = math.log(near / whole)
-    # The lines near the frequency are part of the mean, which reduces the error.
-    part = 1.0 - share * near / whole
-    sd = part * math.sqrt(1.0 / lines + 1.0 / others)
-    score = (abs(log_ratio) - math.log(_HARMLESS_RATIO)) / max(sd, 1e-9)
-    p_value = 0.5 * math.erfc(score / math.sqrt(2.0))
-    ratio = math.exp(log_ratio)
-    gain = 2.0 * (lines + others) * math.log(whole)
-    gain -= 2.0 * (lines * math.log(near) + others * math.log(rest))
-    slope, slope_sd = _slope(spectrum)
+    density = noise.variance[(noise.starts + number // 2).clip(max=len(data) - 1)]
+    there = near * number / float(number[near].sum()) * density
+    whole = heard * number / float(number[heard].sum()) * density
+    # The error of the logarithm of a ratio of two sums of densities.
+    part = there / there.sum() - whole / whole.sum()
+    ratio = float(there.sum() / whole.sum())
+    sd = math.sqrt(float(part @ noise.uncertainty @ part))
+    score = (abs(math.log(ratio)) - math.log(_HARMLESS_RATIO)) / max(sd, 1e-9)
+    gain = float(number[heard] @ np.log(whole.sum() / density[heard]))
+    across = np.log(middle) * near
+    across = near * (across - across.sum() / np.count_nonzero(near))
+    across /= across @ across
+    slope = -float(across @ np.log(density))
     word = "stronger" if ratio > 1.0 else "weaker"
-    parameters = {
-        "slope": Estimate(slope, slope_sd, ""),
-        "density_ratio": Estimate(ratio, ratio * sd, ""),
-    }
     return Finding(
         "coloured-noise",
-        min(p_value, 1.0),
+        0.5 * math.erfc(score / math.sqrt(2.0)),
         max(gain, 0.0),
-        parameters,
+        {
+            "slope": Estimate(slope, math.sqrt(float(across @ noise.uncertainty @ across)), ""),
+            "density_ratio": Estimate(ratio, ratio * sd, ""),
+        },
         Location(
             (float(data.time_s[0]), float(data.time_s[-1])),
             frequency_hz=(_NEAR_BAND[0] * frequency_hz, _NEAR_BAND[1] * frequency_hz),
@@ -83,35 +69,3 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         summary=f"the noise about the pendulum's frequency is {max(ratio, 1.0 / ratio):.2g} times"
         f" {word} in power than on average: it is coloured (power as f^{-slope:.2g} there)",
     )
-
-
-def _spectrum(data: Data, residual: FloatArray, frequency_hz: float) -> Spectrum:
-    count = len(residual)
-    window = 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
-    power = np.asarray(np.abs(np.fft.rfft(residual * window)) ** 2, dtype=np.float64)
-    frequency: FloatArray = np.asarray(np.fft.rfftfreq(count, data.interval_s), dtype=np.float64)
-    kept = (frequency > _LOWEST * frequency_hz) & (frequency > 0.05)
-    kept &= np.arange(len(frequency)) < len(frequency) - 2
-    for harmonic in range(1, _HARMONICS + 1):
-        kept &= np.abs(frequency - harmonic * frequency_hz) > _HARMONIC_HALF_WIDTH * frequency_hz
-    frequency, power = frequency[kept], power[kept]
-    near = (frequency > _NEAR_BAND[0] * frequency_hz) & (frequency < _NEAR_BAND[1] * frequency_hz)
-    return Spectrum(frequency, power, near)
-
-
-def _mean(power: FloatArray) -> float:
-    """Mean of exponentially distributed lines, clipped against tones."""
-    mean = float(np.median(power)) / math.log(2.0)
-    for _ in range(4):
-        mean = float(np.mean(np.minimum(power, 8.0 * mean)))
-    return max(mean, 1e-300)
-
-
-def _slope(spectrum: Spectrum) -> tuple[float, float]:
-    """Exponent s of S ~ 1/f^s near the frequency, from the logarithms of the lines."""
-    x = np.log(spectrum.frequency_hz[spectrum.near])
-    y = np.log(np.maximum(spectrum.power[spectrum.near], 1e-300))
-    x = x - x.mean()
-    size = float(x @ x)
-    # ln of an exponential number has the variance pi^2/6.
-    return -float(x @ y) / size, math.pi / math.sqrt(6.0 * size / _LINES_PER_HANN)

@@ -164,7 +164,7 @@ def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> tup
     rest = np.where(out, 0.0, residual)
     local = local_residual(phase, whitened_in_time(rest, noise), ~out)
     if not local.smooth():
-        return local, noise.uniform and noise.memory != 0.0
+        return local, noise.coloured
     filled = np.interp(phase, phase[~out], residual[~out])
     padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")
     between = (4.0 * (padded[1:-3] + padded[3:-1]) - padded[:-4] - padded[4:]) / 6.0

@@ -13,7 +13,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.codes import Coded, read_codes
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.lattice import rounding_moments, whole_readings
-from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_in_time
+from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.numerics import tail_of_squares
 from pendpipe.diagnosis.refine import Fit
@@ -105,12 +105,12 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     """Return squares of normal errors; None if a misfit of the motion remains in them."""
     sampled, used = fit.at.sampled, data.weight > 0.0
     residual = residual_of(data, fit)
-    white = whitened_in_time(residual, noise)
+    white, unit = whitened_series(residual, noise)
+    unit = unit**2 * float(np.mean(white[used] ** 2))
     local = local_residual(sampled.phase, white, used)
     if local.smooth():
         return None
     scaled = local.scaled[used]
-    unit = noise.white_rms**2
     mean, double, speed = _speeds(fit, np.flatnonzero(used))
     ones = np.ones(len(scaled))
     shared = float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5))

@@ -98,10 +98,9 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
     This compares each reading with its best prediction from all others (unit variance). White
     noise is simply divided by its standard deviation.
     """
-    if not noise.uniform:
-        return np.asarray(residual / np.sqrt(noise.variance))
-    if noise.red == 0.0 and noise.memory == 0.0:
-        return residual / noise.rms
+    residual = residual if noise.level is None else residual / noise.level
+    if not noise.coloured:
+        return residual / math.sqrt(float(noise.variance[0]))
     count = len(residual)
     inverse = 1.0 / noise.variance
     filtered = from_cosines(cosines(residual) * inverse)
@@ -110,6 +109,23 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
     odd = 2 * np.arange(count) + 1
     diagonal = inverse.sum() - inverse[0] + doubled[np.where(odd <= count, odd, 2 * count - odd)]
     return np.asarray(filtered / np.sqrt(diagonal / count))
+
+
+def whitened_series(residual: FloatArray, noise: Noise) -> tuple[FloatArray, float]:
+    """Return the residual as a series of independent numbers, its level kept.
+
+    Returns
+    -------
+    series
+        Shape (n,).
+    unit
+        The white noise that has the variance 1 there.
+    """
+    inverse = 1.0 / noise.variance
+    unit = 1.0 / math.sqrt(float(np.mean(inverse)))
+    if not noise.coloured:
+        return residual / unit, unit
+    return from_cosines(cosines(residual) * np.sqrt(inverse)), unit
 
 
 def local_residual(
