@@ -201,9 +201,10 @@ def _solved(
     system[:, 1, 1] += prior + 1e-12
     empty = gram[:, 0, 0] == 0.0
     system[empty] = np.eye(system.shape[1])
-    inverse = np.linalg.inv(system)
+    inverse: FloatArray = np.asarray(np.linalg.inv(system), dtype=np.float64)
     inverse[empty] = np.nan
-    return inverse @ np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2), inverse
+    told = np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2)
+    return np.asarray(inverse @ told), inverse
 
 
 def _peak(
