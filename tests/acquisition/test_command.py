@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -194,11 +196,17 @@ def test_make_clean_spares_what_an_instrument_has_recorded(tmp_path: Path) -> No
     assert sorted(left) == ["1.raw", "README.md"]
 
 
-def test_a_simulated_record_is_the_same_whenever_it_is_made(tmp_path: Path) -> None:
+def test_a_simulated_record_is_the_same_whenever_it_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Date and measured rate are the run's: they go to the log, not into the result."""
     made = []
-    for name in ("first", "second"):
+    for year in (2026, 2027):
+        then = SimpleNamespace(now=lambda zone, year=year: datetime(year, 1, 1, tzinfo=zone))
+        monkeypatch.setattr("pendpipe.acquisition.recorder.datetime", then)
+        out = tmp_path / str(year) / "recording.csv"
         call = ["--campaign", "config/config.yaml", "--record", "air-12"]
-        assert main(["acquire", *call, "--out", str(tmp_path / name / "recording.csv")]) == 0
-        made.append((tmp_path / name / "recording.csv").read_bytes())
+        assert main(["acquire", *call, "--out", str(out)]) == 0
+        assert f"recorded_at: {year}-01-01" in capsys.readouterr().err
+        made.append(out.read_bytes())
     assert made[0] == made[1]
