@@ -197,8 +197,8 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     columns *= weight[:, None]
     right = (part.time_s - part.time_s[0]) * weight
 
-    def eta(design: FloatArray, use: FloatArray | slice = slice(None)) -> float:
-        values = np.linalg.lstsq(design[use], right[use], rcond=1e-13)[0]
+    def eta(design: FloatArray) -> float:
+        values = np.linalg.lstsq(design, right, rcond=1e-13)[0]
         return float(values[1] / values[0])
 
     def square(design: FloatArray) -> float:
@@ -208,13 +208,8 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     value, count = eta(columns), len(part)
     blocks = min(_BLOCKS, count // 3)
     edges = np.linspace(0, count, blocks + 1).astype(int).tolist()
-    without = []
-    for low, high in pairwise(edges):
-        use = np.ones(count, dtype=bool)
-        use[low:high] = False
-        step = weight * (np.arange(count) >= high)
-        inner = low > 0 and high < count
-        without.append(eta(np.column_stack([columns, step]) if inner else columns, use))
+    rows = np.column_stack([columns, weight, right])
+    without = _without_each([rows[low:high] for low, high in pairwise(edges)])
     scatter = math.sqrt((blocks - 1) * float(np.var(without)))
     slower = np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
     drift = eta(np.column_stack([columns, weight * slower])) - value
@@ -222,3 +217,23 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     bent[:, 0] += columns[:, 1]
     removed = 1.0 - square(bent) / linear if linear > 0.0 else 0.0
     return Coefficient(value, math.hypot(scatter, drift), scatter, removed)
+
+
+def _without_each(blocks: list[FloatArray]) -> FloatArray:
+    """The coefficient without each block of the decay in turn, the phase beyond it free.
+
+    Rows of a block are the four columns of the design, the weight (of a step of the phase) and the
+    right side.
+    """
+    scale = 1.0 / np.linalg.norm(np.concatenate(blocks), axis=0)
+    products = np.stack([(rows * scale).T @ (rows * scale) for rows in blocks])
+    system = products.sum(axis=0) - products
+    beyond = products.sum(axis=0) - np.cumsum(products, axis=0)
+    # Before the first and behind the last block there is nothing for a step to part.
+    beyond[[0, -1]] = 0.0
+    beyond[[0, -1], 4, 4] = 1.0
+    system[:, 4, :], system[:, :, 4] = beyond[:, 4, :], beyond[:, :, 4]
+    # A hair, for blocks without which there are fewer turning points than columns.
+    system[:, range(5), range(5)] += 1e-14
+    values = np.linalg.solve(system[:, :5, :5], system[:, :5, 5:])[..., 0]
+    return np.asarray(values[:, 1] / values[:, 0] * scale[1] / scale[0])
