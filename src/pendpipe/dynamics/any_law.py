@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -62,27 +63,25 @@ class Motion:
     time_s: FloatArray
     upwards: float = 1.0
 
-    def __post_init__(self) -> None:
-        amplitude = np.exp(self.log_amplitude)
-        side = self.upwards * self.clock.side
-        put = object.__setattr__
-        put(self, "amplitude", amplitude)
-        put(self, "angle", self.upwards * amplitude * self.clock.cosine)
-        put(
-            self,
-            "velocity",
-            -self.upwards * self.angular_frequency * amplitude * self.clock.sine,
-        )
-        put(self, "direction", -side)
+    @cached_property
+    def amplitude(self) -> FloatArray:
+        """r, rad."""
+        return np.exp(self.log_amplitude)
 
-    amplitude: FloatArray = None  # type: ignore[assignment]
-    """r, rad."""
-    angle: FloatArray = None  # type: ignore[assignment]
-    """x, rad, from the equilibrium."""
-    velocity: FloatArray = None  # type: ignore[assignment]
-    """x', rad/s."""
-    direction: FloatArray = None  # type: ignore[assignment]
-    """Sign of the velocity in each half cycle, shape (half cycles, 1)."""
+    @cached_property
+    def angle(self) -> FloatArray:
+        """x, rad, from the equilibrium."""
+        return self.upwards * self.amplitude * self.clock.cosine
+
+    @cached_property
+    def velocity(self) -> FloatArray:
+        """x', rad/s."""
+        return -self.upwards * self.angular_frequency * self.amplitude * self.clock.sine
+
+    @property
+    def direction(self) -> FloatArray:
+        """Sign of the velocity in each half cycle, shape (half cycles, 1)."""
+        return -self.upwards * self.clock.side
 
     @property
     def turning_angle(self) -> FloatArray:
@@ -201,8 +200,8 @@ def _solved(
         change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
         late = start_s + clock.integral(now.pace) - motion.time_s
         error = max(float(np.max(np.abs(change))), omega * float(np.max(np.abs(late))))
-        motion = Motion(
-            clock, omega, motion.log_amplitude + change, motion.time_s + late, motion.upwards
+        motion = replace(
+            motion, log_amplitude=motion.log_amplitude + change, time_s=motion.time_s + late
         )
         # The next change will be smaller by what this one is smaller than the last.
         smaller = min(error / before, 1.0) if before < math.inf else 1.0
@@ -218,13 +217,7 @@ def _solved(
 
 def _larger(motion: Motion) -> Motion:
     """The motion with a little more of ln r, for differences."""
-    return Motion(
-        motion.clock,
-        motion.angular_frequency,
-        motion.log_amplitude + _STEP,
-        motion.time_s,
-        motion.upwards,
-    )
+    return replace(motion, log_amplitude=motion.log_amplitude + _STEP)
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:
