@@ -256,7 +256,7 @@ def test_what_stands_in_fit_json_comes_back() -> None:
     time = np.arange(0.0, 200.0, 0.05)
     law = Eq8(OMEGA, 0.1, 0.0, 0.01, 1e-4)
     result = fit_recording(recorded(sample(law, Release(-0.3, 0.1), time), time, 1e-4))
-    again = FitResult.from_json(json.loads(json.dumps(result.as_json())))
+    again = FitResult.from_json(json.loads(json.dumps(result.to_dict())))
     assert again.decrement_check == result.decrement_check
     assert (again.light, again.light_reason) == (result.light, result.light_reason)
 

@@ -179,4 +179,4 @@ def test_no_exponential_loss_no_quality_factor() -> None:
     result = fit_points(table(time, exact, 1e-7), fixed={"b": 0.0})
     assert result.quality_factor_limit is None
     assert any("quality_factor_limit" in warning for warning in result.warnings)
-    assert result.as_json()["quality_factor_limit"]["value"] != 0.0
+    assert result.to_dict()["quality_factor_limit"]["value"] != 0.0

@@ -75,6 +75,27 @@ def test_intervals_cover_the_truth_on_the_bound() -> None:
     assert np.all(held > 1000 * 0.95 - 3.0 * math.sqrt(1000 * 0.95 * 0.05))
 
 
+@given(
+    root=hnp.arrays(np.float64, (3, 3), elements=ENTRY),
+    score=hnp.arrays(np.float64, 3, elements=st.floats(-5.0, 5.0)),
+    room=hnp.arrays(np.float64, 3, elements=st.floats(0.0, 2.0)),
+)
+def test_at_its_ends_chi2_has_risen_by_3_84_however_the_others_follow(root, score, room) -> None:  # type: ignore[no-untyped-def]
+    normal = root @ root.T + 0.1 * np.eye(3)
+    bounds = Bounds(np.zeros(3), np.array([np.inf, np.inf, 2.5]))
+    start = bounded_step(normal, score, bounds.about(room))
+    value, gradient = room + start, score - normal @ start
+    for j, ends in enumerate(intervals95(value, normal, gradient, bounds, range(3))):
+        for end in ends:
+            moved = np.zeros(3)
+            moved[j] = end - value[j]
+            left = bounded_step(normal, gradient - normal @ moved, bounds.about(value), (j,))
+            step = moved + left
+            risen = float(step @ normal @ step - 2.0 * gradient @ step)
+            at_wall = min(abs(end - bounds.lower[j]), abs(end - bounds.upper[j])) < 1e-9
+            assert risen <= HALF_95**2 + 1e-4 if at_wall else abs(risen - HALF_95**2) < 1e-4
+
+
 def test_what_is_held_has_no_variance() -> None:
     normal = np.array([[4.0, 1.0], [1.0, 2.0]])
     assert np.array_equal(covariance(normal, [1]), np.array([[0.25, 0.0], [0.0, 0.0]]))

@@ -202,7 +202,7 @@ def test_a_small_swing_is_fitted_as_before() -> None:
         fit_recording(recording, points=points, restoring=restoring)
         for restoring in (None, "linear")
     )  # type: ignore[misc]
-    assert auto.as_json() == linear.as_json()
+    assert auto.to_dict() == linear.to_dict()
 
 
 def test_the_turning_points_alone_know_sin_x() -> None:

@@ -176,9 +176,9 @@ def test_both_methods_agree() -> None:
 
 def test_fit_json_is_read_as_it_was_written() -> None:
     result = fitted()
-    content = json.loads(json.dumps(finite(result.as_json())))
+    content = json.loads(json.dumps(finite(result.to_dict())))
     again = FitResult.from_json(content)
-    assert finite(again.as_json()) == content
+    assert finite(again.to_dict()) == content
     assert set(content) == {
         "schema_version",
         "method",

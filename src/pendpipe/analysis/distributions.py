@@ -65,22 +65,10 @@ def chi2_beyond(score: Any, freedom: int) -> FloatArray:
 
 
 def chi2_of_one(p_value: float) -> float:
-    """Return the chi^2 of one degree of freedom beyond which chance goes with `p_value` > 0.
+    """Return the chi^2 of one degree of freedom beyond which chance goes with `p_value` > 0."""
+    from statistics import NormalDist
 
-    Newton's method on ln erfc(z/sqrt 2), which is concave: from the right it never overshoots.
-    """
-    if p_value >= 1.0:
-        return 0.0
-    wanted = math.log(p_value)
-    z = math.sqrt(-2.0 * wanted)
-    for _ in range(60):
-        beyond = math.erfc(z * math.sqrt(0.5))
-        slope = math.sqrt(2.0 / math.pi) * math.exp(-0.5 * z * z) / beyond
-        moved = (math.log(beyond) - wanted) / slope
-        z += moved
-        if abs(moved) < 1e-12 * (1.0 + z):
-            break
-    return z * z
+    return 0.0 if p_value >= 1.0 else NormalDist().inv_cdf(max(0.5 * p_value, 1e-307)) ** 2
 
 
 def poisson_up_to(count: Any, mean: Any) -> FloatArray:

@@ -7,8 +7,6 @@ from math import inf, isfinite, nan, pi
 
 from pendpipe.estimate import Estimate
 
-_REACH = 1.959963984540054
-
 
 @dataclass(frozen=True)
 class MeasuredRecord:
@@ -82,10 +80,7 @@ def quality_of_rate(frequency_hz: float, rate: Estimate) -> Estimate:
     if not rate.value > 0.0:
         return Estimate(nan, nan, "", (nan, nan))
     value = pi * frequency_hz / rate.value
-    low, high = rate.interval95 or (
-        rate.value - _REACH * rate.sd,
-        rate.value + _REACH * rate.sd,
-    )
+    low, high = rate.bounds95
     return Estimate(
         value,
         value * rate.sd / rate.value,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.envelope import fit_envelope
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import IntArray
+from pendpipe.arrays import BoolArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 
@@ -59,12 +59,13 @@ def tail_fits(points: TurningPoints, count: int = 12) -> list[Tail]:
     if last < 1:
         return []
     levels = np.geomspace(amplitude[0], max(amplitude[last], 1e-3 * amplitude[0]), count)
+    place = np.arange(len(points))
     starts = np.unique(np.searchsorted(-amplitude[: last + 1], -levels))
-    return [tail for start in starts if (tail := _tail(points, np.arange(start, len(points))))]
+    return [tail for start in starts if (tail := _tail(points, place >= start))]
 
 
-def _tail(points: TurningPoints, kept: IntArray) -> Tail | None:
-    part = part_of(points, kept)
+def _tail(points: TurningPoints, kept: BoolArray) -> Tail | None:
+    part = points.chosen(kept)
     try:
         found = fit_points(part).parameters
     except InputError:
@@ -75,17 +76,4 @@ def _tail(points: TurningPoints, kept: IntArray) -> Tail | None:
         a=found["a"],
         b=found["b"],
         c=found["c"],
-    )
-
-
-def part_of(points: TurningPoints, kept: IntArray) -> TurningPoints:
-    """Some of the turning points, with what they share."""
-    return replace(
-        points,
-        half_cycle=points.half_cycle[kept],
-        time_s=points.time_s[kept],
-        time_sd_s=points.time_sd_s[kept],
-        angle_rad=points.angle_rad[kept],
-        angle_sd_rad=points.angle_sd_rad[kept],
-        level_rad=points.level_rad[kept],
     )

@@ -119,7 +119,7 @@ def _record(
     }
     if result.fit is None:
         return content
-    fit = result.fit.as_json()
+    fit = result.fit.to_dict()
     split = next((s for s in separated.records if s.measured.record == row.record), None)
     content |= {name: fit["parameters"][name] for name in fit["parameters"]}
     content |= {

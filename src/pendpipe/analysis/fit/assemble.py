@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-import numpy as np
-
-from pendpipe.analysis.fit.intervals import CHI2_95
+from pendpipe.analysis.fit.intervals import CHI2_95, intervals95
+from pendpipe.analysis.fit.quadratic import Bounds
 from pendpipe.analysis.fit.result import PARAMETERS, FitResult, units
+from pendpipe.analysis.losses import quality_of_rate
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
 
@@ -29,6 +29,17 @@ class Numbers(NamedTuple):
     at_bound: Sequence[str]
 
 
+class Bounded(NamedTuple):
+    """A fit at its bounded optimum: its own parameters, a, b, c first."""
+
+    value: FloatArray
+    normal: FloatArray
+    gradient: FloatArray
+    held: Sequence[int]
+    matrix: FloatArray
+    """The covariance, without regard to the bounds."""
+
+
 def estimates(numbers: Numbers, unit: str) -> dict[str, Estimate]:
     """Dress the seven numbers with units and intervals."""
     dress = units(unit)
@@ -44,12 +55,14 @@ def estimates(numbers: Numbers, unit: str) -> dict[str, Estimate]:
 
 def quality_factor(rate: Estimate, frequency: float) -> Estimate | None:
     """Q = pi f/b of a rate b; None for b = 0."""
-    if not rate.value > 0.0:
-        return None
-    value = math.pi * frequency / rate.value
-    low, high = rate.interval95 or (rate.value, rate.value)
-    ends = (math.pi * frequency / high, math.pi * frequency / low if low > 0.0 else math.inf)
-    return Estimate(value, value * rate.sd / rate.value, "", ends)
+    return quality_of_rate(frequency, rate) if rate.value > 0.0 else None
+
+
+def with_intervals(value: FloatArray, covariance: FloatArray, fit: Bounded, at: Bounds) -> Numbers:
+    """Add to the seven numbers the intervals of a, b, c, and which of these lie at 0."""
+    ends = intervals95(fit.value, fit.normal, fit.gradient, at, range(3), fit.held, fit.matrix)
+    at_bound = [name for k, name in enumerate("abc") if k not in fit.held and fit.value[k] <= 0.0]
+    return Numbers(value, covariance, dict(zip("abc", ends, strict=True)), at_bound)
 
 
 def misfit(chi2_per_dof: float, dof: float) -> float:
@@ -86,13 +99,3 @@ def warn(result: FitResult, stretched: float) -> list[str]:
             " a, b, c of a tail depend on where it begins"
         )
     return said
-
-
-def wrapped(phase: float) -> float:
-    """A phase put between -pi and pi."""
-    return math.remainder(phase, 2.0 * math.pi)
-
-
-def propagated(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Covariance of what depends linearly on parameters."""
-    return np.asarray(jacobian @ covariance @ jacobian.T)

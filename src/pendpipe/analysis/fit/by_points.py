@@ -9,12 +9,18 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.assemble import Numbers, estimates, misfit, quality_factor, wrapped
+from pendpipe.analysis.fit.assemble import (
+    Bounded,
+    Numbers,
+    estimates,
+    misfit,
+    quality_factor,
+    with_intervals,
+)
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.decrement import check_decrement, light_of
 from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_energies, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
-from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
@@ -176,23 +182,20 @@ def _numbers(
     matrix[np.ix_(place, place)] = rates * sign[:, None] * sign
     level = float(np.mean(points.level_rad)) - float(envelope.value[4])
     lag = points.start_s - period.time_s
-    phase = wrapped(period.angular_frequency * lag + (0.0 if points.side[0] > 0 else math.pi))
+    phase = period.angular_frequency * lag + (0.0 if points.side[0] > 0 else math.pi)
     timing = np.array([[0.5 / math.pi, 0.0], [lag, -period.angular_frequency]])
     matrix[np.ix_([3, 5], [3, 5])] = timing @ period.covariance @ timing.T
     a, b, c, amplitude, _ = envelope.value
     value: FloatArray = np.array(
-        [a, b, c, 0.5 * period.angular_frequency / math.pi, amplitude, phase, level]
+        [
+            a,
+            b,
+            c,
+            0.5 * period.angular_frequency / math.pi,
+            amplitude,
+            math.remainder(phase, 2.0 * math.pi),
+            level,
+        ]
     )
-    intervals = dict(
-        zip(
-            "abc",
-            intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held),
-            strict=True,
-        )
-    )
-    at_bound = [
-        name
-        for index, name in enumerate("abc")
-        if index not in envelope.held and envelope.value[index] <= 0.0
-    ]
-    return Numbers(value, matrix, intervals, at_bound)
+    fit = Bounded(envelope.value, normal, gradient, envelope.held, rates)
+    return with_intervals(value, matrix, fit, BOUNDS)

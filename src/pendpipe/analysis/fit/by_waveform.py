@@ -11,17 +11,16 @@ import numpy as np
 
 from pendpipe.analysis.fit import waveform
 from pendpipe.analysis.fit.assemble import (
+    Bounded,
     Numbers,
     estimates,
     misfit,
-    propagated,
     quality_factor,
-    wrapped,
+    with_intervals,
 )
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.by_points import held_values
 from pendpipe.analysis.fit.decrement import check_decrement, light_of
-from pendpipe.analysis.fit.intervals import intervals95
 from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
@@ -266,17 +265,9 @@ def _numbers(fitted: _Fitted, scale: float, start_s: float) -> tuple[Numbers, Fl
             value[waveform.OFFSET],
         ]
     )
-    intervals = dict(
-        zip(
-            "abc",
-            intervals95(value, normal, gradient, waveform.BOUNDS, range(3), held, matrix),
-            strict=True,
-        )
-    )
-    at_bound = [
-        name for index, name in enumerate("abc") if index not in held and value[index] <= 0.0
-    ]
-    return Numbers(numbers, propagated(jacobian, matrix), intervals, at_bound), matrix
+    fit = Bounded(value, normal, gradient, held, matrix)
+    covariances = jacobian @ matrix @ jacobian.T
+    return with_intervals(numbers, covariances, fit, waveform.BOUNDS), matrix
 
 
 def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
@@ -306,8 +297,8 @@ def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, 
     jacobian[4, waveform.OFFSET] -= side
     jacobian[5] = -omega * late
     jacobian[5, waveform.OMEGA] += start_s - time
-    phase = wrapped(omega * (start_s - time) + (0.0 if side > 0 else math.pi))
-    return (amplitude, phase), jacobian
+    phase = omega * (start_s - time) + (0.0 if side > 0 else math.pi)
+    return (amplitude, math.remainder(phase, 2.0 * math.pi)), jacobian
 
 
 __all__ = ["Noise", "fit_waveform"]

@@ -64,10 +64,6 @@ class Decrement(NamedTuple):
         """Whether they agree, and so closely that this says something."""
         return not self.contradicts and abs(self.excess) <= _CONFIRMED
 
-    def as_json(self) -> dict[str, float]:
-        """Return the form of ``fit.json``."""
-        return self._asdict()
-
     def sentence(self, unit: str) -> str:
         """Say it in a clause."""
         return (

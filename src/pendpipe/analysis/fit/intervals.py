@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.quadratic import Bounds, bounded_step, covariance, solved
+from pendpipe.analysis.fit.quadratic import Bounds, covariance, solved
 from pendpipe.arrays import FloatArray
 
 CHI2_95: Final = 3.841458820694124
@@ -83,66 +83,37 @@ def _profiled_end(
     value: FloatArray, normal: FloatArray, gradient: FloatArray, bounds: Bounds, index: int,
     held: Sequence[int], reach: float,
 ) -> float:  # fmt: skip
-    """One end of an interval that a bound takes part in."""
-    normal, gradient, bounds, value, index = _bounded_part(
-        normal, gradient, bounds, value, index, held
-    )
+    """One end of an interval that a bound takes part in, at most `reach` away.
 
-    def rise(distance: float) -> float:
-        """Rise of chi^2 when the parameter is moved and the others follow."""
-        pulled = gradient - normal[:, index] * distance
-        step = bounded_step(normal, pulled, bounds.about(value), (index,))
-        step[index] = distance
-        return float(step @ normal @ step - 2.0 * gradient @ step)
-
-    low, high = float(bounds.lower[index]), float(bounds.upper[index])
-    reach = min(max(reach, low - float(value[index])), high - float(value[index]))
-    return float(value[index]) + _crossing(rise, reach)
-
-
-def _bounded_part(
-    normal: FloatArray, gradient: FloatArray, bounds: Bounds, value: FloatArray, index: int,
-    held: Sequence[int],
-) -> tuple[FloatArray, FloatArray, Bounds, FloatArray, int]:  # fmt: skip
-    """Eliminate what has no bounds (it follows freely), and drop what is held."""
-    free = [j for j in range(len(value)) if j not in held]
-    walled = [j for j, _ in bounds.walls(free)]
-    kept = [j for j in free if j == index or j in walled]
-    gone = [j for j in free if j not in kept]
-    block, cross = normal[np.ix_(kept, kept)], normal[np.ix_(gone, kept)]
-    if gone:
-        both = np.concatenate([cross, gradient[gone][:, None]], axis=1)
-        carried = np.stack([solved(normal[np.ix_(gone, gone)], each) for each in both.T], axis=1)
-        block = block - cross.T @ carried[:, :-1]
-        gradient = gradient[kept] - cross.T @ carried[:, -1]
-    else:
-        gradient = gradient[kept]
-    part = Bounds(bounds.lower[kept], bounds.upper[kept])
-    return block, gradient, part, value[kept], kept.index(index)
-
-
-def _crossing(rise: Callable[[float], float], reach: float) -> float:
-    """Where the rise comes to the 95 % point between 0 and `reach`; `reach` if it does not.
-
-    By the rule of false position on its root, which is nearly a straight line.
+    The end is found as if nothing were bounded; what then lies beyond its bound is put there, and
+    what its bound holds back no more is let go, until the end stays.
     """
-    goal = math.sqrt(CHI2_95)
-    low, below = 0.0, -goal
-    high, above = reach, math.sqrt(max(rise(reach), 0.0)) - goal
-    if above <= 0.0:
-        return reach
-    side = 0
-    for _ in range(40):
-        middle = low - below * (high - low) / (above - below)
-        now = math.sqrt(max(rise(middle), 0.0)) - goal
-        if abs(now) < 1e-4:
-            return middle
-        if now > 0.0:
-            high, above = middle, now
-            below *= 0.5 if side > 0 else 1.0
-            side = 1
+    room, on = bounds.about(value), dict[int, float]()
+    low, high = sorted((0.0, reach))
+    low, high = max(low, float(room.lower[index])), min(high, float(room.upper[index]))
+    others = [j for j in range(len(value)) if j not in held and j != index]
+    for _ in range(3 * len(value)):
+        free = [j for j in others if j not in on] + [index]
+        step = np.zeros(len(value))
+        step[list(on)] = list(on.values())
+        pulled = gradient - normal @ step
+        risen = float(step @ normal @ step - 2.0 * gradient @ step)
+        block = normal[np.ix_(free, free)]
+        best = solved(block, pulled[free])
+        follow = solved(block, (np.array(free) == index).astype(np.float64))
+        left = CHI2_95 - risen + float(pulled[free] @ best)
+        end = float(best[-1]) + math.copysign(math.sqrt(max(left * follow[-1], 0.0)), reach)
+        end = min(max(end, low), high)
+        step[free] = best + follow / follow[-1] * (end - best[-1])
+        slope = normal @ step - gradient
+        idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == room.lower[j])]
+        beyond = np.maximum(room.lower - step, step - room.upper) * np.sqrt(normal.diagonal())
+        worst = max(free[:-1], key=lambda j: float(beyond[j]), default=index)
+        if idle:
+            del on[idle[0]]
+        elif worst != index and beyond[worst] > 1e-9:
+            below = step[worst] < room.lower[worst]
+            on[worst] = float((room.lower if below else room.upper)[worst])
         else:
-            low, below = middle, now
-            above *= 0.5 if side < 0 else 1.0
-            side = -1
-    return 0.5 * (low + high)
+            break
+    return float(value[index]) + end

@@ -156,10 +156,6 @@ class FitResult:
             raise InputError("plot", "the readings are not with this fit", "fit the recording anew")
         return draw_fit(self, self.points, self.decay)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``fit.json``."""
-        return self.as_json()
-
     def to_frame(self) -> DataFrame:
         """Return a table with a row a parameter: value, sd, low95, high95, unit."""
         from pandas import DataFrame
@@ -181,7 +177,7 @@ class FitResult:
 
         target = Path(folder)
         make_folder(target)
-        write_json(target / "fit.json", self.as_json())
+        write_json(target / "fit.json", self.to_dict())
         if self.points is not None and self.decay is not None:
             from pendpipe.figures.style import save
 
@@ -193,7 +189,7 @@ class FitResult:
         """Value of one parameter."""
         return self.parameters[name].value
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the content of ``fit.json``."""
         limit = self.quality_factor_limit
         if limit is None:
@@ -205,7 +201,7 @@ class FitResult:
             "restoring": self.restoring,
             "light": self.light,
             "light_reason": self.light_reason,
-            "decrement_check": [check.as_json() for check in self.decrement_check],
+            "decrement_check": [check._asdict() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
             "quality_factor_limit": limit.as_json(),
             "quality_factor_hysteretic": _optional(self.quality_factor_hysteretic),

@@ -65,27 +65,17 @@ def rounded(
 def best_noise(residual: FloatArray, step: float, start: float) -> float:
     """The most likely noise before the rounding, between step/25 and step.
 
-    By golden section on its logarithm. The diagnosis asks about the same noise in two more
-    places, each with a question of its own: what a reading's neighbours make of it
-    (`forensics.lattice.noise_before_rounding`), and whether the rounding's bias is to be seen
-    at all (`diagnose.data.with_lattice`).
+    Its logarithm is where a parabola through the three best of nine has its vertex.
     """
     score, weight = np.empty_like(residual), np.empty_like(residual)
 
     def unlikely(logarithm: float) -> float:
         return float(rounded(residual, 0.5 * step, math.exp(logarithm), score, weight))
 
-    golden = 0.5 * (math.sqrt(5.0) - 1.0)
-    low, high = math.log(0.04 * step), math.log(max(step, 2.0 * start))
-    inner, outer = high - golden * (high - low), low + golden * (high - low)
-    at_inner, at_outer = unlikely(inner), unlikely(outer)
-    while high - low > 0.02:
-        if at_inner < at_outer:
-            high, outer, at_outer = outer, inner, at_inner
-            inner = high - golden * (high - low)
-            at_inner = unlikely(inner)
-        else:
-            low, inner, at_inner = inner, outer, at_outer
-            outer = low + golden * (high - low)
-            at_outer = unlikely(outer)
-    return math.exp(0.5 * (low + high))
+    grid = np.linspace(math.log(0.04 * step), math.log(max(step, 2.0 * start)), 9)
+    costs = [unlikely(each) for each in grid.tolist()]
+    best = min(max(int(np.argmin(costs)), 1), 7)
+    before, least, after = costs[best - 1 : best + 2]
+    bend = before - 2.0 * least + after
+    turn = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return math.exp(grid[best] + min(max(turn, -1.0), 1.0) * (grid[1] - grid[0]))

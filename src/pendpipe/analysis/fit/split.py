@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from pendpipe.analysis.fit.waveform import OMEGA, SHARE, B
+from pendpipe.analysis.losses import quality_of_rate
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
 
@@ -44,15 +45,7 @@ def split_quality_factors(
     for part, sign in ((share, 1.0), (1.0 - share, -1.0)):
         # Of the product b x part.
         variance = part**2 * variance_b + sign * part * mixed + b**2 * variance_share
-        rate_sd = math.sqrt(max(variance, 0.0))
-        parts.append(_quality_factor(part * b, rate_sd, float(value[OMEGA])))
+        rate = Estimate(part * b, math.sqrt(max(variance, 0.0)), "1/s")
+        known = rate.bounds95[0] > 0.0
+        parts.append(quality_of_rate(0.5 * float(value[OMEGA]) / math.pi, rate) if known else None)
     return parts[0], parts[1], [_CAVEAT]
-
-
-def _quality_factor(rate: float, sd: float, omega: float) -> Estimate | None:
-    """omega/(2 rate), its interval from the rate's; None where the rate may be zero."""
-    low, high = rate - 1.96 * sd, rate + 1.96 * sd
-    if low <= 0.0:
-        return None
-    half = 0.5 * omega
-    return Estimate(half / rate, half * sd / rate**2, "", (half / high, half / low))
