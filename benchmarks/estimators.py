@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+import pendpipe as pp
 from benchmarks.table import Row, at_least, at_most, cpu_seconds, within, write
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
@@ -234,8 +235,8 @@ def speed(rounds: int = 100) -> list[Row]:
             "prominent": by_turns(lambda one: prominent_peaks(TIME_S, one.values, NOISE)),
             "spaced": by_turns(lambda one: spaced(one, quartic=False)),
             "quartic": by_turns(lambda one: spaced(one, quartic=True)),
-            "points": by_turns(lambda one: fit_recording(one, method="turning-points")),
-            "waveform": by_turns(fit_recording),
+            "points": by_turns(lambda one: pp.fit(one, method="turning-points")),
+            "waveform": by_turns(pp.fit),
         },
         rounds,
         statistic=statistics.median,
@@ -245,19 +246,18 @@ def speed(rounds: int = 100) -> list[Row]:
     found = [
         Row(
             "time from array to a, b, c with errors: `find_peaks` by prominence; by distance;"
-            " by distance, with quartics; turning-point route; waveform fit",
+            " by distance, with quartics; `pp.fit` of the turning points; `pp.fit`",
             shown,
         ),
+        at_most("`pp.fit`, warm", 1e3 * ours, 5.0, " ms"),
+        at_most("`pp.fit` over `find_peaks(prominence)`, `curve_fit`", ours / t["prominent"], 1.0),
         at_most(
-            "waveform fit over `find_peaks(prominence)`, `curve_fit`", ours / t["prominent"], 1.0
-        ),
-        at_most(
-            "waveform fit over `find_peaks(distance)`, quartics, `curve_fit` (told the period)",
+            "`pp.fit` over `find_peaks(distance)`, quartics, `curve_fit` (told the period)",
             ours / t["quartic"],
             1.0,
         ),
         at_most(
-            "waveform fit over `find_peaks(distance)`, `curve_fit` (told the period; c biased"
+            "`pp.fit` over `find_peaks(distance)`, `curve_fit` (told the period; c biased"
             " by -180 %)",
             ours / t["spaced"],
             1.0,
@@ -280,7 +280,7 @@ def against_lmfit(ours: float) -> list[Row]:
         for name, value in zip("abc", found, strict=True)
     ]
     return [
-        at_least("waveform fit over lmfit with `solve_ivp`", spent / ours, 5000.0),
+        at_least("`pp.fit` over lmfit with `solve_ivp`", spent / ours, 5000.0),
         at_most("the two apart, in sd of a, b, c", apart, 0.1),
     ]
 
