@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self
@@ -202,10 +203,10 @@ class ReplaceableTerminal(PseudoTerminal):
         self._open()
         Path(self.port).symlink_to(os.ttyname(self._host))
 
-    def close(self) -> None:
-        """End the line for good."""
-        super().close()
-        self._folder.rmdir()
+    def forget(self) -> None:
+        """Remove the folder of the name."""
+        with suppress(FileNotFoundError):
+            self._folder.rmdir()
 
 
 class ReplaceableSocket(LoopbackSocket):
@@ -254,6 +255,12 @@ class FaultyDevice(SimulatedDevice):
             self.dialect.streaming = True
             self._begin()
         return super().__enter__()
+
+    def unplug(self) -> None:
+        """End the device and its line."""
+        super().unplug()
+        if isinstance(self._link, ReplaceableTerminal):
+            self._link.forget()
 
     def step(self) -> None:
         """Read what the host has sent, and send what is due by now, as the faults allow."""

@@ -47,9 +47,6 @@ class Wire:
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Nobody waits at this end: the host's steps do."""
 
-    def wake(self) -> None:
-        """Likewise."""
-
     def receive(self) -> bytes:
         data, self.sent = self.sent, b""
         return data
@@ -60,8 +57,6 @@ class Wire:
 
     def unplug(self) -> None:
         raise NotImplementedError("a wire in memory has no plug")
-
-    close = unplug
 
 
 class SteppedLine(Line):

@@ -9,33 +9,15 @@ from contextlib import suppress
 from typing import TypeAlias
 
 
-class _Waking:
-    """A pair of sockets that ends a wait from another thread (on every system)."""
-
-    def __init__(self) -> None:
-        self._bell, self._rope = socket.socketpair()
-        self._bell.setblocking(False)
-
-    def _wait(self, read: int | None, write: int | None, timeout_s: float) -> None:
-        readers = [self._bell.fileno()] + ([] if read is None else [read])
-        select.select(readers, [] if write is None else [write], [], max(0.0, timeout_s))
-        with suppress(BlockingIOError):
-            self._bell.recv(64)
-
-    def wake(self) -> None:
-        """Let a waiting thread go on."""
-        self._rope.send(b"!")
-
-    def _close(self) -> None:
-        self._bell.close()
-        self._rope.close()
+def _wait(read: int, write: int | None, timeout_s: float) -> None:
+    """Wait until there is something to read, or room to write."""
+    select.select([read], [] if write is None else [write], [], max(0.0, timeout_s))
 
 
-class PseudoTerminal(_Waking):
+class PseudoTerminal:
     """A pseudo-terminal, which the driver opens as it opens any serial port."""
 
     def __init__(self) -> None:
-        super().__init__()
         self._open()
         self.port = os.ttyname(self._host)
 
@@ -50,8 +32,8 @@ class PseudoTerminal(_Waking):
         self._connected = True
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
-        """Wait until there is something to read (or room to write), or `wake` is called."""
-        self._wait(self._device, self._device if sending else None, timeout_s)
+        """Wait until there is something to read (or room to write)."""
+        _wait(self._device, self._device if sending else None, timeout_s)
 
     def receive(self) -> bytes:
         """Return what the host has sent; nothing when it has sent nothing."""
@@ -74,17 +56,11 @@ class PseudoTerminal(_Waking):
             os.close(self._device)
             os.close(self._host)
 
-    def close(self) -> None:
-        """End the line for good."""
-        self.unplug()
-        self._close()
 
-
-class LoopbackSocket(_Waking):
+class LoopbackSocket:
     """A socket on 127.0.0.1, for pyserial's ``socket://``; one host at a time."""
 
     def __init__(self) -> None:
-        super().__init__()
         self._host: socket.socket | None = None
         self._listen(0)
         self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
@@ -94,10 +70,10 @@ class LoopbackSocket(_Waking):
         self._listener.setblocking(False)
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
-        """Wait until there is something to read (or room to write), or `wake` is called."""
+        """Wait until there is something to read (or room to write)."""
         end = self._host or self._listener
         writing = self._host is not None and sending
-        self._wait(end.fileno(), end.fileno() if writing else None, timeout_s)
+        _wait(end.fileno(), end.fileno() if writing else None, timeout_s)
 
     def receive(self) -> bytes:
         """Return what the host has sent; accept a host that has come, drop one that left."""
@@ -135,11 +111,6 @@ class LoopbackSocket(_Waking):
             self._host.close()
             self._host = None
         self._listener.close()
-
-    def close(self) -> None:
-        """End the line for good."""
-        self.unplug()
-        self._close()
 
 
 Link: TypeAlias = PseudoTerminal | LoopbackSocket

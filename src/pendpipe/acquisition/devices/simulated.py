@@ -115,8 +115,9 @@ Signal: TypeAlias = Callable[[FloatArray], FloatArray]
 _BLOCKS: Final = (1 << 10, 1 << 14)
 """Scans computed at a time, ahead of schedule: few at first, then more and more, so that
 neither a short nor a long recording pays for the signal twice."""
-_REST_S: Final = 0.002
-"""The shortest time between two pieces of data, in seconds of the host."""
+_REST_S, _LONGEST_REST_S = 0.002, 0.02
+"""The shortest time between two pieces of data, and the longest for which an unplugged device
+lives on; in seconds of the host."""
 
 
 class Stream:
@@ -272,15 +273,15 @@ class SimulatedDevice:
         """End the device and its line: the host's next read fails."""
         if not self._ending.is_set():
             self._ending.set()
-            self._link.wake()
             self._thread.join()
-            self._link.close()
+            self._link.unplug()
 
     def _live(self) -> None:
         """Serve the line until the end; an exception of the signal silences the device."""
         try:
             while not self._ending.is_set():
-                self._link.wait(self._rest_s(), sending=bool(self._outbox))
+                rest_s = min(self._rest_s(), _LONGEST_REST_S)
+                self._link.wait(rest_s, sending=bool(self._outbox))
                 self.step()
         except BaseException as fault:
             self.failure = fault
@@ -309,7 +310,7 @@ class SimulatedDevice:
 
     def _rest_s(self) -> float:
         """How long there is nothing to do, in seconds of the host, if the host is silent."""
-        return self._stream.rest_s(self.clock) if self._stream else 60.0
+        return self._stream.rest_s(self.clock) if self._stream else _LONGEST_REST_S
 
     def _send(self) -> None:
         """Send what the line takes; while it is full, simulated time stands still."""
