@@ -139,7 +139,11 @@ def main() -> None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             used = _measured(row.command(Path(folder)), Path(folder), row.end)
-            said = re.sub(r"(\S{20})\S{80,}", r"\1...", used.said.replace(folder + os.sep, ""))
+            said = re.sub(
+                r"(\S{20})\S{80,}",
+                r"\1...",
+                used.said.replace(folder + os.sep, "").replace(folder, "FOLDER"),
+            )
             left = row.left(Path(folder)) if used.status in row.statuses else ""
         right = (
             used.cpu_s < MOST_SECONDS
