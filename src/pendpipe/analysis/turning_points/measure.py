@@ -194,13 +194,12 @@ def _solved(
     inverse
         Of the Gram matrix without the level, (k, size, size).
     """
-    system = gram[:, 1:, 1:].copy()
-    diagonal = np.arange(system.shape[1])
+    one = np.eye(right.shape[1] - 1)
     # A hair of regularisation: few samples can't tell harmonics apart.
-    system[:, diagonal, diagonal] *= 1.0 + 1e-9
+    system = gram[:, 1:, 1:] * (1.0 + 1e-9 * one)
     system[:, 1, 1] += prior + 1e-12
     empty = gram[:, 0, 0] == 0.0
-    system[empty] = np.eye(system.shape[1])
+    system[empty] = one
     inverse: FloatArray = np.asarray(np.linalg.inv(system), dtype=np.float64)
     inverse[empty] = np.nan
     told = np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2)
