@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis.held_out import held_out
+from pendpipe.diagnosis.held_out import completed, held_out, predicts_worse
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.effects.catalogue import by_identifier
 
@@ -50,3 +51,34 @@ def test_an_effect_that_is_not_there_predicts_no_better(name: str) -> None:
     found = held_out(fit, more, data, noise, (), ())
     assert found.gain < 6.0
     assert found.gain < 3.0 * found.gain_sd + 1.0
+
+
+def test_a_law_that_only_noise_asked_for_predicts_worse_and_a_right_one_does_not() -> None:
+    """A line fitted to noise loses about a unit of ln p for its two sizes."""
+    fit, data, noise = null_fit()
+    model = fit.model.adding(by_identifier("tone-pickup"))
+    more = refine(model, data, noise, np.concatenate([fit.value, [1e-4, 1e-4, 3.3]]))
+    assert predicts_worse(fit, more, data, noise, (), ())
+    outcome = diagnosed("sensor-cubic")
+    found = outcome.search
+    assert not predicts_worse(
+        found.baseline, found.improved, found.data, found.noise, (), found.held
+    )
+
+
+def test_coloured_noise_is_predicted_from_what_is_known() -> None:
+    """Noise with a memory: the error of the first missing reading is smaller than the noise."""
+    count = 400
+    steps = np.random.default_rng(1).standard_normal(count)
+    walk = np.cumsum(steps)
+    walk -= walk.mean()
+    order = np.maximum(np.arange(count), 0.5)
+    spectrum = 1.0 / (2.0 - 2.0 * np.cos(np.pi * order / count))
+    noise = Noise(spectrum, np.ones(count))
+    out = np.zeros(count, dtype=bool)
+    out[150:160] = True
+    filled = completed(walk, noise, out)
+    straight = np.interp(np.arange(count)[out], np.arange(count)[~out], walk[~out])
+    # The mean of a random walk between known readings is a straight line.
+    np.testing.assert_allclose(filled[out], straight, atol=0.05 * np.std(walk))
+    np.testing.assert_allclose(filled[~out], walk[~out])

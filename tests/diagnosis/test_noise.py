@@ -168,3 +168,41 @@ def test_a_counter_errs_in_time_so_its_angles_err_where_it_is_fast() -> None:
     variance = white_noise(data_of(speed), 1e-3, speed).sd ** 2
     assert variance[np.abs(speed).argmax()] > 4.0 * variance[np.abs(speed).argmin()]
     assert np.all(variance > 0.0)
+
+
+def test_a_counters_errors_are_white_once_divided_by_their_level() -> None:
+    """A row a count: fewer rows in a cycle as the swings become smaller, and errors in time."""
+    fine = np.linspace(0.0, 100.0, 400_000)
+    angle = np.exp(-0.01 * fine) * np.cos(2.0 * np.pi * MOTION_HZ * fine)
+    times = fine[1:][np.diff(np.floor(angle / 0.02)) != 0.0]
+    speed = np.interp(times, fine, np.gradient(angle, fine))
+    error = 1e-3 * speed * np.random.default_rng(2).standard_normal(len(times))
+    data = Data(times, error, float(np.median(np.diff(times))), False, np.ones(len(times)))
+    noise = estimate_noise(data, error, MOTION_HZ, 0.0, slope=speed)
+    assert not noise.coloured
+    fast = np.abs(speed) > np.median(np.abs(speed))
+    squares = noise.whiten(error) ** 2
+    assert np.mean(squares[fast]) == pytest.approx(1.0, abs=0.35)
+
+
+def test_uneven_readings_are_whitened_as_they_follow_each_other() -> None:
+    generator = np.random.default_rng(6)
+    readings = low_pass(generator)
+    times = np.arange(COUNT) * INTERVAL_S + 0.3 * INTERVAL_S * generator.uniform(-1.0, 1.0, COUNT)
+    data = Data(times, readings, INTERVAL_S, False, np.ones(COUNT))
+    white = estimate_noise(data, readings, MOTION_HZ, 0.0).whiten(readings)
+    for part in np.split(white**2, 5):
+        assert np.mean(part) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 * 5.0 / COUNT))
+
+
+@pytest.mark.parametrize("made", [white, red, low_pass])
+def test_a_misfit_stands_out_of_noise_of_any_colour(
+    made: Callable[[np.random.Generator], FloatArray],
+) -> None:
+    """Its mean square about the harmonics is that of noise, with a small part of the motion not."""
+    readings = made(np.random.default_rng(4))
+    noise = estimated(readings)
+    assert noise.misfit(noise.whiten(readings)) == pytest.approx(1.0, abs=0.5)
+    times = np.arange(COUNT) * INTERVAL_S
+    wrong = readings + 5e-4 * np.sin(2.0 * np.pi * MOTION_HZ * times)
+    assert noise.misfit(noise.whiten(wrong)) > 3.0

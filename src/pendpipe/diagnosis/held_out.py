@@ -118,12 +118,12 @@ def _squared_error(
     """
     if not noise.coloured:
         return noise.whiten(residual) ** 2
-    complete = residual if used.all() else _completed(residual, noise, ~used)
-    error = complete - _completed(complete, noise, out | ~used)
+    complete = residual if used.all() else completed(residual, noise, ~used)
+    error = complete - completed(complete, noise, out | ~used)
     return np.asarray(error * noise.adjoint(noise.whiten(error)))
 
 
-def _completed(residual: FloatArray, noise: Noise, missing: BoolArray) -> FloatArray:
+def completed(residual: FloatArray, noise: Noise, missing: BoolArray) -> FloatArray:
     """Replace missing numbers by their mean, given the others (by conjugate gradients)."""
     found = np.where(missing, 0.0, residual)
     left = np.where(missing, -noise.adjoint(noise.whiten(found)), 0.0)

@@ -17,6 +17,10 @@ from pendpipe.diagnosis.numerics import cosines, from_cosines
 _HARMONICS: Final = 7
 _HARMONIC_HALF_WIDTH: Final = 0.08
 """Half width of the band about each harmonic that a misfit may fill, over the frequency."""
+_CYCLES_TOGETHER: Final = 5.0
+"""Cycles over which the readings in a cycle are counted."""
+_FEWEST_COSINES: Final = 40
+"""Between the harmonics; if there are fewer, those about them are used as well."""
 _SLOPES: Final = (0.0, 1.5, 4.0)
 """Rms slopes of ln S against ln f that are tried, at the slowest cosine. Known noises have 0
 (white), 1 (flicker) and 2 (random walk), and steeper ones where a drift is filtered."""
@@ -191,14 +195,23 @@ def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Nois
         If the error is in the time: the speed at each reading.
     """
     variance = np.full(len(data), rms * rms)
-    if slope is None:
-        return Noise(variance, data.weight)
+    return Noise(variance, data.weight, None if slope is None else _level_of_counts(slope))
+
+
+def _level_of_counts(slope: FloatArray) -> FloatArray:
+    """Return the level of readings that err in time: in proportion to the speed, half at rest."""
     usual = math.sqrt(float(np.mean(slope**2)))
-    return Noise(variance, data.weight, np.sqrt(0.25 + (slope / usual) ** 2))
+    return np.sqrt(0.25 + (slope / usual) ** 2)
 
 
 def estimate_noise(
-    data: Data, residual: FloatArray, frequency_hz: float, floor: float, *, red: bool = True
+    data: Data,
+    residual: FloatArray,
+    frequency_hz: float,
+    floor: float,
+    *,
+    red: bool = True,
+    slope: FloatArray | None = None,
 ) -> Noise:
     """Estimate the noise from a residual.
 
@@ -215,18 +228,34 @@ def estimate_noise(
         The smallest rms that is plausible.
     red
         Whether the noise may grow to low frequencies.
+    slope
+        If the error is in the time: the speed at each reading.
     """
-    spacing = float(data.time_s[-1] - data.time_s[0]) / (len(data) - 1)
-    noise_only = _noise_only(len(data), frequency_hz * spacing)
-    noise = Noise(np.ones(len(data)), data.weight, harmonics=~noise_only)
+    noise_only = _noise_only(len(data), *_cycles_per_reading(data, frequency_hz))
+    level = None if slope is None else _level_of_counts(slope)
+    noise = Noise(np.ones(len(data)), data.weight, level, harmonics=~noise_only)
     noise.harmonics[0] = False
     noise = _with_spectrum(noise, residual, noise_only, red=red)
-    level, charge = _level(noise, residual, noise_only)
-    if level is not None:
-        noise = replace(noise, level=level)
+    change, charge = _change_of_level(noise, residual, noise_only)
+    if change is not None:
+        noise = replace(noise, level=change if level is None else change * level)
         noise = _with_spectrum(noise, residual, noise_only, red=red)
         noise = replace(noise, charge=noise.charge + charge)
     return replace(noise, variance=noise.variance * max((floor / noise.rms) ** 2, 1.0))
+
+
+def _cycles_per_reading(data: Data, frequency_hz: float) -> tuple[float, float]:
+    """Return the lowest and the highest frequency of the motion, in cycles per reading.
+
+    They differ where rows come with events: fewer in a cycle as the swings become smaller.
+    """
+    usual = frequency_hz * float(data.time_s[-1] - data.time_s[0]) / (len(data) - 1)
+    if data.uniform:
+        return usual, usual
+    edges = np.arange(data.time_s[0], data.time_s[-1], _CYCLES_TOGETHER / frequency_hz)
+    number = np.diff(np.searchsorted(data.time_s, edges))
+    found = _CYCLES_TOGETHER / np.maximum(number, 1)
+    return min(usual, *found.tolist()), max(usual, *found.tolist())
 
 
 def _with_spectrum(
@@ -270,7 +299,7 @@ def _largest_beside(logs: FloatArray, middle: FloatArray) -> FloatArray:
     return np.asarray(np.max(np.where(apart < math.log(2.0), logs, -np.inf), axis=1))
 
 
-def _level(
+def _change_of_level(
     noise: Noise, residual: FloatArray, noise_only: BoolArray
 ) -> tuple[FloatArray | None, float]:
     """Return the relative level, None if it is constant, and the charge for its estimate.
@@ -302,18 +331,25 @@ def _level(
     return np.exp(0.5 * (log - float(np.mean(log)))), found.charge
 
 
-def _noise_only(count: int, motion: float) -> BoolArray:
+def _noise_only(count: int, lowest: float, highest: float) -> BoolArray:
     """Return which cosines contain noise alone; the offset itself is fitted.
 
-    `motion` is the frequency in cycles per reading.
+    Parameters
+    ----------
+    count
+        Of the readings.
+    lowest, highest
+        Frequency of the motion in cycles per reading.
     """
     frequency = np.arange(count) / (2.0 * count)
-    noise_only = np.arange(count) >= 1
-    for harmonic in range(1, _HARMONICS):
-        noise_only &= np.abs(frequency - harmonic * motion) > _HARMONIC_HALF_WIDTH * motion
-    if np.count_nonzero(noise_only) < 40:
-        noise_only = np.arange(count) >= 1
-    return np.asarray(noise_only)
+    harmonic = np.arange(1, _HARMONICS)[:, None]
+    below = frequency < (harmonic - _HARMONIC_HALF_WIDTH) * lowest
+    above = frequency > (harmonic + _HARMONIC_HALF_WIDTH) * highest
+    noise_only: BoolArray = np.all(below | above, axis=0)
+    if np.count_nonzero(noise_only) < _FEWEST_COSINES:
+        noise_only = np.ones(count, dtype=bool)
+    noise_only[0] = False
+    return noise_only
 
 
 @lru_cache(maxsize=8)

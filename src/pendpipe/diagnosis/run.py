@@ -16,6 +16,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.lattice import with_true_step
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
@@ -235,7 +236,8 @@ def diagnose_decay(
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
     effects = _in_order(found, weighed)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
-    stamps = (*([gap] if gap else []), *found.clock_notes)
+    changing = None if found.data.time_noise else level_note(found.noise)
+    stamps = (*([gap] if gap else []), *found.clock_notes, *([changing] if changing else []))
     noise_rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _fitted_model(found.baseline, found)
     if not fixed:

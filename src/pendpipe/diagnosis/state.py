@@ -124,15 +124,15 @@ def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
     """Estimate the noise from a fit's residual."""
     frequency = fit.value[OMEGA] / (2.0 * np.pi)
     residual = data.residual(fit.at.reading)
-    return estimate_noise(data, residual, frequency, _LEAST_STEP * data.step, red=red)
+    slope = fit.at.sampled.velocity if data.time_noise else None
+    floor = _LEAST_STEP * data.step
+    return estimate_noise(data, residual, frequency, floor, red=red, slope=slope)
 
 
 def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Estimate the noise again if the model is good enough, and refit with it."""
-    if data.time_noise:
-        return fit, data, noise
     finer = with_lattice(data, fit.at.reading)
     left = noise_of_residual(fit, finer, red=red)
     # Differences of phase within the noise at the motion's frequency are none.

@@ -24,6 +24,18 @@ _MISFIT: Final = 1.3
 _NEAR_BAND: Final = (0.3, 3.0)
 
 
+def level_note(noise: Noise) -> str | None:
+    """Say by how much the noise's level changes along the record; None where it hardly does."""
+    if noise.level is None:
+        return None
+    first, last = (float(np.sqrt(np.mean(part**2))) for part in np.array_split(noise.level, 2))
+    ratio = float(noise.level.max() / noise.level.min())
+    if ratio < _HARMLESS_RATIO:
+        return None
+    how = "larger" if first > last else "smaller"
+    return f"the noise changes in time, by a factor of {ratio:.2g}; it is {how} in the first half"
+
+
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the density near the pendulum's frequency differs from the mean by over 1.5.
 
