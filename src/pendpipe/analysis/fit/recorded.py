@@ -17,9 +17,9 @@ from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Recording
 
-_STEP: Final = 1.5
+_STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
-_LEAST: Final = 0.3
+_LEAST: Final = 0.6
 """Of the first amplitude: so much of the decay is kept at least."""
 _FEWEST: Final = 15
 """Turning points of such a part."""
@@ -120,6 +120,8 @@ def _fit(
         return _amber(by_points, f"from the turning points, because for the waveform {why}")
     for part in _larger_amplitudes(points):
         larger = fit_waveform(samples, part, baseline=baseline, fixed=fixed, restoring=restoring)
+        if not _stands(larger):
+            larger = fit_points(part, baseline=baseline, fixed=fixed, restoring=restoring)
         if _stands(larger):
             return _of_larger(larger, points, part)
     return result if result.settled else by_points
