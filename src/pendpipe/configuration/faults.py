@@ -13,6 +13,23 @@ from pydantic import BaseModel, ValidationError
 from pendpipe.errors import InputError
 
 
+def read_text(path: Path, absent: str, remedy: str, form: str) -> str:
+    """Read a file that the user has written.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is no text.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(path, f"there is no such {absent}", remedy) from None
+    except (OSError, UnicodeDecodeError) as fault:
+        reason = getattr(fault, "strerror", fault)
+        raise InputError(path, f"it can't be read ({reason})", f"give {form} in UTF-8") from None
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Say which of the known names `name` may have meant, or all of them."""
     names = sorted(known)

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from pendpipe.configuration.faults import as_input_error, nearest
+from pendpipe.configuration.faults import as_input_error, nearest, read_text
 from pendpipe.configuration.models import Configuration, Geometry
 from pendpipe.configuration.records import Record, read_records
 from pendpipe.errors import InputError
@@ -46,13 +46,7 @@ class Campaign:
 def read_configuration(path: str | Path) -> dict[str, Any]:
     """Read a configuration file, YAML or JSON, unchecked."""
     place = Path(path)
-    try:
-        text = place.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(place, "there is no such configuration", "see config/README.md") from None
-    except (OSError, UnicodeDecodeError) as fault:
-        reason = getattr(fault, "strerror", fault)
-        raise InputError(place, f"it can't be read ({reason})", "give YAML in UTF-8") from None
+    text = read_text(place, "configuration", "see config/README.md", "YAML")
     content = read_json(place) if place.suffix == ".json" else _yaml(place, text)
     if not isinstance(content, dict):
         raise InputError(place, "this is no mapping of keys to values", "see config/README.md")

@@ -7,9 +7,9 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from pendpipe.configuration.faults import nearest
+from pendpipe.configuration.faults import nearest, read_text
 from pendpipe.errors import InputError
 
 COLUMNS: Final = (
@@ -87,13 +87,7 @@ def read_records(path: str | Path) -> list[Record]:
         where a number belongs: file, line, what, remedy.
     """
     place = Path(path)
-    try:
-        text = place.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(place, "there is no such table", "see config/README.md") from None
-    except (OSError, UnicodeDecodeError) as fault:
-        reason = getattr(fault, "strerror", fault)
-        raise InputError(place, f"it can't be read ({reason})", "give a table in UTF-8") from None
+    text = read_text(place, "table", "see config/README.md", "a table")
     rows = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -136,14 +130,9 @@ def _record(where: str, row: dict[str, str]) -> Record:
     _check_name(where, row["record"])
     if not row["source"]:
         raise InputError(where, "the source is blank", "write simulated, dataq:<port> or a file")
-    words = {name: row.get(name, "") for name in COLUMNS[:6]}
-    return Record(
-        **words,
-        start_s=_number(where, row, "start_s"),
-        stop_s=_number(where, row, "stop_s"),
-        volts_per_radian=_number(where, row, "volts_per_radian"),
-        temperature_c=_number(where, row, "temperature_c"),
-    )
+    cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS[:6]}
+    cells |= {name: _number(where, row, name) for name in COLUMNS[6:]}
+    return Record(**cells)
 
 
 def _check_name(where: str, name: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -33,7 +33,10 @@ def responses(
     """Change of the readings for each pair of values, shape (changes, n)."""
     sampled, tangent = at.sampled, at.tangent
     total = np.zeros((len(changes), len(sampled.time_s)))
-    found = [_force_change(effect, tangent.motion, pendulum, *pair) for pair in changes]
+    found = [
+        _change(effect, *pair, lambda values: effect.acceleration(tangent.motion, pendulum, values))
+        for pair in changes
+    ]
     forces = [force for force in found if force is not None]
     # A few at a time stay in the processor's cache.
     for first in range(0, len(forces), _AT_ONCE):
@@ -42,36 +45,31 @@ def responses(
     if effect.kick(changes[0][1]) is not None:
         total += at.after_kicks([effect.kick(high) for _, high in changes])
         total -= at.after_kicks([effect.kick(low) for low, _ in changes])
-    for row, (low, high) in enumerate(changes):
-        added = effect.reading(sampled, pendulum, high)
+    for row, pair in enumerate(changes):
+        added = _change(effect, *pair, lambda values: effect.reading(sampled, pendulum, values))
         if added is not None:
             total[row] += added
-            if not _absent(effect, low):
-                total[row] -= _some(effect.reading(sampled, pendulum, low))
-        late = effect.delay(sampled.time_s, high)
+        late = _change(effect, *pair, lambda values: effect.delay(sampled.time_s, values))
         if late is not None:
-            if not _absent(effect, low):
-                late = late - _some(effect.delay(sampled.time_s, low))
             total[row] += sampled.velocity * late
     return total
 
 
-def _absent(effect: Effect, values: FloatArray) -> bool:
-    """Whether an effect changes nothing: all its sizes are zero."""
-    return not np.any(values[: effect.sizes])
-
-
-def _some(found: FloatArray | None) -> FloatArray | float:
-    return 0.0 if found is None else found
-
-
-def _force_change(
-    effect: Effect, motion: Motion, pendulum: Pendulum, low: FloatArray, high: FloatArray
+def _change(
+    effect: Effect,
+    low: FloatArray,
+    high: FloatArray,
+    what: Callable[[FloatArray], FloatArray | None],
 ) -> FloatArray | None:
-    after = effect.acceleration(motion, pendulum, high)
-    if after is None or _absent(effect, low):
+    """By how much something changes with the values; None where the effect leaves it alone.
+
+    What is absent at `low`, with all its sizes zero, need not be asked there.
+    """
+    after = what(high)
+    if after is None or not np.any(low[: effect.sizes]):
         return after
-    return np.asarray(after - _some(effect.acceleration(motion, pendulum, low)))
+    before = what(low)
+    return after if before is None else np.asarray(after - before)
 
 
 def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:

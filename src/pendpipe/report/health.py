@@ -43,27 +43,33 @@ def health(entry: Mapping[str, Any]) -> Health:
     not run
         The record was refused, so nothing was fitted.
     """
-    if entry.get("refused"):
-        return _state("not run", "refused")
-    missing = [
-        name for name in ("frequency", "a", "b", "c") if not math.isfinite(number(entry.get(name)))
-    ]
-    if missing:
-        return _state("failed", f"no value of {', '.join(missing)}")
-    if entry.get("light") == "red":
-        return _state("failed", str(entry["light_reason"]))
+    missing = [each for each in ("frequency", "a", "b", "c") if not _known(entry.get(each))]
     chi2 = number(entry.get("chi2_per_dof"))
-    if not math.isfinite(chi2):
-        return _state("look", "the fit's χ² is unknown")
-    if chi2 > CHI2_RANGE[1]:
-        return _state("look", f"χ² per degree of freedom is {chi2:.3g}: the model misses something")
-    if chi2 < CHI2_RANGE[0]:
-        return _state("look", f"χ² per degree of freedom is {chi2:.2g}: the noise is overestimated")
-    if not math.isfinite(number(entry.get("quality_factor_limit"))):
-        return _state("look", "b came out as zero: there is no limiting Q")
-    return _state("ok", "the noise explains the misfit")
+    states = (
+        ("not run", entry.get("refused"), "refused"),
+        ("failed", missing, f"no value of {', '.join(missing)}"),
+        ("failed", entry.get("light") == "red", str(entry.get("light_reason"))),
+        ("look", not math.isfinite(chi2), "the fit's χ² is unknown"),
+        (
+            "look",
+            chi2 > CHI2_RANGE[1],
+            f"χ² per degree of freedom is {chi2:.3g}: the model misses something",
+        ),
+        (
+            "look",
+            chi2 < CHI2_RANGE[0],
+            f"χ² per degree of freedom is {chi2:.2g}: the noise is overestimated",
+        ),
+        (
+            "look",
+            not _known(entry.get("quality_factor_limit")),
+            "b came out as zero: there is no limiting Q",
+        ),
+        ("ok", True, "the noise explains the misfit"),
+    )
+    word, reason = next((word, reason) for word, holds, reason in states if holds)
+    return Health(word, *STATES[word], reason)
 
 
-def _state(word: str, reason: str) -> Health:
-    symbol, colour = STATES[word]
-    return Health(word, symbol, colour, reason)
+def _known(quantity: Any) -> bool:
+    return math.isfinite(number(quantity))

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.faults import as_input_error
+from pendpipe.configuration.faults import as_input_error, read_text
 from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.errors import InputError
@@ -112,10 +112,8 @@ def read_model(source: str | Path | Mapping[str, Any]) -> Model:
 def _toml(path: Path) -> dict[str, Any]:
     """Read a TOML file."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(path, "there is no such file", "check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        return tomllib.loads(read_text(path, "file", "check the path", "TOML"))
+    except tomllib.TOMLDecodeError as problem:
         raise InputError(path, f"this is no TOML ({problem})", "correct it") from None
 
 
