@@ -51,10 +51,8 @@ class Estimate:
         half = 1.959963984540054 * self.sd
         return self.interval95 or (self.value - half, self.value + half)
 
-    def as_json(self, *, full: bool = True) -> dict[str, Any]:
-        """Return the form of fit.json; with ``full=False`` that of campaign.json."""
-        if not full:
-            return {"value": self.value, "sd": self.sd, "unit": self.unit}
+    def as_json(self) -> dict[str, Any]:
+        """Return the form of fit.json."""
         low, high = self.bounds95
         return {
             "value": self.value,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
 
 _TINY = 1e-290
 """Where r t is smaller, (1 - exp(-r t))/r is t to the last digit (and r t has few left)."""
@@ -73,6 +73,7 @@ def tangent_fraction(
     return Fraction(y0 * cosine - (0.5 * b * y0 + c) * sine, cosine + (a * y0 + 0.5 * b) * sine)
 
 
+@equation
 def amplitude(
     time_s: Numbers, amplitude0_rad: Numbers, a: Numbers, b: Numbers, c: Numbers
 ) -> FloatArray:
@@ -101,16 +102,15 @@ def amplitude(
     than the last digit of the time times the rate c.
     """
     # Not broadcast here: with scalar rates everything but the exponential is then cheap.
-    t, y0, quadratic, linear, coulomb = floats(time_s, amplitude0_rad, a, b, c)
-    r, sign = root(quadratic, linear, coulomb)
+    r, sign = root(a, b, c)
     with np.errstate(over="ignore", invalid="ignore"):
-        parts = exponential_fraction(t, y0, quadratic, linear, coulomb, r)
+        parts = exponential_fraction(time_s, amplitude0_rad, a, b, c, r)
         if np.any(sign < 0.0):
-            other = tangent_fraction(t, y0, quadratic, linear, coulomb, r)
+            other = tangent_fraction(time_s, amplitude0_rad, a, b, c, r)
             parts = Fraction(
                 *(np.where(sign < 0.0, *pair) for pair in zip(other, parts, strict=True))
             )
-        return plain(quotient(parts, y0))
+        return quotient(parts, amplitude0_rad)
 
 
 def quotient(parts: Fraction, y0: FloatArray) -> FloatArray:

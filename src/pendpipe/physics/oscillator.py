@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation
 
 
 @equation
@@ -112,6 +112,7 @@ def hysteretic_quality_of_decrement(decrement_quality: Numbers) -> FloatArray:
     return np.pi / (4.0 * np.tanh(np.pi / (4.0 * decrement_quality)))
 
 
+@equation
 def driven_pendulum_acceleration(
     angle_rad: Numbers,
     angular_velocity_rad_per_s: Numbers,
@@ -144,16 +145,7 @@ def driven_pendulum_acceleration(
     FloatArray
         x'' in rad/s^2.
     """
-    angle, velocity, time, inertia, restoring, quality, omega, torque, drive = floats(
-        angle_rad,
-        angular_velocity_rad_per_s,
-        time_s,
-        moment_of_inertia_kg_m2,
-        restoring_moment_n_m,
-        quality_factor,
-        angular_frequency_per_s,
-        drive_torque_n_m,
-        drive_angular_frequency_per_s,
-    )
-    driven = torque * np.sin(drive * time) - restoring * np.sin(angle)
-    return plain(driven / inertia - omega / quality * velocity)
+    driven = drive_torque_n_m * np.sin(drive_angular_frequency_per_s * time_s)
+    driven = driven - restoring_moment_n_m * np.sin(angle_rad)
+    loss_rate = angular_frequency_per_s / quality_factor
+    return driven / moment_of_inertia_kg_m2 - loss_rate * angular_velocity_rad_per_s

@@ -86,12 +86,12 @@ def largest_quality_factor(frequency_hz: Numbers, a: Numbers, b: Numbers, c: Num
     return quality_factor_limit(frequency_hz, b + 2.0 * np.sqrt(a * c))
 
 
+@equation
 def amplitude_of_largest_quality_factor(a: Numbers, c: Numbers) -> FloatArray:
     """Return the amplitude in rad at which Eq. 15 is largest: ``y = sqrt(c/a)``.
 
     Infinite for a = 0 with c > 0 (Q then rises with the amplitude throughout), and NaN for
     a = c = 0, where Q depends on no amplitude.
     """
-    quadratic, coulomb = floats(a, c)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return plain(np.sqrt(coulomb / quadratic))
+        return np.sqrt(c / a)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+from pendpipe.physics._floats import FloatArray, Numbers, equation
 
 
 @equation
@@ -48,8 +48,8 @@ def without_hysteresis(
     return inverse(1.0 / quality_factor_measured - 1.0 / quality_factor_hysteretic)
 
 
+@equation
 def inverse(rate: Numbers) -> FloatArray:
     """1/x, infinite (and silent) at zero."""
-    (value,) = floats(rate)
     with np.errstate(divide="ignore"):
-        return plain(1.0 / value)
+        return 1.0 / rate
