@@ -1,4 +1,4 @@
-"""What may have been left out: the catalogue, an effect a class."""
+"""What may have been left out: the catalogue, an effect a function."""
 
 from pendpipe.effects.effect import Effect, Kick, Parameter, Pendulum, Span
 
