@@ -64,8 +64,8 @@ RECORDS: Final = (
     "air\tsimulated\tair\tair\tair-07\t20.0\n"
     "file\tdecay.csv\n"
 )
-PATIENCE_S: Final = 600.0
-"""No run of the small campaign takes as long."""
+PATIENCE_S: Final = 3600.0
+"""No run of the small campaign takes as long, on however busy a machine."""
 
 Sums = dict[str, str]
 Case = dict[str, Any]
@@ -126,7 +126,7 @@ class Project:
     def run(self, *arguments: str, **options: Any) -> tuple[int, str]:
         """Run Snakemake to its end; return its status and what it printed."""
         with tempfile.TemporaryFile() as printed:
-            status = self.start(*arguments, printed=printed, **options).wait(PATIENCE_S)
+            status = end_of(self.start(*arguments, printed=printed, **options))
             printed.seek(0)
             return status, printed.read().decode(errors="replace")
 
@@ -182,6 +182,15 @@ class Project:
             return (process / "cwd").resolve() == self.folder.resolve()
         except OSError:
             return False
+
+
+def end_of(process: subprocess.Popen[bytes]) -> int:
+    """Wait for the end of a run; one that does not end is killed."""
+    try:
+        return process.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        kill_group(process)
+        raise
 
 
 def kill_group(process: subprocess.Popen[bytes]) -> None:
@@ -283,7 +292,7 @@ def job(trial: Trial, project: Project, draw: random.Random) -> Case:
                 os.kill(draw.choice(jobs), signal.SIGKILL)
                 killed = True
         time.sleep(0.02)
-    first = process.wait(PATIENCE_S)
+    first = end_of(process)
     made = len(project.sums())
     return trial.ended(project, {"disturbed": killed, "made": made, "first": first})
 
@@ -392,7 +401,7 @@ def two(trial: Trial, project: Project, draw: random.Random) -> Case:
     begun = project.start()
     project.wait(begun, draw.uniform(0.0, 0.9), len(trial.sums))
     second, said = project.run()
-    statuses = [begun.wait(PATIENCE_S), second]
+    statuses = [end_of(begun), second]
     named = re.search("LockException|cannot be locked", said)
     case = {"disturbed": 0 in statuses and statuses != [0, 0], "statuses": statuses}
     return trial.ended(project, case | {"named": named[0] if named else ""})
