@@ -186,10 +186,8 @@ def read_decay(folder: Path, entry: Entry) -> Decay:
     except InputError as fault:
         raise NothingToDrawError(f"{name}: {without_folders(fault.problem)}") from None
     # The fit counts its time from the first turning point that it kept.
-    low, high = entry.get("start_s"), entry.get("stop_s")
-    keep = np.ones(len(points), dtype=np.bool_)
-    keep &= points.time_s >= (-np.inf if low is None else low - 1e-9)
-    keep &= points.time_s <= (np.inf if high is None else high + 1e-9)
+    low, high = entry.get("start_s", -math.inf), entry.get("stop_s", math.inf)
+    keep = (points.time_s >= low - 1e-9) & (points.time_s <= high + 1e-9)
     if np.count_nonzero(keep) >= 3:
         points = points.chosen(keep)
     if len(points) < 3:

@@ -173,7 +173,7 @@ def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, 
     """Eq. 15 along a decay, and the half width of its 95 % band.
 
     The band follows from the fit's covariance of the amplitude and a, b, c by the
-    derivatives of Q, which are taken numerically.
+    derivatives of Q.
 
     Parameters
     ----------
@@ -188,29 +188,19 @@ def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, 
         Q and the half width, each of shape (n,); zero width without a covariance.
     """
     names = ("amplitude", "a", "b", "c")
-    values = np.array([decay.value(name) for name in names])
-
-    def quality(numbers: FloatArray) -> FloatArray:
-        start, a, b, c = numbers
-        y = physics.amplitude(elapsed_s, start, a, b, c)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return physics.quality_factor(y, decay.value("frequency"), a, b, c)
-
-    centre = quality(values)
-    known = [name for name in names if name in decay.names]
-    if not known or not decay.covariance.size:
-        return centre, np.zeros_like(centre)
-    places = [decay.names.index(name) for name in known]
+    start, a, b, c = (decay.value(name) for name in names)
+    frequency = decay.value("frequency")
+    y, by_parameter = physics.amplitude_and_gradient(elapsed_s, start, a, b, c)
+    known = [name for name in names if name in decay.names] if decay.covariance.size else []
+    columns, places = [names.index(n) for n in known], [decay.names.index(n) for n in known]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quality = physics.quality_factor(y, frequency, a, b, c)
+        # Of the loss a y + b + c/y: by itself, and through y.
+        own = np.stack([0.0 * y, y, np.ones_like(y), 1.0 / y], axis=-1)
+        by_loss = (own + (a - c / y**2)[:, np.newaxis] * by_parameter)[:, columns]
     covariance = decay.covariance[np.ix_(places, places)]
-    slopes = []
-    for place, name in enumerate(known):
-        step = 1e-3 * float(np.sqrt(max(covariance[place, place], 0.0)))
-        moved = values.copy()
-        moved[names.index(name)] += step
-        slopes.append((quality(moved) - centre) / step if step > 0.0 else np.zeros_like(centre))
-    gradient = np.array(slopes)
-    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
-    return centre, 1.96 * np.sqrt(np.maximum(variance, 0.0))
+    variance = np.nan_to_num(np.einsum("ni,ij,nj->n", by_loss, covariance, by_loss))
+    return quality, 1.96 * quality**2 / (np.pi * frequency) * np.sqrt(np.maximum(variance, 0.0))
 
 
 def local_quality(decay: Decay) -> LocalQuality:
