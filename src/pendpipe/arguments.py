@@ -76,6 +76,11 @@ SHARED: Final[Flags] = {
         " quality_factor_hysteretic, quality_factor_viscous); repeatable",
     },
     "--campaign": {"type": Path, "metavar": "CONFIG", "help": "a campaign's configuration"},
+    "--comparison": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "comparison.json, from pendpipe compare",
+    },
     "--record": {"metavar": "NAME", "help": "the campaign's name for this record"},
     "--refused": {
         "type": Path,

@@ -11,26 +11,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pendpipe.arguments import add
+
 if TYPE_CHECKING:
     from pendpipe.manifest import Job
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe figures``."""
-    parser.add_argument(
-        "--campaign",
-        required=True,
-        type=Path,
-        metavar="CONFIG.json",
-        help="the campaign's configuration, as the workflow stores it",
-    )
-    parser.add_argument(
-        "--comparison",
-        required=True,
-        type=Path,
-        metavar="FILE",
-        help="comparison.json, from pendpipe compare",
-    )
+    add(parser, "--campaign", "--comparison", required=True)
     parser.add_argument(
         "--out",
         required=True,
@@ -45,12 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from pendpipe.figures.data import read_comparison, read_content, results_folder
-    from pendpipe.manifest import check, job
+    from pendpipe.figures.data import read_compared
+    from pendpipe.manifest import job
 
-    folder = results_folder(read_content(arguments.campaign))
-    check([arguments.comparison])
-    comparison = read_comparison(arguments.comparison)
+    _, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     inputs = [
         folder / entry["record"] / name
         for entry in comparison["records"]

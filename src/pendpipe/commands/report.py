@@ -11,23 +11,12 @@ import argparse
 import sys
 from pathlib import Path
 
+from pendpipe.arguments import add
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe report``."""
-    parser.add_argument(
-        "--campaign",
-        required=True,
-        type=Path,
-        metavar="CONFIG.json",
-        help="the campaign's configuration, as the workflow stores it",
-    )
-    parser.add_argument(
-        "--comparison",
-        required=True,
-        type=Path,
-        metavar="FILE",
-        help="comparison.json, from pendpipe compare",
-    )
+    add(parser, "--campaign", "--comparison", required=True)
     parser.add_argument(
         "--summary",
         required=True,
@@ -52,17 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from pendpipe.figures.data import read_comparison, read_content, results_folder
+    from pendpipe.figures.data import read_compared, read_content
     from pendpipe.files import replaced
-    from pendpipe.manifest import check, job
+    from pendpipe.manifest import job
     from pendpipe.report.headline import as_text, headline
     from pendpipe.report.page import page_files, render
 
-    configuration = read_content(arguments.campaign)
-    folder = results_folder(configuration)
+    configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     figures = arguments.figures or arguments.out.parent / "figures"
-    check([arguments.comparison])
-    comparison = read_comparison(arguments.comparison)
     inputs = [arguments.comparison, arguments.summary, *page_files(comparison, folder, figures)]
     with job(folder, "report", inputs=inputs, out=arguments.out) as running:
         page = render(

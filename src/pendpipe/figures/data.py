@@ -16,6 +16,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, without_folders
+from pendpipe.manifest import check
 
 Entry = Mapping[str, Any]
 """One record of ``comparison.json``."""
@@ -158,17 +159,25 @@ def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str
     return content
 
 
-def read_comparison(path: Path) -> dict[str, Any]:
-    """Read comparison.json."""
-    content = read_content(path, "run pendpipe compare first")
+def read_compared(campaign: Path, comparison: Path) -> tuple[dict[str, Any], Path, dict[str, Any]]:
+    """Read a campaign's configuration and comparison.json.
+
+    Returns
+    -------
+    configuration, folder, comparison
+        The content of each, and between them the folder of the results: a folder a record.
+
+    Raises
+    ------
+    InputError
+        If one of them is absent or something else; DamagedError if it was altered.
+    """
+    configuration = read_content(campaign)
+    check([comparison])
+    content = read_content(comparison, "run pendpipe compare first")
     if "records" not in content:
-        raise InputError(path, "it has no records", "make it again with pendpipe compare")
-    return content
-
-
-def results_folder(configuration: Mapping[str, Any]) -> Path:
-    """The folder of a campaign's results: a folder a record lies in it."""
-    return Path(str(configuration.get("results") or "results"))
+        raise InputError(comparison, "it has no records", "make it again with pendpipe compare")
+    return configuration, Path(str(configuration.get("results") or "results")), content
 
 
 def read_decay(folder: Path, entry: Entry) -> Decay:
