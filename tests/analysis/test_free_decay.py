@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from pendpipe.analysis._decay_runs import _running_median
 from pendpipe.analysis.free_decay import FreeDecay, find_free_decay
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -244,6 +245,42 @@ def test_what_is_no_decay_is_refused_in_one_line(
         find_free_decay(recording(parts, noise=noise))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("wild", [False, True])
+def test_dense_readings_change_nothing(wild: bool) -> None:
+    """Half cycles of two thousand readings are those of sixty; a wild reading is none of them."""
+
+    def decay(rate: float) -> FreeDecay:
+        time = np.arange(int(30.0 * rate)) / rate - 2.0
+        noise = 1e-3 * np.random.default_rng(5).standard_normal(len(time))
+        values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + noise
+        values[len(time) // 3] += 50.0 * wild
+        return find_free_decay(Recording(time, values, "angle_rad"))
+
+    sparse, dense = decay(100.0), decay(3200.0)
+    assert dense.half_cycles == sparse.half_cycles > 45
+    assert dense.half_period_s == pytest.approx(0.5 * PERIOD, rel=1e-3)
+    assert (dense.start_s, dense.stop_s) == pytest.approx((sparse.start_s, sparse.stop_s), abs=0.02)
+
+
+def test_a_wiggle_within_a_swing_makes_no_half_cycles() -> None:
+    """It is small beside the swings before and after it, as no half cycle of a decay is."""
+    time = np.arange(3000) / RATE
+    values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time)
+    wiggle = 0.06 * np.exp(-(((time - 8.25 * PERIOD) / 0.03) ** 2))
+    smooth, other = (
+        find_free_decay(Recording(time, motion, "angle_rad"))
+        for motion in (values, values + wiggle)
+    )
+    assert other.half_cycles == smooth.half_cycles
+    assert other.notes == []
+
+
+@given(st.lists(st.floats(0.1, 10.0), min_size=3, max_size=12))
+def test_the_usual_half_period_is_the_median_of_five_neighbours(values: list[float]) -> None:
+    expected = [np.median(values[max(0, i - 2) : i + 3]) for i in range(len(values))]
+    np.testing.assert_array_equal(_running_median(np.array(values)), expected)
 
 
 def test_of_random_walks_few_pass_for_a_decay() -> None:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pendpipe.analysis.fit.noise_model import _mean_square
 from pendpipe.analysis.noise import find_step, noise_rms, quantisation_rms, white_rms
 
 SWING = np.cos(np.arange(20000) * 0.06)
@@ -44,3 +45,18 @@ def test_readings_off_a_lattice_have_no_step() -> None:
 def test_noise_is_never_below_the_rounding() -> None:
     assert noise_rms(np.zeros(1000), 0.1) == quantisation_rms(0.1) == 0.1 / math.sqrt(12.0)
     assert quantisation_rms(None) == 0.0
+
+
+def test_half_cycles_of_white_noise_scatter_as_it() -> None:
+    time = np.arange(60_000) * 0.01
+    noise = 0.3 * np.random.default_rng(4).standard_normal(len(time))
+    middles = np.arange(1.0, 599.0)
+    square = _mean_square(middles, np.searchsorted(time, middles), time, noise)
+    assert square == pytest.approx(0.3**2, rel=4.0 * math.sqrt(2.0 / 597))
+
+
+def test_the_quietest_tenth_hears_no_drum_that_beats_for_most_of_the_time() -> None:
+    noise = 3e-4 * np.random.default_rng(1).standard_normal(20000)
+    drum = np.where(np.arange(20000) < 15000, 100.0, 1.0)
+    assert noise_rms(drum * noise, quieter=0.1) == pytest.approx(3e-4, rel=0.2)
+    assert noise_rms(drum * noise) > 1e-2

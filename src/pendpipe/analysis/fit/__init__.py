@@ -11,7 +11,7 @@ __all__ = ["FitResult", "fit_recording", "read_fit"]
 
 
 def __getattr__(name: str) -> object:
-    """Import the fits, and with them numba, only when they are asked for."""
+    """Import the fits only when they are asked for."""
     if name == "fit_recording":
         from pendpipe.analysis.fit.recorded import fit_recording
 

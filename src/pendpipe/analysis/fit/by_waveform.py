@@ -25,6 +25,7 @@ from pendpipe.analysis.fit.minimise import Minimum, minimise
 from pendpipe.analysis.fit.noise_model import Noise, judge_noise
 from pendpipe.analysis.fit.quadratic import covariance
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
+from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
@@ -211,9 +212,6 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     rms = math.sqrt(float(residual @ residual) / len(residual))
     if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
         return fitted
-    # Few recordings are so coarse; the others need no numba.
-    from pendpipe.analysis.fit.rounding import best_noise
-
     for _ in range(_ROUNDS):
         noise = best_noise(problem.residual(value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
