@@ -198,6 +198,11 @@ def test_a_law_that_contradicts_the_decay_is_not_printed(
     assert printed.err.splitlines()[0].startswith(f"pendpipe: {tmp_path / 'decay.csv'}: ")
     content = json.loads((tmp_path / "fit.json").read_text())
     assert content["light"] == "red"
+    # Q = omega/(2 b) is seen without a law.
+    seen = [line.split()[4] for line in printed.out.splitlines() if "turning points alone" in line]
+    for q, check in zip(seen, content["decrement_check"], strict=True):
+        assert abs(check["seen"] - 0.02) < 3.0 * check["seen_sd"]
+        assert float(q.partition("(")[0]) == pytest.approx(0.5 * OMEGA / check["seen"], rel=1e-2)
     assert content["light_reason"] in printed.out
     # Accepted, or in a campaign, it is printed, and still called red.
     assert cli.main([*asked, "--accept"]) == 0

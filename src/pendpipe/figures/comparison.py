@@ -329,7 +329,7 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
     if factor and np.isfinite(number(factor)):
         text = with_error(number(factor), error(factor))
         lower.set_title(f"Drag measured over Eq. 16: {text}", fontsize=8.5, pad=3)
-    lower.set(xlabel="Frequency (Hz)", ylabel="Measured\nover theory")
+    lower.set(xlabel="Frequency (Hz)", ylabel="Q, measured\nover theory")
     lower.margins(y=0.15)
     return figure
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.analysis.fit.summary import period_of
+from pendpipe.analysis.fit.summary import period_of, seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -128,16 +128,12 @@ def _draw_quality(axes: Axes, law: Eq8, result: FitResult, points: TurningPoints
     # Where a cycle takes more than half of the amplitude, no Q describes it.
     q = np.where(lost < 0.7, math.pi / lost, math.nan)
     axes.plot(factor * amplitude, q, color=INK, label="fitted law")
-    seen = [check for check in result.decrement_check if check.seen > 0.0]
+    seen = seen_qualities(result)
     if seen:
-        q_seen = np.array(
-            [math.pi / (check.seen * period_of(result, check.amplitude_rad)) for check in seen]
-        )
-        relative = np.array([check.seen_sd / check.seen for check in seen])
         axes.errorbar(
-            [factor * check.amplitude_rad for check in seen],
-            q_seen,
-            q_seen * relative,
+            [factor * at for at, _ in seen],
+            [each.value for _, each in seen],
+            [each.sd for _, each in seen],
             fmt="o",
             color=BLUE,
             label="turning points alone",

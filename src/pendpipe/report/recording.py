@@ -10,9 +10,11 @@ from markupsafe import Markup
 
 from pendpipe.analysis.fit.summary import (
     LOSSES,
+    WITHOUT_LAW,
     qualities,
     quotable,
     rate_with_error,
+    seen_qualities,
     small_period,
 )
 from pendpipe.quantities import compact, with_error
@@ -65,14 +67,20 @@ def render_recording(
             (f"{letter} ({titles[letter]})", rate_with_error(result[letter], short=False))
             for letter in titles
         ]
-    rows = [
-        (
-            compact(each.amplitude_rad, unit),
-            with_error(each.quality_factor.value, each.quality_factor.sd),
-            f"{100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
-        )
-        for each in (qualities(result) if result.light != "red" else [])
-    ]
+    if result.light == "red":
+        rows = [
+            (compact(amplitude, unit), with_error(seen.value, seen.sd), WITHOUT_LAW)
+            for amplitude, seen in seen_qualities(result)
+        ]
+    else:
+        rows = [
+            (
+                compact(each.amplitude_rad, unit),
+                with_error(each.quality_factor.value, each.quality_factor.sd),
+                f"{100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
+            )
+            for each in qualities(result)
+        ]
     drawn = [("The decay with its fit", result.plot()), *figures]
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),

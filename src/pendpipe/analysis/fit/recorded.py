@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -124,7 +125,13 @@ def _fit(
             larger = fit_points(part, baseline=baseline, fixed=fixed, restoring=restoring)
         if _stands(larger):
             return _of_larger(larger, points, part)
-    return result if result.settled else by_points
+    settled = [each for each in (result, by_points) if each.settled]
+    return min(settled, key=_worst, default=by_points)
+
+
+def _worst(result: FitResult) -> float:
+    """The largest relative contradiction between the law's loss and the decay's."""
+    return max((abs(check.excess) for check in result.decrement_check), default=math.inf)
 
 
 def _stands(result: FitResult) -> bool:

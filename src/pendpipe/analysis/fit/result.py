@@ -31,12 +31,23 @@ TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
+_RATES: Final = {
+    "1": ("1/s", "1/s"),
+    "rad/s": ("1/rad", "rad/s^2"),
+    "rad/s^2": ("s/rad", "rad/s^3"),
+    "m/s": ("1/m", "m/s^2"),
+    "m/s^2": ("s/m", "m/s^3"),
+}
+"""Units of a and c where that of the motion has the second in it."""
+
+
 def units(unit: str) -> dict[str, str]:
-    """Unit of each parameter, for motions in rad or in m."""
+    """Unit of each parameter, for motions in a unit."""
+    a, c = _RATES.get(unit, (f"1/({unit} s)", f"{unit}/s"))
     return {
-        "a": f"1/({unit} s)",
+        "a": a,
         "b": "1/s",
-        "c": f"{unit}/s",
+        "c": c,
         "frequency": "Hz",
         "amplitude": unit,
         "phase": "rad",

@@ -23,6 +23,9 @@ LOSSES: Final = {
 }
 
 
+WITHOUT_LAW: Final = "from the turning points alone"
+
+
 class Quality(NamedTuple):
     """The quality factor at one amplitude, with what loses most there."""
 
@@ -41,6 +44,16 @@ def qualities(result: FitResult) -> list[Quality]:
     first = result.parameters["amplitude"].value
     seen = [check.amplitude_rad for check in result.decrement_check] or [first]
     return [_quality(result, amplitude) for amplitude in seen]
+
+
+def seen_qualities(result: FitResult) -> list[tuple[float, Estimate]]:
+    """Amplitudes and the quality factors there that the turning points show without a law."""
+    found = []
+    for check in result.decrement_check:
+        if check.seen > 0.0:
+            q = math.pi / (period_of(result, check.amplitude_rad) * check.seen)
+            found.append((check.amplitude_rad, Estimate(q, q * check.seen_sd / check.seen, "")))
+    return found
 
 
 def _quality(result: FitResult, amplitude: float) -> Quality:
@@ -148,6 +161,9 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     )
     if not (result.light != "red" if law is None else law):
         found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
+        for amplitude, seen in seen_qualities(result):
+            q = with_error(seen.value, seen.sd, short=True)
+            found.append(_line(f"Q at {compact(amplitude, unit)}", f"{q}, {WITHOUT_LAW}"))
         return [*found, "  " + quotable(result)]
     period = small_period(result)
     name = "period, small amplitude" if result.restoring == "sine" else "period"
@@ -185,7 +201,8 @@ def quotable(result: FitResult) -> str:
     if result.light == "green":
         return "Quote these numbers with their errors."
     if result.light == "red":
-        return "Quote none of a, b, c: run pendpipe diagnose to learn what the law lacks."
+        what = "Q alone" if seen_qualities(result) else "none of these numbers"
+        return f"Quote {what}, not a, b or c: run pendpipe diagnose to learn what the law lacks."
     if result.chi2_per_dof > 2.0:
         return (
             "Quote Q at these amplitudes. Physics is missing from the law: run pendpipe diagnose"
