@@ -31,7 +31,7 @@ def test_a_bounded_step_is_the_lowest_allowed_point(root, gradient) -> None:  # 
         jac=lambda d: normal @ d - gradient, bounds=list(zip(*bounds, strict=True)),
         method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-9},
     )  # fmt: skip
-    assert bounds.hold(step)
+    assert np.all((bounds.lower <= step) & (step <= bounds.upper))
     assert 0.5 * step @ normal @ step - gradient @ step <= found.fun + 1e-7
 
 

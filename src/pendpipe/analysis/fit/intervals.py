@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.quadratic import Bounds, covariance, solved
+from pendpipe.analysis.fit.quadratic import Bounds, covariance, exchanged, solved
 from pendpipe.arrays import FloatArray
 
 CHI2_95: Final = 3.841458820694124
@@ -105,15 +105,6 @@ def _profiled_end(
         end = float(best[-1]) + math.copysign(math.sqrt(max(left * follow[-1], 0.0)), reach)
         end = min(max(end, low), high)
         step[free] = best + follow / follow[-1] * (end - best[-1])
-        slope = normal @ step - gradient
-        idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == room.lower[j])]
-        beyond = np.maximum(room.lower - step, step - room.upper) * np.sqrt(normal.diagonal())
-        worst = max(free[:-1], key=lambda j: float(beyond[j]), default=index)
-        if idle:
-            del on[idle[0]]
-        elif worst != index and beyond[worst] > 1e-9:
-            below = step[worst] < room.lower[worst]
-            on[worst] = float((room.lower if below else room.upper)[worst])
-        else:
+        if not exchanged(on, free[:-1], step, normal, gradient, room):
             break
     return float(value[index]) + end

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 
+_BEYOND: Final = 1e-9
+"""Standard deviations by which rounding may put a step beyond its bound."""
 _SINGULAR: Final = 1e12
 """Of the scaled inverse: beyond, it is mostly rounding."""
 
@@ -25,23 +25,9 @@ class Bounds(NamedTuple):
         """The bounds of a step from `value`."""
         return Bounds(self.lower - value, self.upper - value)
 
-    def hold(self, value: FloatArray) -> bool:
-        """Whether all entries lie within, to rounding."""
-        slack = 1e-12
-        low = value >= self.lower - slack * np.abs(self.lower)
-        return bool(np.all(low & (value <= self.upper + slack * np.abs(self.upper))))
-
     def clip(self, value: FloatArray) -> FloatArray:
         """Put each entry within its bounds."""
         return np.clip(value, self.lower, self.upper)
-
-    def walls(self, free: Sequence[int]) -> list[tuple[int, float]]:
-        """The finite bounds of the free entries: index and value."""
-        return [(j, float(side[j])) for j in free for side in self if math.isfinite(side[j])]
-
-    def distance(self, value: FloatArray) -> FloatArray:
-        """How far each entry is from its nearer bound."""
-        return np.minimum(value - self.lower, self.upper - value)
 
 
 def bounded_step(
@@ -52,8 +38,8 @@ def bounded_step(
 ) -> FloatArray:
     """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
 
-    Sets of active bounds are tried, the smallest first, until one is optimal: there are
-    three or four bounds, hence some 20 small systems at most, and usually one.
+    The step is found as if nothing were bounded; what then lies beyond its bound is put there, and
+    what its bound holds back no more is let go, until the step stays.
 
     Parameters
     ----------
@@ -68,30 +54,50 @@ def bounded_step(
         step = solved(normal, gradient)
         if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
             return step
-    free = [j for j in range(len(gradient)) if j not in held]
-    walls = bounds.walls(free)
-    for size in range(len(walls) + 1):
-        for active in combinations(walls, size):
-            on = [index for index, _ in active]
-            if len(set(on)) < size:
-                continue
-            step = np.zeros(len(gradient))
-            step[on] = [wall for _, wall in active]
-            rest = [index for index in free if index not in on]
-            block = normal[rest]
-            step[rest] = solved(block[:, rest], gradient[rest] - block[:, on] @ step[on])
-            if bounds.hold(step) and _best(normal[on] @ step - gradient[on], step[on], bounds, on):
-                return bounds.clip(step)
-    # Rounding has hidden the answer: the free step, put within the bounds, will do.
-    step = np.zeros(len(gradient))
-    step[free] = solved(normal[np.ix_(free, free)], gradient[free])
+    step, on = np.zeros(len(gradient)), dict[int, float]()
+    for _ in range(4 * len(step)):
+        free = [j for j in range(len(step)) if j not in held and j not in on]
+        step = np.zeros(len(step))
+        step[list(on)] = list(on.values())
+        pulled = gradient - normal @ step
+        step[free] = solved(normal[np.ix_(free, free)], pulled[free])
+        if not exchanged(on, free, step, normal, gradient, bounds):
+            break
     return bounds.clip(step)
 
 
-def _best(slope: FloatArray, wall: FloatArray, bounds: Bounds, on: list[int]) -> bool:
-    """Whether at every active bound the slope points outwards: then no other set is better."""
-    upper = wall == bounds.upper[on]
-    return bool(np.all(np.where(upper, slope <= 0.0, slope >= 0.0)))
+def exchanged(
+    on: dict[int, float], free: Sequence[int], step: FloatArray, normal: FloatArray,
+    gradient: FloatArray, bounds: Bounds,
+) -> bool:  # fmt: skip
+    """Let go what leaves its bound by itself, or put at its bound what is farthest beyond it.
+
+    Parameters
+    ----------
+    on
+        What is at a bound, and where that is: changed.
+    free
+        What may be put at one.
+    step, normal, gradient, bounds
+        Of the problem; bounds of the step.
+
+    Returns
+    -------
+    bool
+        False where the step is the best.
+    """
+    slope = normal @ step - gradient
+    idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == bounds.lower[j])]
+    beyond = np.maximum(bounds.lower - step, step - bounds.upper) * np.sqrt(normal.diagonal())
+    worst = max(free, key=lambda j: float(beyond[j]), default=None)
+    if idle:
+        del on[idle[0]]
+    elif worst is not None and beyond[worst] > _BEYOND:
+        below = step[worst] < bounds.lower[worst]
+        on[worst] = float((bounds.lower if below else bounds.upper)[worst])
+    else:
+        return False
+    return True
 
 
 def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:

@@ -84,15 +84,6 @@ class Waveform:
             self._last[key] = self.values - sample(*self.model(value), self.time_s)
         return self._last[key]
 
-    def chi2(self, value: FloatArray) -> float:
-        """chi^2 with the share's prior; infinite where the model says nothing."""
-        model, release = self.model(value)
-        if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
-            return np.inf
-        off = float(value[SHARE]) - PRIOR_SHARE
-        chi2, _, _ = self._weighed(self.residual(value))
-        return chi2 + PRIOR_INVERSE * off**2
-
     def predict_remaining(
         self, value: FloatArray, trial: FloatArray, quadratic: Quadratic, promised: float
     ) -> float:
@@ -111,18 +102,6 @@ class Waveform:
         slower = 0.4 * b**2 / omega * float(trial[SHARE] - value[SHARE]) ** 2
         at_ends = _ENDS * promised**2 / signal
         return at_ends + float(quadratic.normal[OMEGA, OMEGA]) * slower**2
-
-    def _weighed(self, residual: FloatArray) -> tuple[float, FloatArray, FloatArray | float]:
-        """chi^2 (or -2 ln likelihood), its slope by the model, and the readings' weights."""
-        if self.step == 0.0:
-            weight = self.noise_rms**-2
-            return float(residual @ residual) * weight, residual * weight, weight
-        score, weights = np.empty_like(residual), np.empty_like(residual)
-        return (
-            float(rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)),
-            score,
-            weights,
-        )
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
@@ -148,12 +127,15 @@ class Waveform:
             piece = slice(first, first + _PIECE)
             angle, jacobian = sample_with_jacobian(*self.model(value), self.time_s[piece])
             np.subtract(self.values[piece], angle, out=residual[piece])
-            part, score, weights = self._weighed(residual[piece])
-            chi2 += part
-            gradient += jacobian.T @ score
-            if isinstance(weights, float):
-                normal += weights * (jacobian.T @ jacobian)
+            left, weight = residual[piece], self.noise_rms**-2
+            if self.step == 0.0:
+                chi2 += weight * float(left @ left)
+                gradient += weight * (jacobian.T @ left)
+                normal += weight * (jacobian.T @ jacobian)
             else:
+                score, weights = np.empty_like(left), np.empty_like(left)
+                chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
+                gradient += jacobian.T @ score
                 normal += jacobian.T @ (jacobian * weights[:, None])
         self._last.clear()
         self._last[value.tobytes()] = residual
