@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -145,23 +146,15 @@ def angles(span: Span) -> FloatArray:
     return np.asarray(span.first_amplitude * np.concatenate([-half[:0:-1], half]))
 
 
-def amplitudes(number: int) -> Callable[[Span], FloatArray]:
+def amplitudes(number: int, span: Span) -> FloatArray:
     """Knots over the amplitude, in equal ratios."""
-
-    def knots(span: Span) -> FloatArray:
-        last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
-        return np.geomspace(0.95 * last, 1.05 * span.first_amplitude, number)
-
-    return knots
+    last = max(span.last_amplitude, 1e-3 * span.first_amplitude)
+    return np.geomspace(0.95 * last, 1.05 * span.first_amplitude, number)
 
 
-def instants(number: int) -> Callable[[Span], FloatArray]:
+def instants(number: int, span: Span) -> FloatArray:
     """Knots over the time."""
-
-    def knots(span: Span) -> FloatArray:
-        return np.linspace(span.start_s, span.stop_s, number)
-
-    return knots
+    return np.linspace(span.start_s, span.stop_s, number)
 
 
 def phases(_: Span) -> FloatArray:
@@ -193,13 +186,9 @@ def usual_friction_profile(pendulum: Pendulum, span: Span) -> float:
     return usual_loss_rate(pendulum, span) * pendulum.angular_frequency
 
 
-def share_of_swing(share: float) -> Callable[[Pendulum, Span], float]:
+def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
     """A part of the first amplitude, rad."""
-
-    def unit(_: Pendulum, span: Span) -> float:
-        return share * span.first_amplitude
-
-    return unit
+    return share * span.first_amplitude
 
 
 def hundredth(_: Pendulum, __: Span) -> float:
@@ -216,7 +205,7 @@ def hundredth_of_a_radian(pendulum: Pendulum, _: Span) -> float:
     "acceleration",
     attrgetter("angle"),
     angles,
-    share_of_swing(0.1),
+    partial(share_of_swing, 0.1),
     identifier="unnamed-restoring",
     name="a restoring torque of unknown form",
     equation=r"\omega^2 x \to \omega^2 x + F(x)",
@@ -242,7 +231,7 @@ class DampingCurve(AmplitudeCurve):
     discriminating_test = (
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
     )
-    make_knots = amplitudes(15)
+    make_knots = partial(amplitudes, 15)
     unit = usual_loss_rate
 
     def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
@@ -299,7 +288,7 @@ class DriveCurve(Curve):
     equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
     argument, ordinate = "time, s", "extra torque over omega^2 y"
     discriminating_test = "repeat the run: what depends on the time of day does not come again"
-    make_knots = instants(10)
+    make_knots = partial(instants, 10)
     unit = hundredth
 
     def count_basis_functions(self) -> int:
@@ -320,7 +309,7 @@ class DriveCurve(Curve):
     "reading",
     attrgetter("angle"),
     angles,
-    share_of_swing(0.05),
+    partial(share_of_swing, 0.05),
     identifier="unnamed-measurement",
     name="a sensor curve of unknown form",
     equation=r"y = x + s(x)",
@@ -337,8 +326,8 @@ def reading_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> Fl
 @follows(
     "reading",
     attrgetter("time_s"),
-    instants(14),
-    share_of_swing(0.05),
+    partial(instants, 14),
+    partial(share_of_swing, 0.05),
     in_time=True,
     of_anything=True,
     identifier="unnamed-measurement",
@@ -404,7 +393,7 @@ def memory_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> Fl
 @follows(
     "acceleration",
     attrgetter("time_s"),
-    instants(25),
+    partial(instants, 25),
     usual_loss_rate,
     in_time=True,
     identifier="unnamed-damping",
@@ -425,7 +414,7 @@ def damping_in_time_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) 
 @follows(
     "reading",
     attrgetter("amplitude"),
-    amplitudes(13),
+    partial(amplitudes, 13),
     hundredth,
     AmplitudeCurve,
     identifier="unnamed-measurement",
@@ -444,7 +433,7 @@ def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatA
 @follows(
     "reading",
     attrgetter("amplitude"),
-    amplitudes(13),
+    partial(amplitudes, 13),
     hundredth_of_a_radian,
     AmplitudeCurve,
     identifier="unnamed-measurement",

@@ -171,8 +171,6 @@ _SHIFTS_PERCENT: Final = (1, 2, 5, 10, 20, 40, 60, 70, 80)
 def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
     """Draw the relative lengthening of the period against frequency, cause by cause."""
     names = branches(comparison)
-    if not names:
-        raise NothingToDrawError("the campaign has no theory curves")
     figure, axes = new_figure(3.8)
     for name in names:
         marker = branch(name).marker
@@ -227,21 +225,13 @@ def _keys(axes: Any, names: list[str]) -> None:
         )
         for name in names
     ]
-    axes.legend(
-        handles=causes + kinds,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=2,
-        borderaxespad=0.3,
-    )
+    key_above(axes, 2, handles=causes + kinds)
 
 
 @styled
 def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     """Draw log10 Q_v against frequency: Eq. 16, steady Stokes flow, and what was measured."""
     names = branches(comparison)
-    if not names:
-        raise NothingToDrawError("the campaign has no theory curves")
     figure, axes = new_figure(4.0)
     for name in names:
         look = branch(name)
@@ -275,13 +265,11 @@ def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     handles, labels = axes.get_legend_handles_labels()
     # A column of the key for each branch, theory before measurement.
     order = sorted(range(len(labels)), key=lambda i: names.index(labels[i].partition(":")[0]))
-    axes.legend(
-        [handles[i] for i in order],
-        [labels[i] for i in order],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=len(names),
-        borderaxespad=0.3,
+    key_above(
+        axes,
+        len(names),
+        handles=[handles[i] for i in order],
+        labels=[labels[i] for i in order],
     )
     return figure
 

@@ -124,7 +124,9 @@ def series(entries: Iterable[Entry], quantity: str) -> Series:
 
 def branches(comparison: Mapping[str, Any]) -> list[str]:
     """The branches that have a theory curve, the paper's order first."""
-    return sorted(comparison.get("curves") or {}, key=lambda name: (name != "high", name))
+    if not comparison.get("curves"):
+        raise NothingToDrawError("the campaign has no theory curves")
+    return sorted(comparison["curves"], key=lambda name: (name != "high", name))
 
 
 def of_branch(comparison: Mapping[str, Any], name: str) -> list[Entry]:

@@ -159,9 +159,10 @@ def plain_numbers(axis: Axis, steps: Sequence[float] | None = None) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0) -> None:
+def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0, **entries: Any) -> None:
     """Put the legend above the axes, where it can't hide data."""
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, lift), ncols=columns, borderaxespad=0.3)
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, lift)}
+    axes.legend(ncols=columns, borderaxespad=0.3, **place, **entries)
 
 
 def plain_text(text: str) -> str:
