@@ -23,8 +23,6 @@ GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
 _LARGE_PHASE_ERROR: Final = 0.1
 """Phase error in rad above which they are meaningless too."""
-_MISJUDGED: Final = 1.6
-"""Largest factor by which the first estimate of the noise may be too small; more is a misfit."""
 _ESTIMATE_AGAIN: Final = 0.95
 """Ratio of noise estimates below which the noise is estimated again."""
 _ROUNDS: Final = 3
@@ -138,8 +136,7 @@ def settled(
     # Differences of phase within the noise at the motion's frequency are none.
     turns = fit.value[OMEGA] / (2.0 * np.pi) * float(data.time_s[-1] - data.time_s[0])
     finer = replace(finer, noise_rms=left.rms_at(turns / (len(data) - 1)))
-    misjudged = not fit.model.effects and left.white_rms < _MISJUDGED * noise.white_rms
-    if is_gross(fit, data) and not misjudged:
+    if is_gross(fit, data) and fit.model.effects:
         return fit, data, noise
     better = refine(fit.model, finer, left, fit.value, held=held)
     # A misfit that is gross for the first estimate of the noise may itself be noise.
