@@ -11,6 +11,7 @@ import pytest
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics import TESTS, find_lost_samples
+from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.numerics import tail_of_squares
 from pendpipe.diagnosis.state import settled
@@ -139,3 +140,14 @@ def test_an_encoders_counts_have_no_codes_and_no_jitter() -> None:
     data = replace(record.data, time_noise=True)
     for name in ("missing-codes", "coarse-quantisation", "jitter", "clipping", "coloured-noise"):
         assert TESTS[name](data, record.fit, record.noise, samples).p_value == 1.0
+
+
+def test_noise_that_falls_is_said_to_change_in_time_and_is_no_fault() -> None:
+    pendulum = AIR
+    clean = pendulum.model().reading(pendulum.values())
+    falling = np.linspace(3.0, 1.0, pendulum.count)
+    white = 1e-4 * np.random.default_rng(1).standard_normal(pendulum.count)
+    said = level_note(fitted(pendulum, clean + falling * white).noise)
+    assert said is not None
+    assert "larger in the first half" in said
+    assert level_note(fitted(pendulum, clean + white).noise) is None

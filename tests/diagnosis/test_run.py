@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import binom
 
 from pendpipe.diagnosis import diagnose_recording
@@ -271,3 +272,15 @@ def test_the_seed_decides_the_draws_and_nothing_else() -> None:
     record = recording(other_engine(TRUTH), 1)
     again = diagnose_recording(record).diagnosis
     assert again.to_dict() == diagnosed("null").diagnosis.to_dict()
+
+
+def test_noise_with_a_memory_is_noise_and_no_missing_physics() -> None:
+    """x_k = 0.8 x_(k-1) + e_k: the colour is reported, and Eq. 8 stands."""
+    white = np.random.default_rng(4).standard_normal(len(TIME_S) + 100)
+    noise = 1e-4 * lfilter([1.0], [1.0, -0.8], white)[100:]
+    outcome = diagnose_recording(Recording(TIME_S, other_engine(TRUTH) + noise, "angle_rad"))
+    assert [effect.identifier for effect in outcome.effects] == ["coloured-noise"]
+    assert outcome.verdict == "consistent"
+    assert outcome.diagnosis.p_value > 0.01
+    assert "describes this recording" in str(outcome)
+    assert "it is coloured" in str(outcome)

@@ -68,7 +68,8 @@ def read_answer(entry: dict[str, Any]) -> Answer:
         groups.append((effect["id"], *(other["id"] for other in rest)))
         if number == 0 and effect.get("probability") is not None:
             probability = float(effect["probability"])
-    detected = diagnosis.get("verdict") == "missing-physics"
+    # Noise alone may be reported of a record that lacks nothing.
+    detected = diagnosis.get("verdict") == "missing-physics" or bool(groups)
     return Answer(True, detected, tuple(groups), probability, diagnosis)
 
 

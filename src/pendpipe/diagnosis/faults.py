@@ -23,7 +23,7 @@ from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import COLOURED_NOISE, Location
 from pendpipe.diagnosis.state import Fault, State, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
@@ -65,9 +65,11 @@ class Forensics:
     def p_value(self, faults: Sequence[Fault]) -> float:
         """Return the smallest global p-value, of the reported faults and of the other tests.
 
-        Properties of the record that do no harm (a coarse step at large amplitude) don't count.
+        Properties of the record that do no harm (a coarse step at large amplitude) don't count,
+        nor does the colour of its noise.
         """
-        return min([1.0, *self._quiet.values(), *(fault.p_value for fault in faults)])
+        told = [fault.p_value for fault in faults if fault.finding.identifier != COLOURED_NOISE]
+        return min([1.0, *self._quiet.values(), *told])
 
     def before(self, state: State, progress: Progress) -> None:
         """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""

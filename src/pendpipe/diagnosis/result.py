@@ -16,6 +16,8 @@ FILE_NAME: Final = "diagnosis.json"
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
+COLOURED_NOISE: Final = "coloured-noise"
+"""What is reported of the noise, and is nothing that a model lacks."""
 
 
 @dataclass(frozen=True)

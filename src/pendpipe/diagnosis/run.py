@@ -23,7 +23,7 @@ from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.likelier import swap_in_likelier
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import released_parameters
-from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, FittedModel, FoundEffect
+from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
 from pendpipe.diagnosis.statement import statement
@@ -245,16 +245,17 @@ def diagnose_decay(
         before = _as_fit_prints(before, part, points, baseline, place)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     after = before if same else _fitted_model(found.improved, found)
-    if effects:
+    missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
+    if missing:
         progress("predicting cycles that are left out of the fit")
-    held = _held_out(found, beginning) if effects else None
+    held = _held_out(found, beginning) if missing else None
     swings = _small_swings(found)
     diagnosis = Diagnosis(
         baseline,
         before,
         after,
         noise_rms,
-        "missing-physics" if effects else "consistent",
+        "missing-physics" if missing else "consistent",
         found.p_value,
         effects,
         held,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.diagnosis.chance import printed
-from pendpipe.diagnosis.result import BASELINES
+from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
 
@@ -107,14 +107,15 @@ def statement(
     """
     model = BASELINES.get(baseline, baseline)
     stamps = [f"Note: {'; '.join(notes)}."] if notes else []
-    if not effects:
+    noise = [each.location.summary for each in effects if each.identifier == COLOURED_NOISE]
+    if len(noise) == len(effects):
         nothing = (
             f"{_capital(model)} describes this recording: the residual of"
             f" {compact(before.residual_rms_rad, unit)} rms agrees with the noise"
             f" ({compact(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
             f" than chance would ({printed(unexplained)})."
         )
-        return " ".join([nothing, *stamps])
+        return " ".join([nothing, *(f"{_capital(said)}." for said in noise), *stamps])
     times = before.residual_rms_rad / noise_rms
     text = [
         f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"

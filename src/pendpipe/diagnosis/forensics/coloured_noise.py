@@ -12,7 +12,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import COLOURED_NOISE, Location
 from pendpipe.estimate import Estimate
 
 _HARMLESS_RATIO: Final = 1.5
@@ -44,14 +44,14 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     frequency is not reported.
     """
     if not data.uniform or not noise.coloured or fit.chi2 > _MISFIT * data.used:
-        return nothing("coloured-noise")
+        return nothing(COLOURED_NOISE)
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
     edges = np.append(noise.starts, len(data)) / (2.0 * len(data) * data.interval_s)
     middle, number = 0.5 * (edges[1:] + edges[:-1]), np.diff(np.append(noise.starts, len(data)))
     heard = middle > _LOWEST * frequency_hz
     near = (middle > _NEAR_BAND[0] * frequency_hz) & (middle < _NEAR_BAND[1] * frequency_hz)
     if np.count_nonzero(near) < 3 or np.array_equal(near, heard):
-        return nothing("coloured-noise")
+        return nothing(COLOURED_NOISE)
     density = noise.variance[(noise.starts + number // 2).clip(max=len(data) - 1)]
     there = near * number / float(number[near].sum()) * density
     whole = heard * number / float(number[heard].sum()) * density
@@ -67,7 +67,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     slope = -float(across @ np.log(density))
     word = "stronger" if ratio > 1.0 else "weaker"
     return Finding(
-        "coloured-noise",
+        COLOURED_NOISE,
         0.5 * math.erfc(score / math.sqrt(2.0)),
         max(gain, 0.0),
         {
