@@ -172,7 +172,7 @@ def _without_panel(lines: list[str]) -> list[str]:
 
 
 def _without_split_decimals(lines: list[str]) -> list[str]:
-    """Mend rows with commas in the numbers and between them: as many again as there are names."""
+    """Repair rows with commas in the numbers and between them: as many again as there are names."""
     head = next((row for row, line in enumerate(lines[:50]) if _SPLIT.fullmatch(line)), 0)
     cells = lines[head].split(",")
     names = lines[head - 1].split(",") if head else []
