@@ -78,7 +78,7 @@ def test_sums_and_solutions_are_those_of_least_squares(
     edges = np.stack([bounds[:-1], bounds[1:]], axis=1)
     level = 0.2
     gram, right = np.zeros((half_cycles, 3 + free, 3 + free)), np.zeros((half_cycles, 3 + free))
-    square, block = np.zeros(half_cycles), np.empty((ROWS, block_size))
+    square, block = np.zeros(half_cycles), np.ones((ROWS, block_size))
     harmonics = HARMONICS if shaped else free
     half_cycle_sums(
         time_s,

@@ -89,8 +89,10 @@ def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float =
     number = min(_BLOCKS, len(values) // length)
     starts = (len(values) - length) * np.arange(number) // max(number - 1, 1)
     blocks = values[starts[:, None] + np.arange(length)]
-    squares = np.mean(_fourth_differences(blocks) ** 2, axis=1)
-    return max(floor, math.sqrt(float(np.quantile(squares, quieter)) / _GAIN))
+    fourth = _fourth_differences(blocks)
+    squares = np.sort(np.einsum("kn,kn->k", fourth, fourth)) / fourth.shape[1]
+    square = np.interp(quieter * (number - 1), np.arange(number), squares)
+    return max(floor, math.sqrt(float(square) / _GAIN))
 
 
 def white_rms(residual: FloatArray) -> float:

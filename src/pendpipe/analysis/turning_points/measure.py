@@ -145,7 +145,7 @@ def measure(
         gram,
         right,
         square,
-        np.empty((ROWS, BLOCK)),
+        np.ones((ROWS, BLOCK)),
     )
     prior = np.zeros(number)
     one_sided = gram[:, 1, 2] ** 2 > _ONE_SIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]

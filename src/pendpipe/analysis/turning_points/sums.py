@@ -53,21 +53,24 @@ def _fill(
 ) -> int:
     """Fill the rows of a block of readings; return how many there are."""
     friction, viscous, friction2, viscous2 = shape[0], shape[1], shape[2], shape[3]
-    ones, forms, sines = block[0], block[1], block[2]
-    cosines, readings = block[_COSINE], block[_READING]
+    forms, sines, cosines, last = block[1], block[2], block[_COSINE], block[_READING]
     count: int = min((time_s.size + stride - 1) // stride, block.shape[1])
+    # In loops of few rows each: compilers vectorise no loop of many that might overlap.
     for i in range(count):
-        phase = rate * (time_s[i * stride] - centre_s)
+        last[i] = rate * (time_s[i * stride] - centre_s)
+    for i in range(count):
+        phase = last[i]
         cosine, sine = cosine_sine(phase)
         lack = 1.0 - cosine
-        ones[i], sines[i], cosines[i] = 1.0, sine, cosine
+        sines[i], cosines[i] = sine, cosine
         forms[i] = (
             cosine
             + (math.copysign(friction, phase) - friction2) * lack
             + viscous * (sine - phase * cosine)
             + viscous2 * phase * (0.5 * phase * cosine - sine)
         )
-        readings[i] = values[i * stride] - level
+    for i in range(count):
+        last[i] = values[i * stride] - level
     for m in range(harmonics):
         # cos(n + 2) = 2 cos(2) cos(n) - cos(n - 2), n times the phase
         before, now = block[1 + m if m > 1 else _COSINE], block[2 + m if m > 0 else _COSINE]
@@ -124,7 +127,7 @@ def half_cycle_sums(
         To be added to: sums of products, shape (k, terms, terms), with the readings, (k, terms),
         and of the readings' squares, (k,).
     block
-        Room, shape (ROWS, BLOCK).
+        Room, shape (ROWS, BLOCK), its first row ones.
     """
     terms = right.shape[1]
     for k in range(centre_s.size):
