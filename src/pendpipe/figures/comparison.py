@@ -249,11 +249,10 @@ def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
         )
         _say_how_many_times(axes, frequency, steady, full, look.colour)
         points = series(of_branch(comparison, name), "quality_factor_viscous")
-        points = points.mapped(np.log10, 1.0 / (points.y * np.log(10.0)))
         axes.errorbar(
             points.x,
-            points.y,
-            points.y_sd,
+            np.log10(points.y),
+            points.y_sd / (points.y * np.log(10.0)),
             points.x_sd,
             fmt=look.marker,
             color=look.colour,

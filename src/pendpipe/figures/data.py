@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,10 +34,6 @@ class Series(NamedTuple):
     y: FloatArray
     y_sd: FloatArray
     names: tuple[str, ...]
-
-    def mapped(self, function: Callable[[FloatArray], FloatArray], slope: FloatArray) -> Series:
-        """The same points with another ordinate: y -> function(y), errors times |slope|."""
-        return self._replace(y=function(self.y), y_sd=np.abs(slope) * self.y_sd)
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,6 @@ def render(
     proven = proof(challenge, room)
     asked = configuration.get("diagnose") or {}
     names = [str(entry["record"]) for entry in entries if asked.get("enabled", True)]
-    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     return fill_template(
         "pendpipe.report",
         "page.html",
@@ -96,12 +95,19 @@ def render(
         glossary=GLOSSARY,
         provenance=comparison.get("provenance") or {},
         downloads=_downloads(table, summary),
-        # These two are the package's own files; the policy names the script by its hash.
-        style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
-        script=Markup(script),
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        **_own_files(),
         **remarks.of_campaign(comparison, list(drawn), folder),
     )
+
+
+def _own_files() -> dict[str, str]:
+    """The package's own style and script; the policy names the script by its hash."""
+    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
+    return {
+        "style": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
+        "script": Markup(script),
+        "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+    }
 
 
 def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
