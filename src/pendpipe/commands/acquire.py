@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from pendpipe.arguments import add, load
 from pendpipe.errors import InputError
@@ -103,19 +104,17 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
     The first of them counts, since a closing terminal may send several. One that is ignored
     (nohup) stays so; Windows has no SIGHUP.
     """
-    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-    if threading.current_thread() is not threading.main_thread():
-        numbers = []
-    before = {number: signal.getsignal(number) for number in numbers if number is not None}
-    before = {number: old for number, old in before.items() if old is not signal.SIG_IGN}
+    before: dict[int, Any] = {}
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         for number in before:
             signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for number in before:
-        signal.signal(number, interrupt)
+    for number in (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")):
+        in_main = threading.current_thread() is threading.main_thread()
+        if in_main and number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, interrupt)
     try:
         yield
     finally:
