@@ -43,7 +43,6 @@ def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
     and the answer where it holds two. Infinite where the true pair can't be fitted: it counts
     as needed then.
     """
-    from pendpipe.diagnosis.one_curve import cost
     from pendpipe.diagnosis.weighing import refitted
 
     found, held = outcome.search, outcome.beginning.held
@@ -55,6 +54,10 @@ def over_one(outcome: Outcome, truths: Sequence[str]) -> float:
     rivals = found.steps[0].rivals if found.steps else ()
     fits = [refitted(found.baseline, found, held, rival) for rival in rivals]
     singles += [fit for fit in fits if fit is not None]
+
+    def cost(fit: Fit) -> float:
+        return fit.chi2 + 2.0 * len(fit.free)
+
     return min(map(cost, singles)) - min(map(cost, pairs), default=-math.inf)
 
 
@@ -66,7 +69,7 @@ def _answer(outcome: Outcome, effects: int) -> list[Fit]:
 def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
     """The fit with one more effect of a given name, at the shape its scan finds, if it moves."""
     from pendpipe.diagnosis.detect import detect, prepare
-    from pendpipe.diagnosis.naming import refit_leads
+    from pendpipe.diagnosis.refits import refit_leads
     from pendpipe.diagnosis.state import is_gross
     from pendpipe.effects.catalogue import by_identifier
 

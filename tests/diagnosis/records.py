@@ -17,7 +17,10 @@ from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.run import Outcome, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.effect import Parameter, Pendulum
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
@@ -137,3 +140,30 @@ def classes_found(outcome: Outcome) -> list[set[str]]:
         {effect.identifier, *(name for name, _ in effect.indistinguishable)}
         for effect in outcome.diagnosis.effects
     ]
+
+
+class Magnet(Effect):
+    """A pull to the centre that reaches 40 mrad: the torque -m x/(1 + (x/w)^2)^2."""
+
+    identifier = "magnet"
+    name = "a magnet under the pendulum"
+    kind = "dynamics"
+    equation = r"\ddot x \mathrel{-}= m x/(1 + (x/w)^2)^2"
+    parameters = (Parameter("m", "1/s^2", -10.0, 10.0), Parameter("w", "rad", 1e-3, 1.0))
+    discriminating_test = "take it away"
+
+    def acceleration(
+        self,
+        motion: Motion,
+        pendulum: Pendulum,  # noqa: ARG002
+        values: FloatArray,
+    ) -> FloatArray:
+        """Return the torque over the moment of inertia."""
+        pull, width = values
+        return np.asarray(-pull * motion.angle / (1.0 + (motion.angle / width) ** 2) ** 2)
+
+
+def pulled() -> FloatArray:
+    """Readings of a pendulum over a magnet, without noise."""
+    model = Model(TIME_S, INTERVAL_S, (Magnet(),))
+    return model.reading(np.append(TRUTH, [0.02, 0.04]))

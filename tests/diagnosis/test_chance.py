@@ -13,7 +13,7 @@ from scipy.stats import binom, kstest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.chance import Chance, Trials, draw_chance
 from pendpipe.diagnosis.detect import Lead, detect, prepare
-from pendpipe.diagnosis.evidence import Rival, evidence
+from pendpipe.diagnosis.evidence import Rival, Scale, evidence
 from pendpipe.diagnosis.scores import Bank, Candidate, local_p_values
 from pendpipe.diagnosis.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -105,7 +105,9 @@ def test_who_is_behind_stays_as_far_behind_whatever_else_was_left_at_first() -> 
     """Found while fifty times the noise was left, both are refitted where none of that is."""
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
-    best, other = (Rival(lead, fit, gain, gain / 50.0 - 8.0, 50.0) for gain in (9e5, 6e5))
-    better, worse = best.reaching(fit, 400.0), other.reaching(fit, 350.0)
+    best, other = (Rival(lead, fit, gain, gain / 50.0, gain / 50.0 - 8.0) for gain in (9e5, 6e5))
+    scale = Scale(fit.chi2)
+    better = best.again(fit, fit.chi2 + 400.0, scale)
+    worse = other.again(fit, fit.chi2 + 350.0, scale)
     assert better.evidence == pytest.approx(400.0 - 8.0)
     assert better.evidence - worse.evidence == pytest.approx(50.0)

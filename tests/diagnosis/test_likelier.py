@@ -9,23 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis import diagnose_recording, likelier
-from pendpipe.diagnosis.likelier import swap_in_likelier
+from pendpipe.diagnosis import diagnose_recording, weighing
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.run import Outcome
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Step
-from pendpipe.diagnosis.weighing import Weighed, weigh
+from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh
 from pendpipe.effects.baseline import B
 
 from .records import TRUTH, diagnosed, other_engine, recording
-from .test_one_curve import pulled
-
-
-@functools.cache
-def magnet() -> Outcome:
-    """A torque outside the catalogue, described by a curve."""
-    return diagnose_recording(recording(pulled(), 5))
 
 
 @functools.cache
@@ -103,18 +95,11 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
         curve = [mate for mate in found.mates if mate.identifier == "unnamed-restoring"]
         return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
 
-    monkeypatch.setattr(likelier, "weigh", weighed)
+    monkeypatch.setattr(weighing, "weigh", weighed)
     outcome = diagnosed("circular-error")
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert [effect.identifier for effect in found.improved.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
-
-
-def test_the_likelier_of_a_curve_and_a_name_is_reported() -> None:
-    named = magnet().search.steps[0].winner.identifier
-    step, own, mates, _ = led(magnet(), "unnamed-restoring")
-    assert step.winner.identifier == named != "unnamed-restoring"
-    assert own > max(mates.values())
 
 
 def test_a_wrong_parameter_replaces_missing_physics() -> None:
@@ -138,7 +123,7 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
     outcome = diagnosed("two")
     first = outcome.search.steps[0]
     other = first.rivals[1]
-    monkeypatch.setattr(likelier, "_likelier", lambda _, step, __: other if step is first else None)
+    monkeypatch.setattr(weighing, "_likelier", lambda _, step, __: other if step is first else None)
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert found.steps[0].winner is other
     assert found.steps[1].before is other.fit

@@ -1,4 +1,4 @@
-"""Which effects are refitted, and which comes first in a gross misfit."""
+"""Which effects are refitted."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection, Lead
 from pendpipe.diagnosis.evidence import NO_SCAN
-from pendpipe.diagnosis.naming import refit_leads
 from pendpipe.diagnosis.refine import pulled, refine
+from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

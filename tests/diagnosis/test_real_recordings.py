@@ -53,7 +53,8 @@ def beginning_of(name: str) -> Beginning:
 def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
     """Eq. 8 with some effects (underscores for hyphens) from start values, to a recording."""
     found = beginning_of(name)
-    model, value, noise = found.model, found.value, first_noise(found)
+    model, noise = found.model, first_noise(found)
+    value = found.value if found.sine is None else found.sine
     for identifier, start in effects.items():
         model = model.adding(by_identifier(identifier.replace("_", "-")))
         value = np.append(value, start)

@@ -20,9 +20,9 @@ from .records import null_fit, stribeck_record
 def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
-    best = Rival(lead, fit, gain, gain)
+    best = Rival(lead, fit, gain, gain, gain)
     at_the_limit = gain - useful_chi2(0.0, gain, drawn=False)
-    behind = replace(best, gain=at_the_limit, evidence=at_the_limit)
+    behind = replace(best, gain=at_the_limit, worth=at_the_limit, evidence=at_the_limit)
     assert not of_one_class(best, behind)
 
 

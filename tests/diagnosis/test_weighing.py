@@ -11,7 +11,7 @@ import pytest
 from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.chance import Chance, Trials
 from pendpipe.diagnosis.detect import Lead
-from pendpipe.diagnosis.evidence import Rival, class_width, evidence, probabilities
+from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.run import Outcome
 from pendpipe.diagnosis.weighing import weigh
@@ -30,7 +30,7 @@ from .records import (
 )
 
 JUMP_RAD = 1e-3
-"""Ten times the noise of a reading: so large that the jump is taken for red noise at first."""
+"""Ten times the noise of a reading."""
 
 
 @functools.cache
@@ -42,15 +42,14 @@ def jumped() -> Outcome:
 
 def rival(effect: Effect, worth: float) -> Rival:
     """An effect that gains so much, its scan not counted."""
-    return Rival(Lead(effect, (), 0.0, 0.0), null_fit()[0], worth, worth)
+    return Rival(Lead(effect, (), 0.0, 0.0), null_fit()[0], worth, worth, worth)
 
 
-def test_a_jump_that_was_seen_through_red_noise_has_no_rival_when_that_is_gone() -> None:
-    """Its gain grows by more than ten, and the distances from it as much."""
-    (step,) = jumped().search.steps
+def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> None:
     (effect,) = jumped().diagnosis.effects
     assert effect.identifier == "equilibrium-step"
-    assert effect.delta_chi2 > 10.0 * step.winner.gain
+    # Half the readings on either side of it: chi^2 of the jump itself, about n (10/2)^2.
+    assert effect.delta_chi2 == pytest.approx(25.0 * len(TIME_S), rel=0.3)
     assert effect.indistinguishable == ()
     assert effect.probability > 0.9
 
@@ -80,7 +79,7 @@ def test_a_negative_gain_stays_negative(loss: float) -> None:
     lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
     worth = evidence(lead, fit, -loss, Chance(Trials(1.0, 0.0), {}))
     assert worth == pytest.approx(-loss)
-    later = Rival(lead, fit, -loss, worth).reaching(fit, -0.5 * loss)
+    later = Rival(lead, fit, -loss, -loss, worth).again(fit, fit.chi2 - 0.5 * loss, Scale(fit.chi2))
     assert later.evidence == pytest.approx(-0.5 * loss)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import held_values
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.fit.start import start_values, usable_span
+from pendpipe.analysis.fit.swings import start_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
@@ -19,9 +20,12 @@ from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
-from pendpipe.effects.model import Model
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
+LARGE_PHASE_ERROR: Final = 0.1
+"""Phase error in rad from which a model has lost the motion."""
 _FEWEST_READINGS: Final = 24
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
@@ -46,6 +50,8 @@ class Beginning:
         First estimate of one reading's noise.
     points
         The turning points.
+    sine
+        Start values with sin x, where the half swings ask for it.
     """
 
     data: Data
@@ -54,6 +60,7 @@ class Beginning:
     held: tuple[int, ...]
     noise_rms: float
     points: TurningPoints
+    sine: FloatArray | None = None
 
 
 def begin(
@@ -67,20 +74,21 @@ def begin(
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
     span = usable_span(samples, points, start)
-    value = np.empty(8)
-    a, b, c, omega, angle, time, offset, share = start.value
-    value[[A, B, C, SHARE, OMEGA, START, TIME, OFFSET]] = (
-        a,
-        b,
-        c,
-        min(max(share, 0.0), 1.0),
-        omega,
-        angle,
-        time,
-        offset,
-    )
+    value = _values(start.value)
     if "offset" in fixed:
         value[OFFSET] = fixed["offset"]
+    sine = None
+    if not fixed and samples.unit == "rad":
+        known = start_of(points)
+        if known.sine and known.favoured == "sine" and known.linear.slip_rad > LARGE_PHASE_ERROR:
+            # Both laws begin at the first turning point, so that they count the same half cycles.
+            value, sine = _values(known.linear.value), _values(known.sine.value)
+            value[TIME] = sine[TIME]
+            if baseline == "viscous":
+                value[[A, C]] = sine[[A, C]] = 0.0
+            first = int(np.searchsorted(samples.time_s, known.sine.time_s))
+            span = slice(max(first, span.start), span.stop)
+    omega, angle = float(value[OMEGA]), float(value[START])
     data = gather(
         samples.time_s[span],
         samples.values[span],
@@ -94,9 +102,35 @@ def begin(
     data = _far_from_the_stop(data, value)
     order = order_for(abs(angle), samples.unit)
     data, model = _before_the_stop(data, value, order, parts)
-    data = replace(data, anchor=anchored(data, model.evaluate(value)))
+    at = model.evaluate(value)
+    if sine is not None:
+        data, model, at = _moving_with_sine(data, model, sine)
+    data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
-    return Beginning(data, model, value, held, data.noise_rms, points)
+    return Beginning(data, model, value, held, data.noise_rms, points, sine)
+
+
+def _values(named: FloatArray) -> FloatArray:
+    """Put values in the order of `waveform.NAMES` into that of the model."""
+    a, b, c, omega, angle, time, offset, share = named
+    value = np.empty(8)
+    value[[A, B, C, SHARE]] = a, b, c, min(max(share, 0.0), 1.0)
+    value[[OMEGA, START, TIME, OFFSET]] = omega, angle, time, offset
+    return value
+
+
+def _moving_with_sine(data: Data, model: Model, sine: FloatArray) -> tuple[Data, Model, Evaluated]:
+    """Leave out readings at the end until the pendulum with the start values moves throughout."""
+    effect = by_identifier("circular-error")
+    while True:
+        try:
+            return data, model, model.adding(effect).evaluate(np.append(sine, 1.0))
+        except NoMotionError:
+            keep = int(0.97 * len(data))
+            if keep < _FEWEST_READINGS:
+                raise
+            data = data.first(keep)
+            model = model.at_times(data.time_s)
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

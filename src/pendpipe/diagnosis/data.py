@@ -12,7 +12,7 @@ from pendpipe.arrays import BoolArray, FloatArray
 _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step, at the values that are tried."""
 _NEEDED_GAIN: Final = 12.0
-_MOST_UNEVEN: Final = 3
+_MOST_UNEVEN: Final = 2
 """Largest number of unevenly spaced readings, over `most`."""
 _FEWEST_IN_CYCLE: Final = 24.0
 """Fewest means in a cycle: the fifth harmonic loses 7 %; the loss of the fundamental is known."""

@@ -143,9 +143,9 @@ def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[
     leads = []
     p_values = bank.p_values(scores)
     for name, rows in bank.rows().items():
-        index = min(rows, key=lambda row: (p_values[row], -scores[row]))
-        candidate = bank.candidates[index]
-        score, local = float(scores[index]), float(p_values[index])
+        # How surely the noise is known differs by shape: that counts for chance, not for the name.
+        candidate = bank.candidates[max(rows, key=lambda row: scores[row])]
+        score, local = float(np.max(scores[rows])), float(np.min(p_values[rows]))
         p_value = own[name].global_p_value(local) if name in own else local
         leads.append(Lead(candidate.effect, candidate.shape, score, p_value))
     return leads

@@ -10,8 +10,8 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.evidence import Rival
-from pendpipe.diagnosis.naming import refit_leads
 from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.state import State, settled
 from pendpipe.effects import Effect
 

@@ -12,8 +12,11 @@ import numpy as np
 from pendpipe.analysis.distributions import chi2_beyond, chi2_of_one
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.chance import Chance, Trials
+from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 
@@ -39,6 +42,60 @@ _FAR_BEHIND: Final = 100.0
 
 
 @dataclass(frozen=True)
+class Scale:
+    """What a difference of chi^2 is worth: against the noise, or against what is left.
+
+    Where the best model leaves only noise, chi^2 counts as it is. Where it leaves more, the rest
+    is an unknown function of m numbers of unknown size, the likelihood of which is
+    (sum of squares)^(-m/2): then m ln(1 + (chi^2 - least)/floor) counts, with
+    floor = excess + m.
+
+    Parameters
+    ----------
+    least
+        chi^2 of the best model.
+    floor
+        What it leaves, its noise included; inf where that is noise alone.
+    numbers
+        The independent numbers m of what it leaves.
+    """
+
+    least: float
+    floor: float = math.inf
+    numbers: float = 1.0
+
+    @classmethod
+    def of(cls, best: Fit, data: Data, noise: Noise) -> Scale:
+        """Return the scale that a set's best model gives."""
+        rest = remainder_of(best, data, noise)
+        if not rest.systematic:
+            return cls(best.chi2)
+        return cls(best.chi2, rest.excess + rest.numbers, rest.numbers)
+
+    def lost(self, chi2: float) -> float:
+        """Return what a model is worse than the best."""
+        behind = chi2 - self.least
+        if math.isinf(self.floor) or behind <= 0.0:
+            return behind if math.isinf(self.floor) else behind * self.numbers / self.floor
+        return self.numbers * math.log1p(behind / self.floor)
+
+    def within(self, lost: float) -> float:
+        """Return the chi^2 of a model that is worse than the best by `lost`."""
+        if math.isinf(self.floor):
+            return self.least + lost
+        return self.least + self.floor * math.expm1(min(lost / self.numbers, 50.0))
+
+    @property
+    def unit(self) -> float:
+        """Return the chi^2 that small differences are counted in."""
+        return 1.0 if math.isinf(self.floor) else self.floor / self.numbers
+
+    def worth(self, before: float, after: float) -> float:
+        """Return what a fall of chi^2 is worth."""
+        return self.lost(before) - self.lost(after)
+
+
+@dataclass(frozen=True)
 class Rival:
     """A refitted effect.
 
@@ -50,28 +107,40 @@ class Rival:
         Of the extended model.
     gain
         Delta chi^2 over the model without it.
+    worth
+        What that gain is worth (`Scale`).
     evidence
-        chi^2 of one degree of freedom that is as improbable by chance, the trials of the
-        effect's own scan included.
-    left
-        chi^2 per reading that the best of its rivals leaves: `evidence` uses `gain` over it.
+        `worth` less the charge: chi^2 of one degree of freedom that is as improbable by chance,
+        the trials of the effect's own scan included, with its prior.
     """
 
     lead: Lead
     fit: Fit
     gain: float
+    worth: float
     evidence: float
-    left: float = 1.0
 
-    def reaching(self, fit: Fit, gain: float) -> Rival:
-        """Return it with another fit where only noise is left, with the same charge for its scan.
+    @classmethod
+    def of(cls, lead: Lead, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
+        """Return the rival whose fit lowers chi^2 from `before`."""
+        worth = scale.worth(before, fit.chi2)
+        found = evidence(lead, fit, worth, chance, scale.unit)
+        return cls(lead, fit, before - fit.chi2, worth, found)
+
+    def again(self, fit: Fit, before: float, scale: Scale) -> Rival:
+        """Return it with another fit, and the same charge for its scan.
 
         A curve has no scan; it is charged for the coefficients that it needs now.
         """
-        if isinstance(self.lead.effect, Curve):
-            return Rival(self.lead, fit, gain, evidence(self.lead, fit, gain, NO_SCAN))
-        charged = self.gain / self.left - self.evidence
-        return Rival(self.lead, fit, gain, gain - charged)
+        if self.drawn:
+            return Rival.of(self.lead, fit, before, scale, NO_SCAN)
+        worth = scale.worth(before, fit.chi2)
+        return Rival(self.lead, fit, before - fit.chi2, worth, worth - self.charge)
+
+    @property
+    def charge(self) -> float:
+        """What is charged for its scan, its shapes and its sizes, less its prior."""
+        return self.worth - self.evidence
 
     @property
     def identifier(self) -> str:
@@ -99,7 +168,7 @@ def form_spread(best: Rival) -> float:
 
     Real laws differ slightly from the catalogue's forms, and curves have knots.
     """
-    return math.hypot(_FORM_SD, MISSHAPEN * max(best.gain, 0.0))
+    return math.hypot(_FORM_SD, MISSHAPEN * max(best.worth, 0.0))
 
 
 def class_width(best: Rival) -> float:
@@ -114,7 +183,7 @@ def of_one_class(best: Rival, rival: Rival) -> bool:
     """
     within = class_width(best)
     more = max(best.lead.effect.count - rival.lead.effect.count, 0)
-    by_record = best.gain - rival.gain - _SHAPE_CHARGE * more < within
+    by_record = best.worth - rival.worth - _SHAPE_CHARGE * more < within
     return by_record or best.evidence - rival.evidence < within
 
 
@@ -125,23 +194,25 @@ def equivalent(p_value: float, score: float) -> float:
     return chi2_of_one(p_value)
 
 
-def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance) -> float:
-    """Convert a gain to evidence, comparable between effects with more or fewer free values.
+def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.0) -> float:
+    """Convert a worth to evidence, comparable between effects with more or fewer free values.
 
     Parameters
     ----------
     lead, fit
         The effect, and the model with it.
     gain
-        Delta chi^2, divided by the remaining chi^2 per reading where that exceeds 1.
+        What its Delta chi^2 is worth.
     chance
         The trials of its own scan.
+    unit
+        The chi^2 that counts as 1.
     """
-    superfluous, sizes = _needed_sizes(fit, lead.effect)
+    superfluous, sizes = _needed_sizes(fit, lead.effect, unit)
     gain -= superfluous
     if gain <= 0.0:
         # A negative gain stays negative: a rival that is refitted with another noise
-        # (`Rival.reaching`) must not be credited with it.
+        # (`Rival.again`) must not be credited with it.
         return gain
     effect = lead.effect
     if effect.parameter_free:
@@ -165,7 +236,7 @@ def _prior(effect: Effect, fit: Fit) -> float:
     return effect.prior - unlikely
 
 
-def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
+def _needed_sizes(fit: Fit, effect: Effect, unit: float) -> tuple[float, int]:
     """Return the gain of coefficients that are not needed, and how many are needed.
 
     All sizes of a named effect are needed. A curve is charged for the coefficients that stand
@@ -178,7 +249,7 @@ def _needed_sizes(fit: Fit, effect: Effect) -> tuple[float, int]:
     own, rest = fit.jacobian[:, position], fit.jacobian[:, others]
     basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
     left = own - basis @ (basis.T @ own)
-    squares = (np.linalg.qr(left)[1] @ fit.value[position]) ** 2
+    squares = (np.linalg.qr(left)[1] @ fit.value[position]) ** 2 / unit
     superfluous = squares < SIZE_CHARGE
     return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)
 
@@ -208,7 +279,7 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     uncertain: log odds are averaged over this uncertainty (MacKay's approximation).
     """
     leader = max(rivals, key=lambda rival: rival.evidence)
-    spread = math.hypot(_PROBABILITY_FORM[0], _PROBABILITY_FORM[1] * max(leader.gain, 0.0))
+    spread = math.hypot(_PROBABILITY_FORM[0], _PROBABILITY_FORM[1] * max(leader.worth, 0.0))
     shrunk = 1.0 / math.sqrt(1.0 + math.pi / 8.0 * (0.5 * spread) ** 2)
     prior = np.array([rival.prior for rival in rivals])
     likelihood = np.array([rival.evidence for rival in rivals]) - prior

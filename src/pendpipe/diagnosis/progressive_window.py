@@ -21,6 +21,7 @@ from pendpipe.effects.model import Model
 
 _FIRST_CYCLES: Final = 4
 """Cycles in the first window."""
+_FEWEST_READINGS: Final = 24
 _GROWTH: Final = 1.6
 _SLOW_GROWTH: Final = 1.1
 """Growth of the window where much of the record is fitted already."""
@@ -65,7 +66,8 @@ def progressive_start(
     """
     value = np.asarray(start, dtype=np.float64)
     fixed = tuple(held)
-    count = first or int(_FIRST_CYCLES * 2.0 * np.pi / value[OMEGA] / data.interval_s)
+    cycle = 2.0 * np.pi / value[OMEGA] / data.interval_s
+    count = first or max(int(_FIRST_CYCLES * cycle), _FEWEST_READINGS)
     growth = _GROWTH if first is None else _SLOW_GROWTH
     if first is not None:
         count = int(growth * count)

@@ -1,4 +1,4 @@
-"""Refit all leads side by side, and stop those that can't come near the best."""
+"""Refit the leading effects side by side, and rank them; stop those that can't come near."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.detect import Detection, Lead
+from pendpipe.diagnosis.evidence import Rival, Scale, class_width, equivalent, ranked
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining
+from pendpipe.diagnosis.progressive_window import progressive_start
+from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, pulled, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import finer_shape
 from pendpipe.dynamics.any_law import NoMotionError
@@ -31,6 +34,122 @@ _STALLED_GAIN: Final = 0.3
 """Fall of chi^2 in two rounds below which a refit stops (a winner is refined again)."""
 _LARGEST_DISPLACEMENT: Final = 0.5
 """Largest displacement that an effect may add to the reading, over the first amplitude."""
+_MOST_REFITTED: Final = 9
+_MORE_AT_BOUND: Final = 3
+"""More named effects to refit where a value at its bound lowers the scores."""
+_SCORE_MARGIN: Final = 0.3
+"""Part of the best score that a refit may catch up."""
+_SCORE_MARGIN_AT_BOUND: Final = 0.6
+"""The same where a value at its bound lowers the scores."""
+_LOST_PHASE_RAD: Final = 1.0
+"""Phase error in rad from which a model has lost the motion."""
+_FROM_FIRST_CYCLES: Final = 4
+"""Leads that are then refitted from the first cycles on."""
+
+
+def refit_leads(
+    base: Fit,
+    data: Data,
+    noise: Noise,
+    detection: Detection,
+    *,
+    held: Sequence[int],
+    gross: bool,
+    origin: FloatArray,
+    most: int = _MOST_REFITTED,
+) -> list[Rival]:
+    """Refit the leading effects nonlinearly, and return them ranked, the best first."""
+    leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
+    fits: list[tuple[Lead, Fit]] = []
+    for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
+        lost = base.max_phase_error_rad > _LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
+        # With the baseline's friction the motion may stop before the end.
+        if lost or (gross and fit is None):
+            fit = _better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
+        if fit is not None and believable(base, fit, lead.effect):
+            fits.append((lead, fit))
+    if not fits:
+        return []
+    scale = Scale.of(min((fit for _, fit in fits), key=lambda fit: fit.chi2), data, noise)
+    rivals = ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
+    return rivals if math.isinf(scale.floor) else _names_first(rivals)
+
+
+def _names_first(rivals: list[Rival]) -> list[Rival]:
+    """Rank names that explain most of a misfit before curves, which may follow the rest.
+
+    Where even the best leaves a misfit, names and curves will be needed together, and a curve that
+    was drawn first would hide the names. What is not needed beside the curve is dropped again.
+    Among names that the record can't distinguish the prior decides.
+    """
+    half = 0.5 * max(rival.gain for rival in rivals)
+    best = max(rivals, key=lambda rival: -math.inf if rival.drawn else rival.evidence)
+    near = best.evidence - class_width(best)
+
+    def order(rival: Rival) -> tuple[bool, float, float]:
+        prior = rival.prior if rival.evidence > near else -math.inf
+        return rival.drawn or rival.gain < half, -prior, -rival.evidence
+
+    return sorted(rivals, key=order)
+
+
+def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -> list[Lead]:
+    """Return the leads that may win, or be in the winner's class.
+
+    There are more (`wide`) where the base has a value at its bound: the score keeps it there,
+    while a refit may release it and gain far more.
+    """
+    leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
+    if not leads:
+        return []
+    best = _rank(leads[0])
+    part = 0.9 if gross else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
+    near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
+    if gross:
+        near = near[: most + 2]
+    else:
+        # Curves lead in many misfits; they don't count in the number of named effects.
+        names = [lead for lead in near if lead.effect.kind != "unnamed"]
+        names = names[: most + _MORE_AT_BOUND if wide else most]
+        near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
+    # Always refitted: parameters that the user holds (few), and in a gross misfit bearing friction
+    # and drag, which every pendulum has.
+    asked = [
+        lead
+        for lead in leads
+        if isinstance(lead.effect, ReleasedParameter) or (gross and lead.effect.expected)
+    ]
+    return [*near, *(lead for lead in asked if lead not in near)]
+
+
+def _rank(lead: Lead) -> float:
+    """Return what a score is worth with the noise as it is, as the refits are ranked later."""
+    local = float(chi2_beyond(lead.score, max(lead.effect.sizes, 1)))
+    return equivalent(local, lead.score) + lead.effect.prior
+
+
+def _from_first_cycles(
+    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], origin: FloatArray
+) -> Fit | None:
+    """Refit in a progressive window where the base has lost the phase."""
+    effect = lead.effect
+    if isinstance(effect, ReleasedParameter) or effect.kind == "unnamed":
+        return None
+    sizes = np.ones(1) if effect.parameter_free else np.zeros(effect.sizes)
+    known = base.value[len(origin) :]
+    start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
+    model = base.model.adding(effect)
+    try:
+        value = progressive_start(model, data, noise.white_rms, start, held=held)
+        return refine(model, data, noise, value, held=held)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+
+
+def _better(one: Fit | None, other: Fit | None) -> Fit | None:
+    if one is None or other is None:
+        return one or other
+    return one if one.chi2 <= other.chi2 else other
 
 
 def side_by_side(

@@ -20,7 +20,6 @@ from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.lattice import with_true_step
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
-from pendpipe.diagnosis.likelier import swap_in_likelier
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import released_parameters
 from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
@@ -28,7 +27,7 @@ from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.values import parameters_of
-from pendpipe.diagnosis.weighing import Weighed, effect_named, fault_named
+from pendpipe.diagnosis.weighing import Weighed, effect_named, fault_named, swap_in_likelier
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording

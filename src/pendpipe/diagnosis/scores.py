@@ -130,7 +130,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
         some = max(_COLUMNS_AT_ONCE // effect.sizes, 1)
         for first in range(0, len(rows), some):
             part = rows[first : first + some]
-            kept.add(effect, part, _whitened(fit, noise, effect, part))
+            kept.add(effect, part, whitened(fit, noise, effect, part))
     return kept.bank()
 
 
@@ -140,7 +140,7 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
     return [tuple(float(number) for number in row) for row in effect.shapes(span)]
 
 
-def _whitened(
+def whitened(
     fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[tuple[float, ...]]
 ) -> FloatArray:
     """Derivatives of the whitened readings by each size of each shape, shape (columns, n + 1)."""

@@ -15,42 +15,27 @@ from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Detection, more_leads
 from pendpipe.diagnosis.drift_or_red_noise import reconsider_red_noise
-from pendpipe.diagnosis.evidence import MISSHAPEN
 from pendpipe.diagnosis.faults import Forensics
-from pendpipe.diagnosis.large_first import large_first
-from pendpipe.diagnosis.naming import refit_leads
+from pendpipe.diagnosis.known_first import known_law_first
+from pendpipe.diagnosis.moves import describe, improve, prefer_two_names, price
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.one_curve import prefer_one_curve
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import Remainder, remainder_of
 from pendpipe.diagnosis.result import BASELINES
-from pendpipe.diagnosis.review import (
-    credible,
-    describe_rest,
-    fit_without,
-    stands_apart,
-    withdraw_doubtful,
-)
-from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross
+from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross, loses_phase
 from pendpipe.diagnosis.task import Task, undrawn
-from pendpipe.diagnosis.two_names import prefer_two_names
-from pendpipe.diagnosis.wrong_parameters import prefer_parameters, reconsider_curve
+from pendpipe.diagnosis.wrong_parameters import prefer_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import C
+from pendpipe.effects.baseline import OMEGA, TIME, C
 from pendpipe.effects.curves import FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
 
 _MOST_EFFECTS: Final = 6
-_NEEDED_CHI2: Final = 9.0
-"""Delta chi^2 below which an effect is dropped once others have been added."""
-_GROSS_SHARE: Final = 0.15
-"""Part of a gross misfit that an effect must explain to be added."""
 _LESS_FRICTION: Final = (0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
-_LARGE_AMPLITUDE_SHARE: Final = 0.5
-"""Part of the misfit that an effect must explain while only the large amplitudes are fitted."""
 
 
 class Reviewed(NamedTuple):
@@ -148,11 +133,9 @@ def search(
     state.settle(fit)
     forensics = Forensics(samples, level)
     task = Task(catalogue, released, baseline, level, seed, forensics, progress)
-    large_first(beginning, state, lambda part: _add_one(part, task, _LARGE_AMPLITUDE_SHARE))
-    _add_all(state, task)
-    if reconsider_curve(state, task):
-        _add_all(state, task)
-    named, remainder = _reviewed(state, task)
+    known_law_first(beginning, state, task)
+    _grow(state, task)
+    named, remainder = _described(state, task)
     forensics.after(state, progress)
     assert state.first is not None
     assert state.now is not None
@@ -173,20 +156,19 @@ def search(
     )
 
 
-def _add_all(state: State, task: Task) -> None:
-    """Add effects until chance explains the rest; one curve may replace several effects."""
+def _grow(state: State, task: Task) -> None:
+    """Add effects until chance explains the rest, then improve the set."""
     while len(state.steps) < _MOST_EFFECTS:
         task.forensics.before(state, task.progress)
         if not _add_one(state, task):
             break
-    _prune(state, task.progress)
+    improve(state, task.progress)
     if task.forensics.again(state, task.progress):
-        _prune(state, task.progress)
-    prefer_one_curve(state, task.progress)
+        improve(state, task.progress)
 
 
-def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
-    """Withdraw names that the remaining misfit makes doubtful, and describe it by a curve.
+def _described(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
+    """Describe what the names leave by a curve.
 
     Returns
     -------
@@ -195,16 +177,13 @@ def _reviewed(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
     Remainder
         Misfit of the final model.
     """
-    before = state.fit
-    withdraw_doubtful(state, task.level, task.progress)
     remainder = remainder_of(state.fit, state.data, state.noise)
-    if state.fit is not before or len(state.steps) >= _MOST_EFFECTS:
-        task.scanned(state)
+    task.scanned(state)
     if not remainder.systematic or _ends_with_curve(state):
         return None, remainder
     assert state.now is not None
     named = Reviewed(replace(state.fit, error_scale=remainder.error_scale), remainder)
-    if describe_rest(state, state.now, state.now.p_value / CATALOGUE_SHARE):
+    if describe(state, state.now.p_value / CATALOGUE_SHARE):
         task.scanned(state)
     return named, remainder_of(state.fit, state.data, state.noise)
 
@@ -225,25 +204,30 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
         starts.append(state.bare.copy())
         starts[-1][C] *= share
     error = NoMotionError("it stops")
+    period_s = 2.0 * np.pi / beginning.value[OMEGA]
     for start in starts:
         try:
-            return refine(model, data, state.noise, start, held=beginning.held)
+            fit = refine(model, data, state.noise, start, held=beginning.held)
         except NoMotionError as found:
             error = found
-    raise error
+            continue
+        if abs(fit.value[TIME] - beginning.value[TIME]) < period_s:
+            return fit
+    try:
+        # The linear law has lost a pendulum of large swings: its start says most of it.
+        return refine(model, data, state.noise, beginning.value, held=beginning.held, rounds=0)
+    except NoMotionError:
+        raise error from None
 
 
-def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
-    """Scan the catalogue and add the best effect if it is needed; return whether one was added.
-
-    It must explain a `share` of a gross misfit.
-    """
-    gross, threshold, progress = is_gross(state.fit, state.data), task.threshold, task.progress
+def _add_one(state: State, task: Task) -> bool:
+    """Scan the catalogue and add the best effect; return whether one was added."""
+    gross, progress = is_gross(state.fit, state.data), task.progress
     effects = task.scanned(state)
     assert state.now is not None
-    if state.now.p_value > threshold and state.noise.coloured and not gross:
+    if state.noise.coloured and not gross and not state.steps:
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
-    if state.now.p_value > threshold or _ends_with_curve(state):
+    if state.now.p_value > task.threshold or _ends_with_curve(state):
         return False
     p_value = state.now.p_value / CATALOGUE_SHARE
     progress(f"chance does not explain the residual ({printed(p_value)}): refitting leads")
@@ -255,27 +239,23 @@ def _add_one(state: State, task: Task, share: float = _GROSS_SHARE) -> bool:
         state.noise,
         found,
         held=state.held,
-        gross=gross,
+        gross=loses_phase(state.fit),
         origin=state.origin,
     )
     if rivals:
         rivals = prefer_parameters(state, rivals)
-    if not gross and rivals:
+    if rivals and not gross:
         rivals = prefer_two_names(state, rivals, task)
-    if not gross and rivals and task.forensics.kicked_at_random(state, rivals[0], progress):
+    if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
         return False
-    if not rivals or rivals[0].gain <= max(_NEEDED_CHI2, share * state.fit.chi2 if gross else 0.0):
-        return False
-    step = Step(tuple(rivals), p_value, state.fit)
-    if gross and state.steps and not credible(step, state, task.level):
-        return False
-    if share == _LARGE_AMPLITUDE_SHARE and rivals[0].lead.effect.kind == "unnamed":
-        return False
-    state.steps.append(step)
     winner = rivals[0]
+    step = Step(tuple(rivals), p_value, state.fit)
+    if winner.worth < price([*state.steps, step]) - price(state.steps):
+        return False
     unit, fits = state.data.unit, (state.fit, winner.fit)
     before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
     progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
+    state.steps.append(step)
     if isinstance(winner.lead.effect, ReleasedParameter):
         state.held = winner.lead.effect.without(state.held)
     state.settle(winner.fit)
@@ -286,32 +266,6 @@ def _rms(fit: Fit, data: Data) -> float:
     """Root mean square of the readings that count less the model."""
     residual = data.residual(fit.at.reading)[data.weight > 0.0]
     return float(np.sqrt(np.mean(residual**2)))
-
-
-def _prune(state: State, progress: Progress) -> None:
-    """Drop effects that are no longer needed beside later ones.
-
-    A curve in time can imitate any effect and so drops none. Another curve misfits between its
-    knots by a few per cent of its gain: a name that explains no more than that may be an artefact.
-    """
-    if _ends_with_curve(state) and state.steps[-1].winner.lead.effect.in_time:
-        return
-    between = 0.0
-    if _ends_with_curve(state) and len(state.steps) > 1:
-        without = fit_without(state, state.steps[-1])
-        between = MISSHAPEN * (without.chi2 - state.fit.chi2) if without else 0.0
-    # The last effect has others after it only if a fault was found after it.
-    joined = any(fault.after == len(state.steps) for fault in state.faults)
-    for step in list(state.steps if joined and not _ends_with_curve(state) else state.steps[:-1]):
-        effect = step.winner.lead.effect
-        without = None if isinstance(effect, ReleasedParameter) else fit_without(state, step)
-        if without is None:
-            continue
-        needed = _NEEDED_CHI2 if stands_apart(effect, state.fit) else max(_NEEDED_CHI2, between)
-        if without.chi2 - state.fit.chi2 < needed:
-            progress(f"{effect.name} is no longer needed")
-            state.fit = without
-            state.steps.remove(step)
 
 
 def _ends_with_curve(state: State) -> bool:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import Detection
 from pendpipe.diagnosis.evidence import Rival
@@ -21,8 +21,6 @@ from pendpipe.effects.baseline import OMEGA
 
 GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
-_LARGE_PHASE_ERROR: Final = 0.1
-"""Phase error in rad above which they are meaningless too."""
 _ESTIMATE_AGAIN: Final = 0.95
 """Ratio of noise estimates below which the noise is estimated again."""
 _ROUNDS: Final = 3
@@ -106,7 +104,12 @@ class State:
 
 def is_gross(fit: Fit, data: Data) -> bool:
     """Return whether a misfit is too large for a linear approximation."""
-    return fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > _LARGE_PHASE_ERROR
+    return fit.chi2 > GROSS * data.used or loses_phase(fit)
+
+
+def loses_phase(fit: Fit) -> bool:
+    """Return whether a model is so far out of phase that first-order scores mean nothing."""
+    return fit.max_phase_error_rad > LARGE_PHASE_ERROR
 
 
 def first_noise(beginning: Beginning) -> Noise:

@@ -1,4 +1,4 @@
-"""Final probabilities of each effect and its rivals, beside all other effects."""
+"""Final probabilities of each effect and its rivals; likelier rivals are swapped in."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.evidence import MISSHAPEN, Rival, of_one_class, probabilities
+from pendpipe.diagnosis.evidence import Rival, Scale, of_one_class, probabilities
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.location import locate, tone_of
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.refits import useful_chi2
+from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import FoundEffect
-from pendpipe.diagnosis.review import stands_apart
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Fault, Step, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import BASELINE
+from pendpipe.effects.baseline import BASELINE, OMEGA
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.model import Model
 
@@ -35,6 +36,13 @@ _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
 _SEEN_IN_RESIDUAL: Final = ("jitter", "broadband-drive", "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
+_OFF_HARMONIC: Final = 0.1
+"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
+_LIKELIER: Final = 1.5
+"""Ratio of probabilities from which another effect replaces the one that was added."""
+_LIKELIER_CURVE: Final = 20.0
+"""The same for a curve that replaces a named effect. Names precede curves that the recording
+cannot distinguish from them; at odds of twenty to one it can."""
 _SAME_GAIN: Final = 0.02
 """Relative change of a gain below which the rivals are not refitted."""
 
@@ -67,12 +75,7 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     without, rivals = _rivalry(found, beginning, step)
     gain = without.chi2 - found.improved.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
-    own = _weighed(found, own, gain, gain)
-    others = [
-        _weighed(found, rival, rival.gain, gain)
-        for rival in rivals
-        if rival.identifier != effect.identifier
-    ]
+    others = [rival for rival in rivals if rival.identifier != effect.identifier]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # An effect that every pendulum has gets its prior against rivals and against "none of these".
     # A curve that can follow anything gets no credit for leaving only noise.
@@ -133,17 +136,6 @@ def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
     return list(best.values())
 
 
-def _weighed(found: Search, rival: Rival, gain: float, best: float) -> Rival:
-    """Return a rival with the evidence of its gain beside a remaining misfit."""
-    if not found.remainder.systematic:
-        return rival
-    # m ln(excess) counts, for m independent numbers of the remaining misfit; differences within
-    # the tolerance of the catalogue's forms don't count.
-    behind, left = max(best - gain, 0.0), found.remainder.excess + MISSHAPEN * max(best, 0.0)
-    worth = -found.remainder.numbers * math.log1p(behind / max(left, 1.0))
-    return replace(rival, gain=worth, evidence=worth + rival.prior)
-
-
 def _explained(found: Search, effect: Effect, gain: float) -> float:
     """Return the part of the misfit that an effect explains, an upper limit of its probability.
 
@@ -198,20 +190,40 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
     without = _refined(model, found, held, value, bare, step.before.value) or step.before
     gain = without.chi2 - found.improved.chi2
-    same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
-    if len(found.steps) == 1 and same and not is_gross(without, found.data):
+    if len(found.steps) == 1 and _same(gain, step) and not is_gross(without, found.data):
         return without, step.rivals
     # Refit even rivals that were far behind in the search: noise and other effects have changed.
-    useful = without.chi2
-    if not found.remainder.systematic:
-        useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
-    rivals = []
+    scale = Scale.of(found.improved, found.data, found.noise)
+    useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
+    if found.remainder.systematic:
+        useful = scale.within(NEAR)
+    fits = []
     for rival in step.rivals:
         own = rival.lead.effect.key == effect.key
         fit = found.improved if own else refitted(without, found, held, rival, useful)
         if fit is not None:
-            rivals.append(rival.reaching(fit, without.chi2 - fit.chi2))
-    return without, rivals
+            fits.append((rival, fit))
+    return without, [rival.again(fit, without.chi2, scale) for rival, fit in fits]
+
+
+def _same(gain: float, step: Step) -> bool:
+    """Whether an effect gains what it gained when its rivals were refitted."""
+    return abs(gain - step.winner.gain) < _SAME_GAIN * gain
+
+
+def stands_apart(effect: Effect, fit: Fit) -> bool:
+    """Return whether the remaining misfit can't be mistaken for an effect.
+
+    This holds for a separate spectral line, off the motion's harmonics, and for effects that
+    every pendulum has.
+    """
+    if effect.expected:
+        return True
+    line = tone_of(fit, effect)
+    if line is None:
+        return False
+    order = line / (0.5 * float(fit.value[OMEGA]) / math.pi)
+    return abs(order - round(order)) > _OFF_HARMONIC and order > _OFF_HARMONIC
 
 
 def _refined(
@@ -247,3 +259,86 @@ def refitted(
     return _refined(
         without.model.adding(effect), found, held, start, rival.fit.value, useful=useful
     )
+
+
+def swap_in_likelier(
+    found: Search, beginning: Beginning, progress: Progress = silent
+) -> tuple[Search, tuple[Weighed, ...]]:
+    """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
+
+    A search adds what reduces a gross misfit most. Where much remains unexplained, a slightly
+    larger gain means nothing and the prior decides; and effects added later, or the final
+    estimate of the noise, may have changed the odds.
+
+    Returns
+    -------
+    Search
+        With the swaps made.
+    tuple of Weighed
+        One for each of its steps.
+    """
+    weighed = [weigh(found, beginning, step) for step in found.steps]
+    # Names under a curve stay: their probabilities show how little they explain.
+    if found.named.fit.model is not found.improved.model:
+        return found, tuple(weighed)
+    for number in range(len(found.steps)):
+        best = _likelier(found, found.steps[number], weighed[number])
+        after = _exchanged(found, number, best, weighed[number].without) if best else None
+        if best is not None and after is not None:
+            own = found.steps[number].winner
+            progress(f"replacing {own.name} by {best.name}, which is likelier")
+            found = after
+            weighed[number] = weigh(found, beginning, found.steps[number])
+    return found, tuple(weighed)
+
+
+def _likelier(found: Search, step: Step, weighed: Weighed) -> Rival | None:
+    """Return the likelier rival that may replace a step's winner."""
+    present = {effect.key for effect in found.improved.model.effects}
+    own = step.winner
+    likelier = [
+        (float(weight), rival)
+        for rival, weight in zip(weighed.mates, weighed.weights[1:], strict=False)
+        if rival.lead.effect.key not in present
+        # What no model explains has its curve already, on top of the names.
+        and not (rival.drawn and found.remainder.systematic)
+        and weight
+        > weighed.weights[0] * (_LIKELIER_CURVE if rival.drawn and not own.drawn else _LIKELIER)
+    ]
+    return max(likelier, key=lambda each: each[0], default=(0.0, None))[1]
+
+
+def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search | None:
+    """Replace a step's winner by a rival; None where the model has no such motion."""
+    step, effect = found.steps[number], best.lead.effect
+    own, held = step.winner.lead.effect, set(found.held)
+    # A held part of b has no index: the model itself holds it.
+    if isinstance(own, ReleasedParameter) and own.index is not None:
+        held.add(own.index)
+    if isinstance(effect, ReleasedParameter):
+        held = set(effect.without(held))
+    fit = refitted(without, found, sorted(held), best)
+    if fit is None:
+        return None
+    remainder = remainder_of(fit, found.data, found.noise)
+    fit = replace(fit, error_scale=remainder.error_scale)
+    return replace(
+        found,
+        improved=fit,
+        steps=_reordered(found.steps, number, effect),
+        remainder=remainder,
+        held=tuple(sorted(held)),
+        named=found.named._replace(fit=fit, remainder=remainder),
+    )
+
+
+def _reordered(steps: Sequence[Step], number: int, effect: Effect) -> tuple[Step, ...]:
+    """Return the steps with an effect moved to the front of its rivals at one of them."""
+    own = [rival for rival in steps[number].rivals if rival.lead.effect.key == effect.key]
+    rest = [rival for rival in steps[number].rivals if rival.lead.effect.key != effect.key]
+    after = list(steps)
+    after[number] = replace(steps[number], rivals=(*own, *rest))
+    if number + 1 < len(steps):
+        # The next step is tested without its own effect: start from this model.
+        after[number + 1] = replace(steps[number + 1], before=own[0].fit)
+    return tuple(after)

@@ -7,20 +7,15 @@ be missing. Of these parameters only those that are needed are reported.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from pendpipe.diagnosis.evidence import SIZE_CHARGE, Rival
-from pendpipe.diagnosis.naming import refit_leads
-from pendpipe.diagnosis.one_curve import BETTER
+from pendpipe.diagnosis.moves import FURTHER
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.review import fit_without
-from pendpipe.diagnosis.state import State, Step
-from pendpipe.diagnosis.task import Task
-from pendpipe.diagnosis.two_names import prefer_two_names
+from pendpipe.diagnosis.state import State
 from pendpipe.dynamics.any_law import NoMotionError
 
 
@@ -52,48 +47,13 @@ def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
     return [first, *(rival for rival in rivals if rival is not first)]
 
 
-def reconsider_curve(state: State, task: Task) -> bool:
-    """Replace the last curve by a held parameter if that and a named effect do as well.
-
-    A curve can follow a wrong parameter and an effect together, and hide both. Returns whether
-    it was replaced.
-    """
-    if not task.released or not state.steps or not state.steps[-1].winner.drawn:
-        return False
-    drawn = state.steps[-1]
-    without = fit_without(state, drawn)
-    if without is None or all(entry in without.model.effects for entry in task.released):
-        return False
-    before = replace(state, fit=without, steps=state.steps[:-1])
-    task.scanned(before)
-    assert before.now is not None
-    leads = tuple(lead for lead in before.now.leads if lead.effect.kind in ("parameter", "unnamed"))
-    rivals = refit_leads(
-        without,
-        state.data,
-        state.noise,
-        replace(before.now, leads=leads),
-        held=state.held,
-        gross=False,
-        origin=state.origin,
-    )
-    rivals = prefer_two_names(before, sorted(rivals, key=lambda each: -each.evidence), task)
-    if not rivals or not isinstance(rivals[0].lead.effect, ReleasedParameter):
-        return False
-    task.progress(f"{rivals[0].identifier} and a named effect do as well as the curve")
-    state.steps[:] = [*before.steps, Step(tuple(rivals), drawn.p_value, without)]
-    state.held = rivals[0].lead.effect.without(state.held)
-    state.settle(rivals[0].fit)
-    return True
-
-
 def _fewest(state: State, released: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
     """Return the fewest parameters to which no other adds more than chance, and their fit."""
     for number in range(1, len(released)):
         tried = [(some, _together(state, some)) for some in combinations(released, number)]
         fits = [(some, fit) for some, fit in tried if fit is not None]
         some, best = min(fits, key=lambda each: each[1].chi2, default=(released, most))
-        if best.chi2 - most.chi2 < SIZE_CHARGE * released[0].left * (len(released) - number):
+        if best.chi2 - most.chi2 < SIZE_CHARGE * _unit(released[0]) * (len(released) - number):
             return some, best
     return released, most
 
@@ -122,10 +82,15 @@ def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequenc
     """
     one, more = needed[0], len(needed) - 1
     worth = (
-        (state.fit.chi2 - fit.chi2) / one.left - SIZE_CHARGE * more + (0.0 if more else one.prior)
+        (state.fit.chi2 - fit.chi2) / _unit(one) - SIZE_CHARGE * more + (0.0 if more else one.prior)
     )
     return all(
-        worth >= rival.evidence + (BETTER if more and not rival.drawn else 0.0)
+        worth >= rival.evidence + (FURTHER if more and not rival.drawn else 0.0)
         for rival in rivals
         if not isinstance(rival.lead.effect, ReleasedParameter)
     )
+
+
+def _unit(rival: Rival) -> float:
+    """Return the chi^2 that counts as 1."""
+    return rival.gain / rival.worth if rival.worth > 0.0 else 1.0

@@ -29,7 +29,7 @@ _ROUNDS: Final = 25
 _STEP: Final = 1e-6
 _STRIDE: Final = 0.7
 """Longest step in ln r."""
-_STEEPEST: Final = 0.9
+_STEEPEST: Final = 0.97
 """Of g cos(psi): beyond, the pendulum hardly turns, or never."""
 _LARGEST: Final = 4.0
 """Of g, where it pulls back: the equilibrium is far off for so small an r."""

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     name="circular error",
     equation=r"\omega^2 x \to \omega^2 \sin x",
     parameter_free=True,
-    prior=6.0,
+    expected=True,
+    prior=12.0,
     angular=True,
     example=(1.0,),
     discriminating_test=(

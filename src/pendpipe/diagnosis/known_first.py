@@ -1,0 +1,115 @@
+"""The known law of a pendulum, sin x, first: wherever the half swings ask for it.
+
+Over a long record at large amplitude the linear law loses the phase by many turns, and what is
+fitted to it there means little. The half swings, which are counted, tell sin x and its start.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.chance import CATALOGUE_SHARE
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
+from pendpipe.diagnosis.progressive_window import progressive_start
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.scores import Candidate, build_bank, whitened
+from pendpipe.diagnosis.state import State, Step
+from pendpipe.diagnosis.task import Task, applicable
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
+
+_IMITATORS: Final = 3
+"""Effects that are refitted in the place of sin x."""
+
+
+def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
+    """Fit sin x from its own start, and take it as the first effect if it lowers chi^2.
+
+    Parameters
+    ----------
+    beginning
+        Its `sine` is the start; None where the half swings do not ask for sin x, or the linear
+        law keeps the phase: then the scan finds sin x as it finds others.
+    state
+        After the baseline's fit; updated.
+    task
+        Its catalogue holds what might imitate sin x.
+    """
+    if beginning.sine is None:
+        return
+    effect = by_identifier("circular-error")
+    task.progress("the half swings ask for sin x: fitting it first")
+    before, start = state.fit, np.append(beginning.sine, 1.0)
+    fit = fitted_from(before.model, state, effect, start)
+    if fit is None or _misfit(fit, state.data) >= _misfit(before, state.data):
+        return
+    if state.first is None:
+        task.scanned(state)
+    state.settle(fit)
+    task.progress("refitting what may imitate it")
+    fits = [(Lead(effect, (), before.chi2 - fit.chi2, 0.0), fit), *_imitated(state, effect, task)]
+    best = min((fit for _, fit in fits), key=lambda fit: fit.chi2)
+    scale = Scale.of(best, state.data, state.noise)
+    rivals = [Rival.of(lead, fit, before.chi2, scale, NO_SCAN) for lead, fit in fits]
+    assert state.now is not None
+    state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, before))
+
+
+def _misfit(fit: Fit, data: Data) -> float:
+    """Return the sum of squares of readings less model.
+
+    Where a model has lost the phase its chi^2 is taken along the motion, and says less.
+    """
+    return float(np.sum((data.residual(fit.at.reading) * data.weight) ** 2))
+
+
+def _imitated(state: State, effect: Effect, task: Task) -> list[tuple[Lead, Fit]]:
+    """Refit what changes the readings as sin x does, each from the values that imitate it."""
+    fit, noise = state.fit, state.noise
+    change = whitened(fit, noise, effect, [()])[0]
+    others = applicable(task.catalogue, fit, task.baseline, state.data.unit)
+    names = [other for other in others if other.kind == "dynamics" and other.sizes == 1]
+    bank = build_bank(fit, noise, names)
+    scores = bank.scores(change - bank.basis @ (bank.basis.T @ change))
+    found: dict[str, tuple[float, Candidate]] = {}
+    for candidate, score in zip(bank.candidates, scores.tolist(), strict=True):
+        if score > found.get(candidate.effect.key, (0.0, candidate))[0]:
+            found[candidate.effect.key] = score, candidate
+    near = sorted(found.values(), key=lambda pair: -pair[0])[:_IMITATORS]
+    fits = []
+    for score, (other, shape, _, _) in near:
+        column = whitened(fit, noise, other, [shape])[0]
+        columns = np.column_stack([fit.jacobian[:, list(fit.free)], column])
+        moved = np.linalg.lstsq(columns, change, rcond=1e-11)[0]
+        model, start = fit.model.dropping(effect, fit.value)
+        start[list(fit.free)] += moved[:-1]
+        start = np.concatenate([start, moved[-1:], shape])
+        imitated = fitted_from(model, state, other, start)
+        if imitated is not None:
+            fits.append((Lead(other, shape, score, 0.0), imitated))
+    return fits
+
+
+def fitted_from(base: Model, state: State, effect: Effect, start: FloatArray) -> Fit | None:
+    """Fit at once, and in a growing window; return the better of the two."""
+    model, found = base.adding(effect), []
+    for growing in (False, True):
+        try:
+            value = start
+            if growing:
+                white = state.noise.white_rms
+                value = progressive_start(model, state.data, white, start, held=state.held)
+            found.append(refine(model, state.data, state.noise, value, held=state.held))
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+        if found[-1].converged and found[-1].max_phase_error_rad < 0.1:
+            break
+    return min(found, key=lambda fit: fit.chi2, default=None)

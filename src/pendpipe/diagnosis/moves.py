@@ -1,0 +1,277 @@
+"""Sets of effects: their score, and the moves from one set to a better one.
+
+The score of a set is
+
+    S = lost(chi^2) + the charges of its effects + the price of each further name,
+
+and the set with the smallest S is the answer. `lost` is the fall of the log-likelihood against
+the best set (`evidence.Scale`): chi^2 itself where the best leaves noise alone. The charge of an
+effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.charge`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.diagnosis import Progress
+from pendpipe.diagnosis.detect import Detection, Lead, detect, prepare
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.scores import build_bank
+from pendpipe.diagnosis.state import State, Step
+from pendpipe.diagnosis.task import Task, applicable
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
+
+CHOICE: Final = 7.4
+"""Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
+FURTHER: Final = 22.0
+"""Price of each further name: a choice, in a recording that needs two at once, which is as rare
+again as two choices."""
+_LOST_AT_KNOTS: Final = 0.012
+"""Part of a curve's gain lost between its knots, where it is straight: h^2 F''/12 at the knots of
+`effects.curves`; it is credited as far as the names leave as much."""
+_MOST_MOVES: Final = 6
+_FIRST_TRIED: Final = 2
+"""Named effects tried as the first of two."""
+_SECOND_TRIED: Final = 3
+"""Named effects refitted as the second, beside each of them."""
+
+
+class Proposed(NamedTuple):
+    """A set of effects, as steps, with its fit."""
+
+    fit: Fit
+    steps: tuple[Step, ...]
+    words: str = ""
+    credit: float = 0.0
+
+
+def price(steps: Sequence[Step]) -> float:
+    """Return the charges of a set of effects, with the price of each further name."""
+    names = sum(_is_further(step) for step in steps)
+    chosen = CHOICE * min(names, 1) + FURTHER * max(names - 1, 0)
+    return chosen + sum(step.winner.charge for step in steps)
+
+
+def _is_further(step: Step) -> bool:
+    effect = step.winner.lead.effect
+    return not (effect.expected or effect.parameter_free or effect.kind in ("unnamed", "parameter"))
+
+
+def improve(state: State, progress: Progress) -> None:
+    """Make the best move, again and again, until none lowers the score."""
+    for _ in range(_MOST_MOVES):
+        here = Proposed(state.fit, tuple(state.steps))
+        there = list(_moves(state))
+        best = _best(here, there, state)
+        if best is here:
+            return
+        progress(best.words)
+        state.steps[:] = best.steps
+        state.settle(best.fit)
+
+
+def _best(here: Proposed, there: Sequence[Proposed], state: State) -> Proposed:
+    """Return the set of the smallest score; `here` if no other is smaller."""
+    found = [here, *there]
+    best = min(found, key=lambda each: each.fit.chi2)
+    scale = Scale.of(best.fit, state.data, state.noise)
+    return min(found, key=lambda each: scale.lost(each.fit.chi2 - each.credit) + price(each.steps))
+
+
+def _moves(state: State) -> Iterator[Proposed]:
+    yield from _drops(state)
+    yield from _curves_for_names(state)
+
+
+def _drops(state: State) -> Iterator[Proposed]:
+    """Drop one effect.
+
+    The last one, which was significant, is not dropped where it leaves only noise, unless a fault
+    of the measurement was found after it.
+    """
+    clean = np.isinf(Scale.of(state.fit, state.data, state.noise).floor)
+    joined = any(fault.after == len(state.steps) for fault in state.faults)
+    if clean and len(state.steps) < 2 and not joined:
+        return
+    for step in state.steps:
+        effect = step.winner.lead.effect
+        if isinstance(effect, ReleasedParameter):
+            continue
+        without = fit_without(state, step)
+        if without is not None:
+            others = tuple(other for other in state.steps if other is not step)
+            yield Proposed(without, others, f"{effect.name} is no longer needed")
+
+
+def _curves_for_names(state: State) -> Iterator[Proposed]:
+    """Put one curve in the place of several names: all, or all but what is sudden or a line."""
+    own = [step for step in state.steps if _is_further(step)]
+    steady = [step for step in own if not (step.winner.lead.effect.local or _line(step))]
+    tried: list[list[Step]] = []
+    for replaced in (own, steady):
+        if len(replaced) < 2 or replaced in tried or any(s.winner.drawn for s in state.steps):
+            continue
+        tried.append(replaced)
+        bare = _without(state, replaced)
+        if bare is None:
+            continue
+        fits = [fit for curve in _curves(bare, state) if (fit := _with_curve(bare, curve, state))]
+        if not fits:
+            continue
+        scale = Scale.of(min((*fits, state.fit), key=lambda fit: fit.chi2), state.data, state.noise)
+        rivals = ranked([_rival(bare, fit, scale) for fit in fits])
+        step = Step(tuple(rivals), replaced[0].p_value, bare)
+        kept = [other for other in state.steps if other not in replaced]
+        left = max(state.fit.chi2 - state.data.used, 0.0)
+        best = rivals[0]
+        yield Proposed(
+            best.fit,
+            (*kept, step),
+            f"{best.name} alone does as well as {len(replaced)} effects",
+            min(_LOST_AT_KNOTS * best.gain, left),
+        )
+
+
+def _line(step: Step) -> bool:
+    return step.winner.lead.effect.spectral
+
+
+def fit_without(state: State, step: Step) -> Fit | None:
+    """Fit the model without one effect; None where it has no such motion: the effect is needed."""
+    return _without(state, [step])
+
+
+def _without(state: State, steps: Sequence[Step]) -> Fit | None:
+    """Refit the model without some effects, from the present values and from the baseline's."""
+    model, value = state.fit.model, state.fit.value
+    for step in steps:
+        model, value = model.dropping(step.winner.lead.effect, value)
+    bare = np.concatenate([state.bare, value[len(state.bare) :]])
+    found = []
+    for start in (value, bare):
+        try:
+            found.append(refine(model, state.data, state.noise, start, held=state.held))
+        except (NoMotionError, np.linalg.LinAlgError):
+            continue
+        if len(found) == 1 and found[0].converged:
+            break
+    return min(found, key=lambda fit: fit.chi2, default=None)
+
+
+def describe(state: State, p_value: float) -> bool:
+    """Add the curve that describes what is left best, if that lowers the score."""
+    curves = _curves(state.fit, state, in_time=True)
+    fits = [fit for curve in curves if (fit := _with_curve(state.fit, curve, state))]
+    if not fits:
+        return False
+    scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
+    rivals = ranked([_rival(state.fit, fit, scale) for fit in fits])
+    if rivals[0].evidence <= CHOICE:
+        return False
+    state.steps.append(Step(tuple(rivals), p_value, state.fit))
+    state.settle(rivals[0].fit)
+    return True
+
+
+def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
+    curve: Effect = fit.model.effects[-1]
+    lead = Lead(curve, (), bare.chi2 - fit.chi2, 0.0)
+    return Rival.of(lead, fit, bare.chi2, scale, NO_SCAN)
+
+
+def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
+    """Return the curves with the coefficients that the recording resolves."""
+    present = {effect.key for effect in bare.model.effects}
+    drawn = [curve(bare.at.span) for curve in (*CURVES, *FOLLOW_UP_CURVES)]
+    drawn = [curve for curve in drawn if curve.key not in present and in_time >= curve.in_time]
+    seen = build_bank(bare, state.noise, drawn).candidates
+    return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
+
+
+def _with_curve(bare: Fit, curve: Curve, state: State) -> Fit | None:
+    start = np.concatenate([bare.value, np.zeros(curve.count)])
+    try:
+        fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.held)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+    return fit if curve.believable(fit.value[len(bare.value) :]) else None
+
+
+def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:
+    """Put a named effect before the leading curve if it and a second one are better than it.
+
+    A curve can follow parts of two effects, and no name is added after a curve.
+    """
+    curve = rivals[0]
+    if not curve.drawn:
+        return list(rivals)
+    least_gain = OF_A_CURVE * curve.gain
+    names = [rival for rival in rivals if not rival.drawn and rival.gain > least_gain]
+    names = names or [rival for rival in _best_names(state) if rival.gain > least_gain]
+    for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST_TRIED]:
+        task.progress(f"trying {name.name} with a second effect instead of a curve")
+        if any(_better_than(curve, name, second, state) for second in _seconds(state, name, task)):
+            return [name, *(rival for rival in rivals if rival is not name)]
+    return list(rivals)
+
+
+def _better_than(curve: Rival, name: Rival, second: Rival, state: State) -> bool:
+    """Whether the score of two names is smaller than that of a curve."""
+    fits = min((curve.fit, second.fit), key=lambda fit: fit.chi2)
+    scale = Scale.of(fits, state.data, state.noise)
+    names, drawn = (
+        price([Step((rival,), 0.0, state.fit) for rival in some])
+        for some in ((name, second), (curve,))
+    )
+    return scale.lost(second.fit.chi2) + names < scale.lost(curve.fit.chi2) + drawn
+
+
+def _best_names(state: State) -> list[Rival]:
+    """Refit the best named effects where only curves had been."""
+    assert state.now is not None
+    leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
+    return _refitted_beside(
+        state.fit, replace(state.now, leads=leads), state, state.held, _FIRST_TRIED
+    )
+
+
+def _seconds(state: State, name: Rival, task: Task) -> list[Rival]:
+    """Return the best named effects that could be added to a first."""
+    effects = [
+        effect
+        for effect in applicable(task.catalogue, name.fit, task.baseline, state.data.unit)
+        if effect.kind != "unnamed"
+    ]
+    held = state.held
+    if isinstance(name.lead.effect, ReleasedParameter):
+        held = name.lead.effect.without(held)
+    released = [entry for entry in task.released if entry not in name.fit.model.effects]
+    scanner = prepare(name.fit, state.data, state.noise, [*effects, *released])
+    found = detect(scanner, name.fit, seed=task.seed, known=state.now)
+    if found.p_value > task.threshold:
+        return []
+    return _refitted_beside(name.fit, found, state, held, _SECOND_TRIED)
+
+
+def _refitted_beside(
+    base: Fit, found: Detection, state: State, held: Sequence[int], most: int
+) -> list[Rival]:
+    return refit_leads(
+        base,
+        state.data,
+        state.noise,
+        found,
+        held=held,
+        gross=False,
+        most=most,
+        origin=state.origin,
+    )

@@ -1,0 +1,211 @@
+"""Of two sets of effects the one with the smaller score is the answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import diagnose_recording, silent
+from pendpipe.diagnosis.detect import Lead, detect, prepare
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.moves import FURTHER, describe, improve, prefer_two_names, price
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.state import State, Step, first_noise
+from pendpipe.diagnosis.task import Task, applicable
+from pendpipe.diagnosis.weighing import stands_apart
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.model import Model
+
+from .records import (
+    FREQUENCY_HZ,
+    INTERVAL_S,
+    TIME_S,
+    TRUTH,
+    VALUES,
+    beginning_of,
+    diagnosed,
+    null_fit,
+    other_engine,
+    prepared,
+    pulled,
+    recording,
+    white,
+    with_effects,
+)
+
+CHIRP = 1e-3 * np.sin(2.0 * np.pi * (1e-3 * TIME_S) * TIME_S)
+"""What no entry explains: a line whose frequency rises from 0 to 0.2 Hz."""
+SCALES = st.builds(
+    Scale, st.floats(0.0, 1e6), st.just(np.inf) | st.floats(1.0, 1e8), st.floats(2.0, 1e3)
+)
+
+
+def state_with(readings: FloatArray, *names: str) -> State:
+    """A search that has added several effects, each from near its true values."""
+    data, noise = prepared(readings)
+    effects = tuple(by_identifier(name) for name in names)
+    bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    shapes = [
+        VALUES.get(each.identifier, np.append(np.zeros(each.sizes), each.shapes(bare.at.span)[0]))
+        for each in effects
+    ]
+    start = np.concatenate([bare.value, *shapes])
+    fit = refine(Model(TIME_S, INTERVAL_S, effects), data, noise, start)
+    state = State(fit, data, noise, [], TRUTH, bare.value)
+    for effect in effects:
+        gain = bare.chi2 - fit.chi2
+        lead = Lead(effect, (), gain, 1e-12)
+        rival = Rival.of(lead, fit, bare.chi2, Scale(fit.chi2), NO_SCAN)
+        state.steps.append(Step((rival,), 1e-9, bare))
+    return state
+
+
+@given(scale=SCALES, behind=st.floats(0.0, 1e6))
+def test_what_a_model_loses_grows_with_chi2_and_never_exceeds_it(
+    scale: Scale, behind: float
+) -> None:
+    lost = scale.lost(scale.least + behind)
+    assert scale.lost(scale.least) == 0.0
+    assert 0.0 <= lost <= max(behind * scale.numbers / min(scale.floor, 1e300), behind) + 1e-6
+    assert scale.lost(scale.least + 2.0 * behind) >= lost
+    assert scale.within(lost) == pytest.approx(scale.least + behind, rel=1e-6, abs=1e-6)
+
+
+@given(numbers=st.floats(2.0, 1e3), part=st.floats(1e-6, 1e-3))
+def test_a_small_loss_counts_against_what_is_left_for_each_number(
+    numbers: float, part: float
+) -> None:
+    """M ln(1 + d/(e + m)) is d over the mean square of the m numbers, for small d."""
+    floor = 50.0 * numbers
+    assert Scale(0.0, floor, numbers).lost(part * floor) == pytest.approx(
+        part * floor / (floor / numbers), rel=1e-3
+    )
+
+
+def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
+    """A name that imitates it is never confident, and the curve is of its class."""
+    (effect,) = diagnose_recording(recording(pulled(), 5)).effects
+    assert "unnamed-restoring" in {
+        effect.identifier,
+        *(name for name, _ in effect.indistinguishable),
+    }
+    assert effect.probability < 0.5 or effect.identifier == "unnamed-restoring"
+
+
+def test_two_names_for_one_law_give_way_to_a_curve() -> None:
+    state = state_with(pulled() + white(6), "frequency-drift", "cubic-stiffness")
+    before = state.fit.chi2
+    improve(state, silent)
+    assert [step.winner.identifier for step in state.steps] == ["unnamed-restoring"]
+    assert state.fit.chi2 < before + FURTHER + 18.0
+
+
+def test_two_real_effects_keep_their_names() -> None:
+    assert len(diagnosed("two").search.steps) == 2
+    assert all(step.winner.lead.effect.kind != "unnamed" for step in diagnosed("two").search.steps)
+
+
+def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
+    fit, _, _ = null_fit()
+
+    def steps(*names: str) -> list[Step]:
+        rivals = [
+            Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, 9.0, 9.0, 9.0) for name in names
+        ]
+        return [Step((rival,), 0.0, fit) for rival in rivals]
+
+    one = price(steps("impulse"))
+    assert price(steps("circular-error")) == 0.0 < one
+    assert price(steps("impulse", "circular-error")) == one
+    assert price(steps("impulse", "sensor-cubic", "gain-drift")) == one + 2.0 * FURTHER
+
+
+def test_a_name_that_leaves_noise_stays() -> None:
+    state = state_with(with_effects("sensor-quadratic") + white(5), "sensor-quadratic")
+    before = state.fit
+    improve(state, silent)
+    assert state.fit is before
+
+
+def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
+    found = diagnose_recording(recording(with_effects("frequency-drift") + CHIRP, 5))
+    named = [effect for effect in found.effects if effect.kind != "unnamed"]
+    assert all(effect.probability < 0.5 for effect in named)
+
+
+def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
+    readings = with_effects("sensor-quadratic") + white(5)
+    state = state_with(readings, "sensor-quadratic", "tone-pickup")
+    improve(state, silent)
+    assert [step.winner.identifier for step in state.steps] == ["sensor-quadratic"]
+
+
+def tone_at(frequency_hz: float) -> Fit:
+    wave = 4e-4 * np.cos(2.0 * np.pi * frequency_hz * TIME_S)
+    data, noise = prepared(other_engine(TRUTH) + wave + white(5))
+    model = Model(TIME_S, INTERVAL_S, (by_identifier("tone-pickup"),))
+    return refine(model, data, noise, np.append(TRUTH, [4e-4, 0.0, frequency_hz]))
+
+
+@pytest.mark.parametrize(("order", "apart"), [(3.4, True), (2.6, True), (2.0, False), (3.0, False)])
+def test_a_line_between_the_harmonics_stands_apart(order: float, apart: bool) -> None:
+    """At a harmonic it may be a part of the motion that the model lacks."""
+    fit = tone_at(order * FREQUENCY_HZ)
+    assert stands_apart(by_identifier("tone-pickup"), fit) == apart
+
+
+def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
+    """A sensor whose reading is bent where no polynomial of two terms would bend it."""
+    angle = other_engine(TRUTH) - TRUTH[7]
+    bent = 4e-4 * np.tanh(angle / 0.02)
+    data, noise = prepared(other_engine(TRUTH) + bent + white(6))
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    state = State(fit, data, noise, [], TRUTH, fit.value)
+    before = remainder_of(fit, data, noise)
+    assert describe(state, 1e-9)
+    assert state.steps[-1].winner.lead.effect.kind == "unnamed"
+    after = remainder_of(state.fit, state.data, state.noise)
+    assert after.excess < 0.2 * before.excess
+
+
+def test_noise_is_not_described() -> None:
+    fit, data, noise = null_fit()
+    state = State(fit, data, noise, [], TRUTH, fit.value)
+    assert not describe(state, 1e-9)
+    assert state.fit is fit
+
+
+def rivals_after(readings: FloatArray, seed: int) -> list[Rival]:
+    """A curve of the torque leads; return what leads after two effects are tried."""
+    record = recording(readings, seed)
+    begun = beginning_of(record)
+    noise = first_noise(begun)
+    fit = refine(begun.model, begun.data, noise, begun.value)
+    state = State(fit, begun.data, noise, [], begun.value, fit.value)
+    forensics = Forensics(prepare_samples(record, "the test"), 0.01)
+    task = Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent)
+    effects: list[Effect] = applicable(CATALOGUE, fit, "eq8", "rad")
+    state.now = detect(prepare(fit, begun.data, noise, effects), fit, seed=1)
+    lead = next(each for each in state.now.leads if each.effect.identifier == "unnamed-restoring")
+    start = np.append(fit.value, np.zeros(lead.effect.count))
+    drawn = refine(begun.model.adding(lead.effect), begun.data, noise, start)
+    rival = Rival.of(lead, drawn, fit.chi2, Scale(drawn.chi2), NO_SCAN)
+    return prefer_two_names(state, [rival], task)
+
+
+def test_a_step_and_a_tone_go_before_a_curve() -> None:
+    found = rivals_after(with_effects("equilibrium-step", "tone-pickup"), 3)
+    assert found[0].identifier in ("equilibrium-step", "tone-pickup")
+    assert found[1].identifier == "unnamed-restoring"
+
+
+def test_a_law_outside_the_catalogue_stays_a_curve() -> None:
+    found = rivals_after(pulled(), 3)
+    assert [each.identifier for each in found] == ["unnamed-restoring"]
