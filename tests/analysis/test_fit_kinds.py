@@ -55,6 +55,13 @@ def test_a_torsion_wheel_has_no_sine_however_far_it_turns(wound: float) -> None:
     assert holds(result, "b", 0.03)
 
 
+def test_sin_x_is_refused_beyond_pi() -> None:
+    wheel = recorded(viscous(4.0, 0.0, 0.03, linear=True), TIME, 2e-3)
+    for method in ("waveform", "turning-points"):
+        with pytest.raises(pendpipe.InputError, match="below pi rad"):
+            pendpipe.fit(wheel, restoring="sine", method=method)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("stop", [11.0, 14.3])
 def test_a_gap_in_a_decay_loses_nothing_but_its_readings(stop: float) -> None:
     values = pendulum(1.2, TIME, **LOSSES)

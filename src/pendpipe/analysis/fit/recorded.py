@@ -13,6 +13,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
+from pendpipe.analysis.fit.swings import may_be_sine, restoring_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import InputError, NotAnalysableError
@@ -106,10 +107,16 @@ def _fit(
 
         points = turning_points_of(samples, place)
     if restoring is None:
-        from pendpipe.analysis.fit.swings import restoring_of
-
         stated = not any("(--unit)" in guess for guess in recording.weak_guesses)
         restoring = restoring_of(points, stated=stated)
+    elif restoring == "sine" and not may_be_sine(points):
+        largest = float(np.max(points.amplitude_rad))
+        raise NotAnalysableError(
+            place,
+            f"sin x needs six turning points below pi rad (the largest is {largest:.3g}"
+            f" {points.unit})",
+            "use --restoring linear",
+        )
     if method == "turning-points":
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.by_points import envelope_and_period, share_of
 from pendpipe.analysis.fit.fixed import loss_rates_of
-from pendpipe.analysis.fit.period import Period, fit_period, period_excess
+from pendpipe.analysis.fit.period import TOP, Period, fit_period, period_excess
 from pendpipe.analysis.fit.result import Baseline, Restoring
 from pendpipe.analysis.fit.swings import clear
 from pendpipe.analysis.turning_points import TurningPoints
@@ -73,6 +73,8 @@ def start_values(
         known,
         at_first="amplitude" in fixed or restoring == "sine",
     )
+    if restoring == "sine":
+        angle = math.copysign(min(abs(angle), TOP), angle)
     value = np.array(
         [a, b, c, known.angular_frequency, angle, time,
          float(np.mean(points.level_rad)) - level, middle_share]

@@ -131,7 +131,7 @@ def start_of(points: TurningPoints, *, stated: bool = True) -> Start:
     ('linear', 5.485)
     """
     coefficient = sine_coefficient(points)
-    sine = _law_start(points, "sine") if _may_be_sine(points) else None
+    sine = _law_start(points, "sine") if may_be_sine(points) else None
     favoured = restoring_of(points, coefficient, stated=stated)
     return Start(_law_start(points, "linear"), sine, favoured, coefficient)
 
@@ -140,7 +140,7 @@ def restoring_of(
     points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
 ) -> Restoring:
     """Which torque the half cycles favour; see `start_of`."""
-    if not _may_be_sine(points):
+    if not may_be_sine(points):
         return "linear"
     coefficient = coefficient or sine_coefficient(points)
     wide = abs(float(clear(points).angle_rad[0])) > _PENDULUM
@@ -148,7 +148,7 @@ def restoring_of(
     return "sine" if coefficient.agrees or pendulum else "linear"
 
 
-def _may_be_sine(points: TurningPoints) -> bool:
+def may_be_sine(points: TurningPoints) -> bool:
     """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
     return inside and len(clear(points)) >= _FEWEST
