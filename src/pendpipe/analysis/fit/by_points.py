@@ -125,6 +125,7 @@ def fit_points(
         points, Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring)
     )
     light, reason = light_of(checks, misfit=stretched, unit=points.unit)
+    known = {name: Estimate(number, 0.0, "") for name, number in fixed.items()}
     result = FitResult(
         method="turning-points",
         baseline=baseline,
@@ -138,31 +139,21 @@ def fit_points(
         chi2_per_dof=envelope.chi2_per_dof,
         samples=points.samples,
         turning_points=len(points),
-        quality_factor_hysteretic=_held(fixed, "quality_factor_hysteretic"),
-        quality_factor_viscous=_held(fixed, "quality_factor_viscous"),
+        quality_factor_hysteretic=known.get("quality_factor_hysteretic"),
+        quality_factor_viscous=known.get("quality_factor_viscous"),
         settled=envelope.converged,
         decrement_check=checks,
         light=light,
         light_reason=reason,
     )
-    said = [*points.notes, *warnings_of(result, stretched), *_said(period)]
-    return replace(result, warnings=tuple(said))
-
-
-def _held(fixed: Mapping[str, float], name: str) -> Estimate | None:
-    """A quality factor that the user holds."""
-    return Estimate(fixed[name], 0.0, "") if name in fixed else None
-
-
-def _said(period: Period) -> list[str]:
-    said = []
+    said = [*points.notes, *warnings_of(result, stretched)]
     if period.chi2_per_dof > _LATE:
         said.append(
             "the period changes along the record as Eq. 8's does not"
             f" (chi^2 of the times is {period.chi2_per_dof:.3g} per point):"
             " the frequency is a mean"
         )
-    return said
+    return replace(result, warnings=tuple(said))
 
 
 def _numbers(

@@ -58,25 +58,15 @@ def intervals95(
     if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
         # None can come to a bound, since following another moves it by 1.96 of its own at most.
         return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
-    # The others follow a parameter that is moved to an end of its interval.
-    sizes = np.where(deviations > 0.0, deviations, 1.0)
-    step = matrix[:, indices] * (half / sizes**2)[indices]
-    inside = (
-        (-step >= room.lower[:, None]) & (-step <= room.upper[:, None]),
-        (step >= room.lower[:, None]) & (step <= room.upper[:, None]),
-    )
-    ok = [at_rest & side.all(axis=0) for side in inside]
-    result = []
-    for position, index in enumerate(indices):
-        width = float(half[index])
-        ends = [float(value[index]) - width, float(value[index]) + width]
-        if width > 0.0:
-            for k, sign in enumerate((-1.0, 1.0)):
-                if not ok[k][position]:
-                    reach = sign * _FAR * float(deviations[index])
-                    ends[k] = _profiled_end(value, normal, gradient, bounds, index, held, reach)
-        result.append((ends[0], ends[1]))
-    return result
+    return [
+        (
+            _profiled_end(value, normal, gradient, bounds, j, held, -_FAR * float(deviations[j])),
+            _profiled_end(value, normal, gradient, bounds, j, held, _FAR * float(deviations[j])),
+        )
+        if deviations[j] > 0.0
+        else (float(value[j]), float(value[j]))
+        for j in indices
+    ]
 
 
 def _profiled_end(

@@ -33,7 +33,6 @@ class Minimum(NamedTuple):
     value: FloatArray
     quadratic: Quadratic
     converged: bool
-    evaluations: int
     at: FloatArray
     """Where chi^2 was evaluated: `value`, or where the last, unverified step began."""
     gained: float = 0.0
@@ -71,36 +70,33 @@ def minimise(
     """
     value = bounds.clip(start)
     now = evaluate(value)
-    level, spent = 0, 1
-    while spent < most:
+    level = 0
+    for _ in range(most - 1):
         damped = now.normal
         if level > 0:
             damped = damped + _DAMPING[level] * np.diag(np.diag(damped))
         step = bounded_step(damped, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         if promised < tolerance and level < 3:
-            return Minimum(
-                bounds.clip(value + step), _moved(now, step), True, spent, value, promised
-            )
+            return Minimum(bounds.clip(value + step), _moved(now, step), True, value, promised)
         trial = bounds.clip(value + step)
         if (
             predict_remaining is not None
             and level == 0
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
-            return Minimum(trial, _moved(now, step), True, spent, value, promised)
+            return Minimum(trial, _moved(now, step), True, value, promised)
         then = evaluate(trial)
-        spent += 1
         if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:
             if now.chi2 - then.chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2:
-                return Minimum(trial, then, True, spent, trial)
+                return Minimum(trial, then, True, trial)
             value, now = trial, then
             level = max(level - 2, 0)
         elif level == len(_DAMPING) - 1:
-            return Minimum(value, now, False, spent, value)
+            return Minimum(value, now, False, value)
         else:
             level += 1
-    return Minimum(value, now, False, spent, value)
+    return Minimum(value, now, False, value)
 
 
 def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
