@@ -225,7 +225,8 @@ def _add_one(state: State, task: Task) -> bool:
     gross, progress = is_gross(state.fit, state.data), task.progress
     effects = task.scanned(state)
     assert state.now is not None
-    if state.noise.coloured and not gross and not state.steps:
+    chance = state.now.p_value > task.threshold
+    if state.noise.coloured and not gross and (chance or not state.steps):
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
     if state.now.p_value > task.threshold or _ends_with_curve(state):
         return False
