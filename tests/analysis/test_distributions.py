@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special
 
-from pendpipe.analysis import distributions, significance
+from pendpipe.analysis import distributions
 
 _CHANCES = st.floats(1e-280, 1.0, exclude_max=True)
 
@@ -60,11 +60,11 @@ def test_so_many_of_rare_events(count: int, number: int, chance: float) -> None:
 
 @given(st.floats(0.0, 3.0), st.sampled_from([1, 2, 3, 26, 101, 4000]))
 def test_chi_squared_of_many_degrees_of_freedom(ratio: float, freedom: int) -> None:
-    found = significance.chi_square_p_value(ratio * freedom, freedom)
+    found = distributions.chi_square_p_value(ratio * freedom, freedom)
     assert found == pytest.approx(special.chdtrc(freedom, ratio * freedom), rel=1e-9, abs=1e-280)
 
 
 @given(st.floats(0.0, 50.0), st.integers(1, 300), st.integers(1, 300))
 def test_a_ratio_of_variances(ratio: float, numerator: int, denominator: int) -> None:
-    found = significance.variance_ratio_p_value(ratio, numerator, denominator)
+    found = distributions.variance_ratio_p_value(ratio, numerator, denominator)
     assert found == pytest.approx(special.fdtrc(numerator, denominator, ratio), rel=1e-8, abs=1e-12)

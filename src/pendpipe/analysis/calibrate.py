@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pendpipe.analysis.calibration import Calibration, Linearity
-from pendpipe.analysis.significance import (
+from pendpipe.analysis.distributions import (
     chi_square_p_value,
     student_quantile95,
     variance_ratio_p_value,

@@ -73,27 +73,24 @@ def chi2_of_one(p_value: float) -> float:
 
 def poisson_up_to(count: Any, mean: Any) -> FloatArray:
     """Return P(N <= count) of Poisson's distribution: Q(count + 1, mean), for any count > -1."""
-    order, at = np.broadcast_arrays(np.asarray(count, dtype=np.float64) + 1.0, mean)
-    at = np.maximum(at, _TINY)
-    front = np.exp(order * np.log(at) - at - each(math.lgamma, order))
-    small = at < order + 1.0
-    return np.asarray(
-        np.where(small, 1.0 - front * _gamma_series(order, np.where(small, at, 0.0)),
-                 front * _gamma_fraction(order, np.where(small, order + 1.0, at)))
-    )  # fmt: skip
+    return _gamma(np.asarray(count, dtype=np.float64) + 1.0, mean)[1]
 
 
 def poisson_from(count: Any, mean: Any) -> FloatArray:
     """Return P(N >= count) of Poisson's distribution, P(count, mean); 1 for no count."""
-    order, at = np.broadcast_arrays(np.asarray(count, dtype=np.float64), mean)
-    some, at = np.maximum(order, 1.0), np.maximum(at, _TINY)
-    front = np.exp(some * np.log(at) - at - each(math.lgamma, some))
-    small = at < some + 1.0
-    found = np.where(
-        small, front * _gamma_series(some, np.where(small, at, 0.0)),
-        1.0 - front * _gamma_fraction(some, np.where(small, some + 1.0, at)),
-    )  # fmt: skip
-    return np.asarray(np.where(order > 0.0, found, 1.0))
+    order = np.asarray(count, dtype=np.float64)
+    return np.where(order > 0.0, _gamma(np.maximum(order, 1.0), mean)[0], 1.0)
+
+
+def _gamma(order: FloatArray, mean: Any) -> tuple[FloatArray, FloatArray]:
+    """The regularised incomplete gamma functions P and Q, each good where it is small."""
+    order, at = np.broadcast_arrays(order, mean)
+    at = np.maximum(at, _TINY)
+    front = np.exp(order * np.log(at) - at - each(math.lgamma, order))
+    small = at < order + 1.0
+    below = front * _gamma_series(order, np.where(small, at, 0.0))
+    beyond = front * _gamma_fraction(order, np.where(small, order + 1.0, at))
+    return np.where(small, below, 1.0 - beyond), np.where(small, 1.0 - below, beyond)
 
 
 def _gamma_series(order: FloatArray, at: FloatArray) -> FloatArray:
@@ -174,3 +171,32 @@ def binomial_at_least(count: int, number: int, chance: float) -> float:
     if count <= 0:
         return 1.0
     return float(beta_below(float(count), number - count + 1.0, chance))
+
+
+def chi_square_p_value(chi2: float, degrees_of_freedom: int) -> float:
+    """Probability of a larger chi^2; NaN without degrees of freedom."""
+    if degrees_of_freedom < 1 or not math.isfinite(chi2):
+        return math.nan
+    return float(poisson_up_to(0.5 * degrees_of_freedom - 1.0, 0.5 * max(chi2, 0.0)))
+
+
+def variance_ratio_p_value(ratio: float, numerator: int, denominator: int) -> float:
+    """Probability of a larger F; NaN without degrees of freedom."""
+    if min(numerator, denominator) < 1 or not math.isfinite(ratio):
+        return math.nan
+    share = denominator / (denominator + numerator * max(ratio, 0.0))
+    return float(beta_below(0.5 * denominator, 0.5 * numerator, share))
+
+
+def student_quantile95(degrees_of_freedom: int) -> float:
+    """How many standard deviations a 95 % interval reaches to each side.
+
+    >>> round(student_quantile95(3), 4)
+    3.1824
+    """
+    low, high = 1.9, 13.0  # of infinite freedom, and of one degree
+    while high - low > 1e-12 * high:
+        middle = 0.5 * (low + high)
+        beyond = float(student_beyond(np.array(degrees_of_freedom), np.array(middle)))
+        low, high = (middle, high) if beyond > 0.05 else (low, middle)
+    return 0.5 * (low + high)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord, quality_of_rate
-from pendpipe.analysis.significance import chi_square_p_value
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.significance import chi_square_p_value
+from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.analysis.viscous import SharedErrors, ViscousLosses, shared_effects
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
