@@ -167,6 +167,34 @@ def test_several_runs_with_a_header_each(read_as: Callable[..., Recording]) -> N
     assert "3 runs stand below one another" in recording.weak_guesses[0]
 
 
+def test_seconds_and_their_parts_in_two_columns(read_as: Callable[..., Recording]) -> None:
+    for head, begin, per_second in (("sec,nsec", 0, 1e9), ("secs,nsecs", 1714567890, 1e9)):
+        whole = begin + np.floor(TIME + 1e-9)
+        part = np.rint((TIME + begin - whole) * per_second)
+        text = rows(whole, part, DEGREES, form=".10g")
+        same(read_as(f"{head},angle (deg)\n" + text))
+    clock = [f"12:00:{int(t):02d},{1000 * (t % 1):.0f}" for t in TIME + 1e-6]
+    text = "".join(f"{t},{x:.3f}\n" for t, x in zip(clock, DEGREES, strict=True))
+    same(read_as("time,ms,angle (deg)\n" + text))
+
+
+@pytest.mark.parametrize(
+    "form", ["[2024-05-01 12:00:{:06.3f}] {:.4f}", "0 days 00:00:{:09.6f},{:.4f}"]
+)
+def test_times_of_terminals_and_of_pandas(read_as: Callable[..., Recording], form: str) -> None:
+    head = "" if form.startswith("[") else "elapsed,angle (rad)\n"
+    lines = [form.format(t, x) for t, x in zip(TIME, ANGLE, strict=True)]
+    same(read_as(head + "\n".join(lines) + "\n", "a.log"))
+
+
+def test_a_table_that_lies_on_its_side(read_as: Callable[..., Recording]) -> None:
+    lines = [
+        ",".join([name, *(f"{x:.4f}" for x in values)])
+        for name, values in (("t (s)", TIME), ("theta (rad)", ANGLE))
+    ]
+    same(read_as("\n".join(lines) + "\n"))
+
+
 # --- phones and microcontrollers -------------------------------------------------------------
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -119,6 +120,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     if not table.columns:
         raise InputError(table.place, "there is no column of numbers", "give time and readings")
     roles = {column.number: meaning(column) for column in table.columns}
+    table = replace(table, columns=_whole_times(table.columns, roles))
     own_clock = [column for column in table.columns if column.time_s is not None]
     time, counts = (None, False) if own_clock else _time(table, options, roles)
     channels = tuple(column for column in table.columns if column is not time)
@@ -181,6 +183,21 @@ def _channel(table: Table, channels: Sequence[Column], key: str) -> Column:
         return channels[int(key) - 1]
     names = listed([f"{i} {column.label}" for i, column in enumerate(channels, start=1)])
     raise InputError(table.place, f"there is no channel '{key}'", f"choose from: {names}")
+
+
+def _whole_times(columns: tuple[Column, ...], roles: Mapping[int, Role]) -> tuple[Column, ...]:
+    """Add to a time in whole seconds the part of a second that stands in the next column."""
+    for whole, part in pairwise(columns):
+        unit = unit_of(part.unit) or unit_of(part.name)
+        if roles[whole.number] != "time" or unit is None or unit.kind != "time":
+            continue
+        steps, fraction = np.diff(whole.values), part.values * unit.factor
+        in_part = unit.factor < 1.0 and fraction.min() >= 0.0 and 0.5 < fraction.max() < 1.0
+        in_whole = len(steps) > 0 and steps.min() >= 0.0 and set(np.unique(steps)) <= {0.0, 1.0}
+        if in_part and in_whole and np.any(np.diff(fraction) < 0.0):
+            one = replace(whole, values=whole.values + fraction, unit="s")
+            return tuple(one if c is whole else c for c in columns if c is not part)
+    return columns
 
 
 def one_way(values: FloatArray) -> float:

@@ -34,7 +34,7 @@ _IN_A_ROW: Final = 4
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
 _BLANK: Final = re.compile(
-    r'|""|[-*]{1,4}|--[.:]--|n/?a|#n/a|#nv|null|none|nan|#value!|\?|ol|over(load|flow|range)?'
+    r'|""|[-*]{1,4}|--[.:]--|n/?a|#n/a|#nv|[+-]?∞|null|none|nan|#value!|\?|ol|over(load|flow|range)?'
     r"|missing|invalid|err|error",
     re.I,
 )
@@ -328,6 +328,7 @@ def _without_unit(cells: Sequence[str], filled: Sequence[int]) -> tuple[FloatArr
 
 
 _CLOCK: Final = re.compile(
+    r"(?:0 days? )?"
     r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ,]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})[T ,]+)?"
     r"(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2}(?:[.,:]\d+)?)"
     r"\s*(am|pm)?\s*(?:z|utc|[+-]\d{2}:?\d{2})?",

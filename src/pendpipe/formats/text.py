@@ -85,6 +85,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         _without_brackets,
         _without_panel,
         _without_split_decimals,
+        _upright,
     ):
         lines = form_of(lines)
     lines = _without_labels(lines)
@@ -130,20 +131,27 @@ def _without_cassy_limits(lines: list[str]) -> list[str]:
     return head + lines[50:]
 
 
-_ARROW: Final = re.compile(r"\s*(\d{1,2}:\d\d:\d\d(?:\.\d+)?)\s*->\s*")
+_CLOCK: Final = r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
+_ARROW: Final = re.compile(rf"\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*")
 _LABELLED: Final = re.compile(
     r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;|]?\s*"
 )
 
 
 def _without_arrows(lines: list[str]) -> list[str]:
-    """Make a cell of the time that a serial monitor puts before each line (``12:03:04.512 ->``)."""
+    """Make a cell of the time that serial monitors put before each line.
+
+    As ``12:03:04.512 ->`` or ``[2024-05-01 12:03:04.512]``.
+    """
     some = lines[:100]
     marked = [line for line in some if _ARROW.match(line)]
     if len(marked) < 0.5 * len(some) or not marked:
         return lines
     sign = next((sign for sign in "\t;," if sign in marked[len(marked) // 2]), " ")
-    return [_ARROW.sub(lambda match: match[1] + sign, line, count=1) for line in lines]
+    return [
+        _ARROW.sub(lambda match: (match[1] or match[2]).replace(" ", "T") + sign, line, count=1)
+        for line in lines
+    ]
 
 
 def _without_brackets(lines: list[str]) -> list[str]:
@@ -189,6 +197,22 @@ def _without_split_decimals(lines: list[str]) -> list[str]:
 
 
 _SPLIT: Final = re.compile(r"[+-]?\d+,\d+(,[+-]?\d+,\d+)+")
+
+
+def _upright(lines: list[str]) -> list[str]:
+    """Turn a table that lies on its side: a few long lines, each of one quantity."""
+    rows = [line for line in lines[:_FEW_LINES] if line.strip()]
+    if len(lines) > _FEW_LINES or len(rows) < 2:
+        return lines
+    sign = max("\t;,", key=rows[0].count)
+    cells = [row.strip().split(sign if sign in rows[0] else None) for row in rows]
+    width = len(cells[0])
+    if width < 5 * _FEW_LINES or any(len(row) != width for row in cells):
+        return lines
+    return ["\t".join(column) for column in zip(*cells, strict=True)]
+
+
+_FEW_LINES: Final = 12
 
 
 def _without_labels(lines: list[str]) -> list[str]:

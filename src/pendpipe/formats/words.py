@@ -53,7 +53,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("time", 1e-3, "s", "ms msec msecs millis milli millisecond milliseconds millisekunden мс"),
     ("time", 1e-3, "s", "毫秒 millisecondi"),
     ("time", 1e-6, "s", "µs us usec usecs micros microsecond microseconds mikrosekunden мкс 微秒"),
-    ("time", 1e-9, "s", "ns nsec nanos nanosecond nanoseconds"),
+    ("time", 1e-9, "s", "ns nsec nsecs nanosec nanos nanosecond nanoseconds"),
     ("time", 60.0, "s", "min mins minute minutes minuten"),
     ("time", 3600.0, "s", "h hr hrs hour hours"),
     ("own", 1.0, "rad/s", "rad/s rad/sec rads/s radian/s radians/s s-1 1/s rad.s-1 rads-1 s^-1"),
