@@ -174,6 +174,11 @@ class Refining:
         """The fit so far."""
         return Fit(self._here, tuple(self._free.tolist()), self._converged)
 
+    @property
+    def _unit(self) -> float:
+        """chi^2 of a reading: gains that are small beside a misfit of all readings are none."""
+        return max(1.0, self._here.chi2 / len(self._here.residual))
+
     def go(self, rounds: int, useful: float = math.inf) -> None:
         """Run some rounds, or fewer if the fit converges or becomes hopeless.
 
@@ -197,6 +202,7 @@ class Refining:
 
     def _round(self) -> None:
         here, free, steps = self._here, self._free, self._steps
+        settled = SETTLED * self._unit
         step = steps.step(here, free)
         expected = _expected(here, here.columns, step)
         better = steps.line_search(here, step, free, expected)
@@ -207,12 +213,12 @@ class Refining:
             step = steps.step(here, others)
             better = steps.line_search(here, step, others, _expected(here, here.columns, step))
         if better is None:
-            self._ended, self._converged = True, expected < 10.0 * SETTLED
+            self._ended, self._converged = True, expected < 10.0 * settled
             return
         self._here = better
         gained = here.chi2 - better.chi2
         self._gains.append(gained)
-        if expected < SETTLED or (gained < SETTLED and expected < 1.0):
+        if expected < settled or (gained < settled and expected < 50.0 * settled):
             self._ended = self._converged = True
         elif direct and abs(expected - gained) < _LINEAR_WITHIN * expected:
             self._settle(here)
@@ -225,7 +231,7 @@ class Refining:
         values compensate each other.
         """
         return any(
-            len(self._gains) >= rounds and max(self._gains[-rounds:]) < little
+            len(self._gains) >= rounds and max(self._gains[-rounds:]) < little * self._unit
             for rounds, little in self._stalled
         )
 
@@ -240,7 +246,7 @@ class Refining:
             return
         step = self._steps.step(here, self._free, before.columns)
         expected = _expected(here, before.columns, step)
-        if expected < SETTLED:
+        if expected < SETTLED * self._unit:
             self._here = self._steps.line_search(here, step, self._free, expected) or here
             self._ended = self._converged = True
 

@@ -169,7 +169,7 @@ def side_by_side(
     # The winner is refined again when the noise is estimated from its residual.
     little = SETTLED if gross or data.time_noise else _STALLED_GAIN
     refits = [_started(base, data, noise, lead, held, little) for lead in leads]
-    useful = math.inf if gross else _limit(base, leads, refits)
+    useful = math.inf if gross else _limit(base, data, noise, leads, refits)
     return [
         (lead, _finished(refit, useful) if refit else None)
         for lead, refit in zip(leads, refits, strict=True)
@@ -204,14 +204,28 @@ def believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     return effect.displacement(own, span.duration_s) < _LARGEST_DISPLACEMENT * span.first_amplitude
 
 
-def _limit(base: Fit, leads: Sequence[Lead], refits: Sequence[Refining | None]) -> float:
+def _limit(
+    base: Fit,
+    data: Data,
+    noise: Noise,
+    leads: Sequence[Lead],
+    refits: Sequence[Refining | None],
+) -> float:
     """Return the largest useful chi^2, from the best credible refit so far."""
-    best = [
-        useful_chi2(refit.chi2, base.chi2 - refit.chi2, drawn=lead.effect.kind == "unnamed")
+    found = [
+        (refit, lead.effect.kind == "unnamed")
         for lead, refit in zip(leads, refits, strict=True)
         if refit and believable(base, refit.fit, lead.effect)
     ]
-    return min(best, default=math.inf)
+    if not found:
+        return math.inf
+    best = min((refit for refit, _ in found), key=lambda refit: refit.chi2)
+    scale = Scale.of(best.fit, data, noise)
+    if not math.isinf(scale.floor):
+        return scale.within(NEAR)
+    return min(
+        useful_chi2(refit.chi2, base.chi2 - refit.chi2, drawn=drawn) for refit, drawn in found
+    )
 
 
 def _started(
