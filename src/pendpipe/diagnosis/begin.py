@@ -26,6 +26,8 @@ from pendpipe.physics.decay import time_at
 
 LARGE_PHASE_ERROR: Final = 0.1
 """Phase error in rad from which a model has lost the motion."""
+SINE: Final = "circular-error"
+"""The effect that turns x into sin x."""
 _FEWEST_READINGS: Final = 24
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
@@ -121,7 +123,7 @@ def _values(named: FloatArray) -> FloatArray:
 
 def _moving_with_sine(data: Data, model: Model, sine: FloatArray) -> tuple[Data, Model, Evaluated]:
     """Leave out readings at the end until the pendulum with the start values moves throughout."""
-    effect = by_identifier("circular-error")
+    effect = by_identifier(SINE)
     while True:
         try:
             return data, model, model.adding(effect).evaluate(np.append(sine, 1.0))

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.begin import SINE, Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
@@ -45,7 +45,7 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
     """
     if beginning.sine is None:
         return
-    effect = by_identifier("circular-error")
+    effect = by_identifier(SINE)
     task.progress("the half swings ask for sin x: fitting it first")
     before, start = state.fit, np.append(beginning.sine, 1.0)
     fit = fitted_from(before.model, state, effect, start)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendpipe.analysis.fit.fixed import check_fixed
-from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.fit.result import Baseline, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.begin import SINE, Beginning, begin
 from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.lattice import with_true_step
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
@@ -241,9 +241,11 @@ def diagnose_decay(
     before = _fitted_model(found.baseline, found)
     if not fixed:
         # A part of b that is held bounds b here, and not in the fit.
-        before = _as_fit_prints(before, part, points, baseline, place)
+        before = _as_fit_prints(before, part, points, baseline, "linear", place)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     after = before if same else _fitted_model(found.improved, found)
+    if not fixed and [each.identifier for each in found.improved.model.effects] == [SINE]:
+        after = _as_fit_prints(after, part, points, baseline, "sine", place)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")
@@ -328,13 +330,14 @@ def _small_swings(found: Search) -> SmallSwings | None:
 
 
 def _as_fit_prints(
-    before: FittedModel,
+    own: FittedModel,
     part: Recording,
     points: TurningPoints,
     baseline: Baseline,
+    restoring: Restoring,
     place: str | Path,
 ) -> FittedModel:
-    """Take the baseline's numbers from the fit, which has the same model and uses all readings.
+    """Take the numbers of a model from the fit, which has the same model and uses all readings.
 
     Where the fit settles and does not contradict the decay, there is then one answer. Else the
     search has lost the phase, as a least squares of all readings does in a gross misfit; the
@@ -347,13 +350,13 @@ def _as_fit_prints(
             part,
             points=points,
             method="waveform",
-            restoring="linear",
+            restoring=restoring,
             baseline=baseline,
             place=place,
         )
     except NotAnalysableError:
-        return before
-    return before if fitted.light == "red" else replace(before, parameters=fitted.parameters)
+        return own
+    return own if fitted.light == "red" else replace(own, parameters=fitted.parameters)
 
 
 def _fitted_model(fit: Fit, found: Search) -> FittedModel:
