@@ -223,6 +223,38 @@ def rounded(rng: np.random.Generator, swing: Swing) -> Array:
     return step * np.round(noisy / step)
 
 
+def stand(rng: np.random.Generator, swing: Swing) -> Array:
+    """A stand that sways of its own at random: one resonance of Q 3 to 15, over white noise.
+
+    It lies at 0.05 to 0.8 of the Nyquist frequency; the white noise has 0.2 to 0.7 of its rms.
+    """
+    centre_hz = np.exp(rng.uniform(*np.log([0.05, 0.8]))) * swing.rate_hz / 2
+    quality = np.exp(rng.uniform(*np.log([3, 15])))
+
+    def power(frequency: Array) -> Array:
+        ratio = frequency / centre_hz
+        return 1 / ((1 - ratio**2) ** 2 + (ratio / quality) ** 2)
+
+    sway = _coloured(rng, swing, power)
+    noise = _unit(sway + rng.uniform(0.2, 0.7) * rng.normal(size=len(sway)))
+    return swing.angle + swing.noise_rms * noise
+
+
+def popcorn(rng: np.random.Generator, swing: Swing) -> Array:
+    """An amplifier's burst noise: the level jumps between two, 1 to 4 sd of the white part apart.
+
+    It dwells 0.1 to 10 s in each on average.
+    """
+    dwell_s = np.exp(rng.uniform(*np.log([0.1, 10]), size=2))
+    level, at, state = np.empty(len(swing.angle)), 0, int(rng.integers(2))
+    while at < len(level):
+        end = at + 1 + int(rng.exponential(dwell_s[state]) * swing.rate_hz)
+        level[at:end] = state
+        at, state = end, 1 - state
+    noise = _unit(rng.uniform(1, 4) * level + rng.normal(size=len(level)))
+    return swing.angle + swing.noise_rms * noise
+
+
 FAMILIES: Final[dict[str, Family]] = {
     "white": white,
     "memory": memory,
@@ -231,6 +263,8 @@ FAMILIES: Final[dict[str, Family]] = {
     "heavy-tails": heavy_tails,
     "smoothed": smoothed,
     "rounded": rounded,
+    "stand": stand,
+    "popcorn": popcorn,
 }
 TRUE_NAMES: Final = {"rounded": frozenset({"coarse-quantisation"})}
 """By family: what stands in the catalogue and is there."""

@@ -28,6 +28,8 @@ MOTION: Final = (
     *("equilibrium-creep", "equilibrium-step", "frequency-step", "damping-step", "impulse"),
     *("second-mode", "backlash", "amplitude-linear-stiffness", "parametric-drive"),
 )
+NOISES: Final = ("white", "memory", "red", "changing", "heavy-tails", "smoothed")
+"""Families of `benchmarks.null_families` that some nulls have."""
 FAULTS: Final = ("glitches", "clipping", "missing-codes", "jitter", "tracking-noise")
 """Entered when the readings are written; what they are worth is counted there."""
 SENSORS: Final = {
@@ -258,7 +260,7 @@ def _try(rng: Rng, number: int, part: str) -> Item | None:
     scene = scene_of(rng, apparatus, wheel)
     family = "own"
     if part == "null" and not scene.event_driven and rng.uniform() < 0.7:
-        family = str(rng.choice([each for each in nulls.FAMILIES if each != "rounded"]))
+        family = str(rng.choice(NOISES))
         scene = replace(scene, memory=0.0)
     no_sine = CATALOGUE["circular-error"]
     causes = [] if wheel else [Cause("circular-error", no_sine.draw(rng, scene), 1.0)]

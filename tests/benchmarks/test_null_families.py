@@ -87,7 +87,17 @@ def test_noise_with_a_memory_resembles_its_neighbour_and_white_noise_does_not() 
         return float(np.corrcoef(noise[1:], noise[:-1])[0, 1])
 
     assert abs(likeness(noise_of("white"))) < 0.02
-    assert all(likeness(noise_of(family)) > 0.1 for family in ("memory", "red", "smoothed"))
+    assert all(
+        likeness(noise_of(family)) > 0.1 for family in ("memory", "red", "smoothed", "popcorn")
+    )
+
+
+def test_a_stand_has_one_resonance() -> None:
+    power = np.abs(np.fft.rfft(noise_of("stand"))) ** 2
+    coarse = power[1:20_001].reshape(100, 200).mean(axis=1)
+    assert coarse.max() > 5 * np.median(coarse)
+    near = np.flatnonzero(coarse > 0.5 * coarse.max())
+    assert np.ptp(near) == len(near) - 1
 
 
 def test_an_answer_of_other_code_is_asked_again_and_a_torn_line_is_none(tmp_path) -> None:
