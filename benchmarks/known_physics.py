@@ -125,11 +125,13 @@ SPRINGS: Final = (
     *("presliding-friction", "cubic-stiffness", "amplitude-linear-stiffness"),
     *("unnamed-restoring", "frequency-drift", "complex-modulus"),
 )
+DRY: Final = ("coulomb-friction", "presliding-friction")
+"""Dahl's friction is dry friction at amplitudes far above its depth."""
 BEATS: Final = ("second-mode", "tone-pickup", "plane-coupling", "periodic-drive")
 TESTS: Final[dict[str, Callable[[Answers], bool]]] = {
     "a>0": lambda it: it.between("a", low=0) or "quadratic-drag" in it.names,
     "b>0": lambda it: it.between("b", low=0),
-    "c>0": lambda it: it.between("c", low=0) or "coulomb-friction" in it.names,
+    "c>0": lambda it: it.between("c", low=0) or any(each in it.names for each in DRY),
     "stiffer-below": lambda it: _below(it, 1) or "presliding-friction" in it.names,
     "softer-below": lambda it: _below(it, -1) or "softer" in it.said,
     "hardening": lambda it: _stiffness(it, 1),
