@@ -16,6 +16,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Detection, more_leads
 from pendpipe.diagnosis.drift_or_red_noise import reconsider_red_noise
 from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
 from pendpipe.diagnosis.moves import describe, improve, prefer_two_names, price
 from pendpipe.diagnosis.noise import Noise
@@ -253,12 +254,19 @@ def _add_one(state: State, task: Task) -> bool:
     step = Step(tuple(rivals), p_value, state.fit)
     if winner.worth < price([*state.steps, step]) - price(state.steps):
         return False
+    released = winner.lead.effect
+    held = released.without(state.held) if isinstance(released, ReleasedParameter) else state.held
+    # In a gross misfit it is what is still missing that decides how well cycles are predicted.
+    if not gross and predicts_worse(
+        state.fit, winner.fit, state.data, state.noise, state.held, held
+    ):
+        progress(f"{winner.name} predicts cycles that are left out worse: it is not added")
+        return False
     unit, fits = state.data.unit, (state.fit, winner.fit)
     before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
     progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
     state.steps.append(step)
-    if isinstance(winner.lead.effect, ReleasedParameter):
-        state.held = winner.lead.effect.without(state.held)
+    state.held = held
     state.settle(winner.fit)
     return True
 
