@@ -134,5 +134,9 @@ def test_a_lock_is_named_before_there_are_results(
     assert "--unlock" in found.safe
 
 
-def test_a_folder_that_is_not_there_is_the_users_error(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_the_users_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Where no run has left a lock.
+    monkeypatch.chdir(tmp_path)
     assert main(["doctor", str(tmp_path / "none")]) == 2
