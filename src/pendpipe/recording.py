@@ -140,6 +140,11 @@ class Recording:
         return len(self.time_s)
 
     @property
+    def unit_is_stated(self) -> bool:
+        """Whether the unit is known, and not guessed."""
+        return not any("(--unit)" in guess for guess in self.weak_guesses)
+
+    @property
     def unit(self) -> str:
         """The unit of `values`; ``"1"`` where nobody knows it."""
         return UNITS.get(self.quantity) or self.metadata.get("unit") or "1"

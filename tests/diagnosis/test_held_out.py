@@ -58,11 +58,11 @@ def test_a_law_that_only_noise_asked_for_predicts_worse_and_a_right_one_does_not
     fit, data, noise = null_fit()
     model = fit.model.adding(by_identifier("tone-pickup"))
     more = refine(model, data, noise, np.concatenate([fit.value, [1e-4, 1e-4, 3.3]]))
-    assert predicts_worse(fit, more, data, noise, (), ())
+    assert predicts_worse(fit, more, data, noise, (), (), drawn=False)
     outcome = diagnosed("sensor-cubic")
     found = outcome.search
     assert not predicts_worse(
-        found.baseline, found.improved, found.data, found.noise, (), found.held
+        found.baseline, found.improved, found.data, found.noise, (), found.held, drawn=False
     )
 
 

@@ -71,8 +71,12 @@ def begin(
     *,
     baseline: Baseline,
     fixed: Mapping[str, float],
+    stated: bool = True,
 ) -> Beginning:
-    """Choose the readings that are compared, and the start values of the search."""
+    """Choose the readings that are compared, and the start values of the search.
+
+    `stated` is whether it is known that the readings are angles.
+    """
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
     span = usable_span(samples, points, start)
@@ -81,7 +85,7 @@ def begin(
         value[OFFSET] = fixed["offset"]
     sine = None
     if not fixed and samples.unit == "rad":
-        known = start_of(points)
+        known = start_of(points, stated=stated)
         if known.sine and known.favoured == "sine" and known.linear.slip_rad > LARGE_PHASE_ERROR:
             # Both laws begin at the first turning point, so that they count the same half cycles.
             value, sine = _values(known.linear.value), _values(known.sine.value)

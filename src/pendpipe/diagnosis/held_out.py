@@ -69,12 +69,17 @@ def predicts_worse(
     noise: Noise,
     held_before: Sequence[int],
     held_after: Sequence[int],
+    *,
+    drawn: bool,
 ) -> bool:
     """Return whether a model predicts cycles that it was not fitted to worse than another.
 
-    Then what it has more than the other describes the noise of the readings and no law.
+    Then what it has more than the other describes the noise of the readings and no law. A curve
+    (`drawn`) may diverge in one block where its knots have no readings: that is a loss of one
+    standard deviation of the sum, and two are asked.
     """
-    return held_out(before, after, data, noise, held_before, held_after).gain < 0.0
+    found = held_out(before, after, data, noise, held_before, held_after)
+    return found.gain < (-2.0 * found.gain_sd if drawn else 0.0)
 
 
 def _blocks(fit: Fit) -> IntArray:

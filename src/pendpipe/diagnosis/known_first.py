@@ -13,11 +13,11 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import SINE, Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE
-from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.progressive_window import progressive_start
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refits import LOST_PHASE_RAD
 from pendpipe.diagnosis.scores import Candidate, build_bank, whitened
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable
@@ -49,7 +49,7 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
     task.progress("the half swings ask for sin x: fitting it first")
     before, start = state.fit, np.append(beginning.sine, 1.0)
     fit = fitted_from(before.model, state, effect, start)
-    if fit is None or _misfit(fit, state.data) >= _misfit(before, state.data):
+    if fit is None or not _leads(fit, before, effect, state):
         return
     if state.first is None:
         task.scanned(state)
@@ -63,12 +63,19 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
     state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, before))
 
 
-def _misfit(fit: Fit, data: Data) -> float:
-    """Return the sum of squares of readings less model.
+def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
+    """Whether sin x leaves less than x, or what it loses is worth less than that it is known.
 
-    Where a model has lost the phase its chi^2 is taken along the motion, and says less.
+    Where a model has lost the phase its chi^2 is taken along the motion, and says less than the
+    squares of the readings less the model.
     """
-    return float(np.sum((data.residual(fit.at.reading) * data.weight) ** 2))
+    data = state.data
+    left, right = (np.sum((data.residual(f.at.reading) * data.weight) ** 2) for f in (fit, before))
+    if left < right or max(fit.max_phase_error_rad, before.max_phase_error_rad) > LOST_PHASE_RAD:
+        return bool(left < right)
+    best = min((fit, before), key=lambda each: each.chi2)
+    worth = Scale.of(best, data, state.noise).worth(before.chi2, fit.chi2)
+    return worth + effect.prior > 0.0
 
 
 def _imitated(state: State, effect: Effect, task: Task) -> list[tuple[Lead, Fit]]:

@@ -11,6 +11,7 @@ effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.ch
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -37,7 +38,7 @@ FURTHER: Final = 22.0
 again as two choices."""
 _LOST_AT_KNOTS: Final = 0.012
 """Part of a curve's gain lost between its knots, where it is straight: h^2 F''/12 at the knots of
-`effects.curves`; it is credited as far as the names leave as much."""
+`effects.curves`; it is credited, as far as the names leave as much, where only noise is left."""
 _MOST_MOVES: Final = 6
 _FIRST_TRIED: Final = 2
 """Named effects tried as the first of two."""
@@ -113,8 +114,13 @@ def _drops(state: State) -> Iterator[Proposed]:
 
 
 def _curves_for_names(state: State) -> Iterator[Proposed]:
-    """Put one curve in the place of several names: all, or all but what is sudden or a line."""
+    """Put one curve in the place of several names: all, or all but what is sudden or a line.
+
+    Where more than noise is left, the name that gains most stays: a curve competes for the rest.
+    """
     own = [step for step in state.steps if _is_further(step)]
+    if own and not math.isinf(Scale.of(state.fit, state.data, state.noise).floor):
+        own.remove(max(own, key=lambda step: step.winner.gain))
     steady = [step for step in own if not (step.winner.lead.effect.local or _line(step))]
     tried: list[list[Step]] = []
     for replaced in (own, steady):
@@ -131,7 +137,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         rivals = ranked([_rival(bare, fit, scale) for fit in fits])
         step = Step(tuple(rivals), replaced[0].p_value, bare)
         kept = [other for other in state.steps if other not in replaced]
-        left = max(state.fit.chi2 - state.data.used, 0.0)
+        left = max(state.fit.chi2 - state.data.used, 0.0) if math.isinf(scale.floor) else 0.0
         best = rivals[0]
         yield Proposed(
             best.fit,

@@ -41,7 +41,7 @@ _SCORE_MARGIN: Final = 0.3
 """Part of the best score that a refit may catch up."""
 _SCORE_MARGIN_AT_BOUND: Final = 0.6
 """The same where a value at its bound lowers the scores."""
-_LOST_PHASE_RAD: Final = 1.0
+LOST_PHASE_RAD: Final = 1.0
 """Phase error in rad from which a model has lost the motion."""
 _FROM_FIRST_CYCLES: Final = 4
 """Leads that are then refitted from the first cycles on."""
@@ -62,7 +62,7 @@ def refit_leads(
     leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
-        lost = base.max_phase_error_rad > _LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
+        lost = base.max_phase_error_rad > LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
         # With the baseline's friction the motion may stop before the end.
         if lost or (gross and fit is None):
             fit = _better(fit, _from_first_cycles(base, data, noise, lead, held, origin))

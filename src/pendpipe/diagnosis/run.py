@@ -228,7 +228,7 @@ def diagnose_decay(
     samples = with_true_step(prepare(part, place))
     try:
         found, weighed, beginning = _searched(
-            samples, points, baseline, fixed, level, seed, progress
+            samples, points, baseline, fixed, part.unit_is_stated, level, seed, progress
         )
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
@@ -290,13 +290,14 @@ def _searched(
     points: TurningPoints,
     baseline: Baseline,
     fixed: Mapping[str, float],
+    stated: bool,
     level: float,
     seed: int,
     progress: Progress,
 ) -> tuple[Search, tuple[Weighed, ...], Beginning]:
     from pendpipe.effects.catalogue import CATALOGUE
 
-    beginning = begin(samples, points, baseline=baseline, fixed=fixed)
+    beginning = begin(samples, points, baseline=baseline, fixed=fixed, stated=stated)
     found = search(
         beginning,
         samples,

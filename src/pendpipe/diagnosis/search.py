@@ -15,6 +15,7 @@ from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Detection, more_leads
 from pendpipe.diagnosis.drift_or_red_noise import reconsider_red_noise
+from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
@@ -34,7 +35,9 @@ from pendpipe.effects.baseline import OMEGA, TIME, C
 from pendpipe.effects.curves import FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
 
-_MOST_EFFECTS: Final = 6
+_MOST_EFFECTS: Final = 4
+_TRIED: Final = 3
+"""Rivals tried in their order where the best predicts worse."""
 _LESS_FRICTION: Final = (0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
@@ -250,25 +253,41 @@ def _add_one(state: State, task: Task) -> bool:
         rivals = prefer_two_names(state, rivals, task)
     if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
         return False
-    winner = rivals[0]
-    step = Step(tuple(rivals), p_value, state.fit)
-    if winner.worth < price([*state.steps, step]) - price(state.steps):
+    step = _first_that_predicts(state, rivals, p_value, progress)
+    if step is None:
         return False
+    winner = step.winner
     released = winner.lead.effect
-    held = released.without(state.held) if isinstance(released, ReleasedParameter) else state.held
-    # In a gross misfit it is what is still missing that decides how well cycles are predicted.
-    if not gross and predicts_worse(
-        state.fit, winner.fit, state.data, state.noise, state.held, held
-    ):
-        progress(f"{winner.name} predicts cycles that are left out worse: it is not added")
-        return False
+    if isinstance(released, ReleasedParameter):
+        state.held = released.without(state.held)
     unit, fits = state.data.unit, (state.fit, winner.fit)
     before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
     progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
     state.steps.append(step)
-    state.held = held
     state.settle(winner.fit)
     return True
+
+
+def _first_that_predicts(
+    state: State, rivals: Sequence[Rival], p_value: float, progress: Progress
+) -> Step | None:
+    """Return the best effect that pays its price and predicts cycles left out no worse.
+
+    In a gross misfit it is what is still missing that decides how well cycles are predicted.
+    """
+    gross = is_gross(state.fit, state.data)
+    for rival in rivals[:_TRIED]:
+        step = Step((rival, *(other for other in rivals if other is not rival)), p_value, state.fit)
+        if rival.worth < price([*state.steps, step]) - price(state.steps):
+            continue
+        effect, held = rival.lead.effect, state.held
+        if isinstance(effect, ReleasedParameter):
+            held = effect.without(held)
+        fits = (state.fit, rival.fit, state.data, state.noise, state.held, held)
+        if gross or not predicts_worse(*fits, drawn=rival.drawn):
+            return step
+        progress(f"{rival.name} predicts cycles that are left out worse: it is not added")
+    return None
 
 
 def _rms(fit: Fit, data: Data) -> float:

@@ -107,8 +107,7 @@ def _fit(
 
         points = turning_points_of(samples, place)
     if restoring is None:
-        stated = not any("(--unit)" in guess for guess in recording.weak_guesses)
-        restoring = restoring_of(points, stated=stated)
+        restoring = restoring_of(points, stated=recording.unit_is_stated)
     elif restoring == "sine" and not may_be_sine(points):
         largest = float(np.max(points.amplitude_rad))
         raise NotAnalysableError(
