@@ -61,6 +61,11 @@ def normal(size: float) -> Callable[[Generator, int], FloatArray]:
     return lambda generator, count: np.asarray(size * generator.standard_normal(count))
 
 
+def smoothed(generator: Generator, count: int) -> FloatArray:
+    """Noise of which the instrument stored the running mean of five."""
+    return np.convolve(white(generator, count + 4), np.full(5, 0.2), mode="valid")
+
+
 NOISES = {
     "white": Noisy(white),
     "red": Noisy(red),

@@ -29,7 +29,7 @@ _CORNERS: Final = 25
 _FILTERS: Final = (0.0, 0.3, 1.0, 4.0)
 """Rms first cepstral coefficients of ln S that are tried: a memory phi of one reading has 2 phi, a
 running mean 2."""
-_TAPS: Final = 32
+TAPS: Final = 32
 """Readings over which a filter may reach; a running mean of m has coefficients to some 3 m."""
 _LEVELS: Final = (0.0, 0.3, 1.0, 3.0)
 """Rms first coefficients of ln level^2 that are tried; a level that falls by 3 has 0.9."""
@@ -374,6 +374,6 @@ def _smooth_spectra(count: int) -> tuple[Smooth, Smooth]:
     middle = np.maximum(0.5 * (starts + np.append(starts[1:], count) - 1), 1.0)
     corner = np.linspace(0.0, math.log(count), _CORNERS)
     below = 0.5 * np.log1p(np.exp(2.0 * (corner - np.log(middle)[:, None])))
-    order = np.arange(1, _TAPS + 1)
+    order = np.arange(1, TAPS + 1)
     waves = np.cos(math.pi * np.outer(middle / count, order)) / order
     return Smooth(below / math.sqrt(_CORNERS), _SLOPES), Smooth(waves, _FILTERS)

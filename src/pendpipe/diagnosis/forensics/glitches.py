@@ -20,7 +20,7 @@ from pendpipe.diagnosis.forensics.local import (
     whitened_in_time,
 )
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
-from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.noise import TAPS, Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Location
 from pendpipe.estimate import Estimate
@@ -57,6 +57,10 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         return nothing("glitches")
     residual, used = error_of(data, fit), data.weight > 0.0
     local, smeared = _errors(fit, noise, residual, ~used)
+    if noise.coloured:
+        # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
+        used = used.copy()
+        used[:TAPS] = used[-TAPS:] = False
     error = own_error(local)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
     ordered = np.sort(error[used])
@@ -75,7 +79,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         mask |= beyond
         if not smeared:
             break
-        local, _ = _errors(fit, noise, residual, ~used | mask)
+        local, _ = _errors(fit, noise, residual, (data.weight == 0.0) | mask)
         error = own_error(local)
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
