@@ -132,3 +132,22 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
         other.identifier,
         found.steps[1].winner.identifier,
     }
+
+
+def test_after_a_swap_every_effect_is_weighed_beside_the_new_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both effects give way, and the second is compared in the model that has the first's rival."""
+    outcome = diagnosed("two")
+    wanted = [step.rivals[1] for step in outcome.search.steps]
+    others = iter(wanted)
+    monkeypatch.setattr(
+        weighing, "_likelier", lambda _, step, __: None if step.winner in wanted else next(others)
+    )
+    found, weighed = swap_in_likelier(outcome.search, outcome.beginning)
+    names = {rival.identifier for rival in wanted}
+    assert {step.winner.identifier for step in found.steps} == names
+    assert {effect.identifier for effect in found.improved.model.effects} == names
+    for step, each in zip(found.steps, weighed, strict=True):
+        left = {effect.identifier for effect in each.without.model.effects}
+        assert left == names - {step.winner.identifier}

@@ -266,6 +266,8 @@ def swap_in_likelier(
 ) -> tuple[Search, tuple[Weighed, ...]]:
     """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
 
+    After each replacement all are weighed anew: what each was compared beside has changed.
+
     A search adds what reduces a gross misfit most. Where much remains unexplained, a slightly
     larger gain means nothing and the prior decides; and effects added later, or the final
     estimate of the noise, may have changed the odds.
@@ -277,19 +279,32 @@ def swap_in_likelier(
     tuple of Weighed
         One for each of its steps.
     """
-    weighed = [weigh(found, beginning, step) for step in found.steps]
-    # Names under a curve stay: their probabilities show how little they explain.
-    if found.named.fit.model is not found.improved.model:
-        return found, tuple(weighed)
-    for number in range(len(found.steps)):
-        best = _likelier(found, found.steps[number], weighed[number])
-        after = _exchanged(found, number, best, weighed[number].without) if best else None
-        if best is not None and after is not None:
-            own = found.steps[number].winner
-            progress(f"replacing {own.name} by {best.name}, which is likelier")
-            found = after
-            weighed[number] = weigh(found, beginning, found.steps[number])
-    return found, tuple(weighed)
+    tried: list[set[str]] = []
+    while True:
+        weighed = tuple(weigh(found, beginning, step) for step in found.steps)
+        tried.append({effect.key for effect in found.improved.model.effects})
+        # Names under a curve stay: their probabilities show how little they explain.
+        if found.named.fit.model is not found.improved.model:
+            return found, weighed
+        likelier = _with_a_likelier(found, weighed, tried)
+        if likelier is None:
+            return found, weighed
+        found, words = likelier
+        progress(words)
+
+
+def _with_a_likelier(
+    found: Search, weighed: Sequence[Weighed], tried: Sequence[set[str]]
+) -> tuple[Search, str] | None:
+    """Exchange the first effect that has a likelier rival, if that is a set not yet tried."""
+    for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True)):
+        best = _likelier(found, step, each)
+        after = _exchanged(found, number, best, each.without) if best else None
+        if best is None or after is None:
+            continue
+        if {effect.key for effect in after.improved.model.effects} not in tried:
+            return after, f"replacing {step.winner.name} by {best.name}, which is likelier"
+    return None
 
 
 def _likelier(found: Search, step: Step, weighed: Weighed) -> Rival | None:
