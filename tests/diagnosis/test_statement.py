@@ -37,7 +37,7 @@ def paragraph(effect: FoundEffect, gain: float = 50.0) -> str:
         FittedModel(parameters(0.9), 2e-4, 4.0),
         FittedModel(parameters(0.91), 1e-4, 1.0),
     )
-    held = HeldOut(1000.0, 1000.0 + gain, 5.0)
+    held = HeldOut(1000.0, 1000.0 + gain, 5.0, 2e-4, 1.1e-4, 12, 11 if gain > 0.0 else 3)
     return statement("eq8", before, after, [effect], held, 1e-4, 0.0, 0.5, 0.01)
 
 
@@ -73,7 +73,7 @@ def test_numbers_are_rounded_to_their_errors() -> None:
     text = paragraph(named("impulse", dv=Estimate(1.7573525e-05, 1.4961e-05, "rad/s")))
     assert "dv = (1.8 ± 1.5) × 10⁻⁵ rad/s" in text
     assert "from 1.111111 to (1.098901 ± 0.000028) s" in text
-    assert "Q limit (pi f/b) by less than its error (232.4 ± 3.8)" in text
+    assert "leaves the Q limit (pi f/b) at 232.4 ± 3.8, within its error" in text
 
 
 def test_a_doubtful_name_is_only_possibly_missing() -> None:
@@ -84,7 +84,15 @@ def test_a_doubtful_name_is_only_possibly_missing() -> None:
     )
     text = paragraph(doubtful)
     assert "Possibly missing from the model of the measurement: tone in the reading" in text
-    assert "cannot distinguish it from periodic drive (30 %) or others below 1 %" in text
+    assert "cannot distinguish it from periodic drive (30 %)." in text
+    assert "An unknown drive would fit almost as well, but is less probable than 1 %." in text
+
+
+def test_a_name_that_is_not_sure_leads_no_sentence() -> None:
+    """What only describes the misfit is no finding: it is said to have no certain cause."""
+    text = paragraph(replace(named("impulse"), probability=0.01))
+    assert "issing from" not in text
+    assert "The misfit has no certain cause; it is described best by impulse." in text
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:
@@ -98,9 +106,9 @@ def test_a_model_that_predicts_worse_fails_this_test() -> None:
     """A gain below zero is a loss: the effect failed on cycles left out of the fit."""
     step = named("equilibrium-step", J=Estimate(1e-3, 1e-5, "rad"))
     better, worse = paragraph(step, 50.0), paragraph(step, -50.0)
-    assert "predicted better, by 50.0 ± 5.0 in log-likelihood" in better
+    assert "predicted better in 11 of 12 parts of the record (from 200 µrad to 110 µrad" in better
     assert "fails this test" not in better
-    assert "predicted worse, by 50.0 ± 5.0 in log-likelihood" in worse
+    assert "predicted worse in 9 of 12 parts of the record" in worse
     assert "fails this test" in worse
     assert "better" not in worse
 

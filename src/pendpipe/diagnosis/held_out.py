@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -32,16 +32,33 @@ class HeldOut:
         Of the baseline and of the extended model.
     gain_sd
         Standard deviation of after - before, from the scatter of the blocks.
+    rms_before, rms_after
+        Of the errors of prediction, in the unit of the readings.
+    blocks, better
+        How many blocks were left out, and how many the extended model predicts better.
     """
 
     before: float
     after: float
     gain_sd: float
+    rms_before: float
+    rms_after: float
+    blocks: int
+    better: int
 
     @property
     def gain(self) -> float:
         """Gain in log density of the extended model."""
         return self.after - self.before
+
+    def as_json(self) -> dict[str, Any]:
+        """Return ``prediction`` of ``diagnosis.json``: errors of what was left out of the fit."""
+        return {
+            "rms_before_rad": self.rms_before,
+            "rms_after_rad": self.rms_after,
+            "blocks": self.blocks,
+            "blocks_better": self.better,
+        }
 
 
 def held_out(
@@ -54,12 +71,22 @@ def held_out(
 ) -> HeldOut:
     """Predict every other block of about ten cycles from the rest, with both models."""
     block = _blocks(improved)
-    before = _densities(baseline, data, noise, held_before, block)
-    after = _densities(improved, data, noise, held_after, block)
+    before, error_before = _predicted(baseline, data, noise, held_before, block)
+    after, error_after = _predicted(improved, data, noise, held_after, block)
     count = int(block.max()) + 1
     gains = np.bincount(block, weights=after - before, minlength=count)
     sd = math.sqrt(count) * float(np.std(gains, ddof=1)) if count > 1 else math.nan
-    return HeldOut(float(before.sum()), float(after.sum()), sd)
+    used = data.weight > 0.0
+    filled = np.bincount(block, weights=used, minlength=count) > 0.0
+    return HeldOut(
+        float(before.sum()),
+        float(after.sum()),
+        sd,
+        float(np.sqrt(np.mean(error_before[used] ** 2))),
+        float(np.sqrt(np.mean(error_after[used] ** 2))),
+        int(np.count_nonzero(filled)),
+        int(np.count_nonzero(gains > 0.0)),
+    )
 
 
 def predicts_worse(
@@ -89,14 +116,15 @@ def _blocks(fit: Fit) -> IntArray:
     return np.asarray(np.maximum(np.floor(turns / size), 0.0).astype(np.int64))
 
 
-def _densities(
+def _predicted(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], block: IntArray
-) -> FloatArray:
-    """Return the log density of each reading, given the other half of the blocks."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return log density and error of each reading, predicted from the other half of the blocks."""
     used = data.weight > 0.0
     unmasked = replace(noise, weight=np.ones(len(data)))
     usual = -0.5 * float(np.mean(np.log(noise.variance))) - 0.5 * math.log(2.0 * math.pi)
     found = np.where(used, usual + np.log(unmasked.scale), 0.0)
+    error = np.zeros(len(data))
     for fold in range(_FOLDS):
         out = block % _FOLDS == fold
         known = data.masked(out | ~used)
@@ -109,8 +137,9 @@ def _densities(
         # A curve may diverge where blocks are missing: limit the error to that of no prediction.
         largest = 2.0 * fit.at.span.first_amplitude
         off = np.clip(data.residual(predicted), -largest, largest)
+        error[out] = off[out]
         found -= np.where(out, 0.5 * _squared_error(off, unmasked, out, used), 0.0)
-    return np.where(used, found, 0.0)
+    return np.where(used, found, 0.0), error
 
 
 def _squared_error(

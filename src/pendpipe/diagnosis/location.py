@@ -185,7 +185,7 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
     if found.harmonics:
         names = {0: "the offset", 1: "the fundamental"}
         parts = [names.get(h, f"harmonic {h}") for h in found.harmonics]
-        clauses.append("in " + " and ".join(parts))
+        clauses.append("in " + " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1]))))
     elif found.frequency_hz:
         clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
     return f"it shows {', '.join(clauses)}" if clauses else ""

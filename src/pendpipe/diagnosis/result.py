@@ -18,6 +18,7 @@ BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
 COLOURED_NOISE: Final = "coloured-noise"
 """What is reported of the noise, and is nothing that a model lacks."""
+_DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd")
 
 
 @dataclass(frozen=True)
@@ -197,6 +198,11 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
         held = self.held_out
+        densities = (
+            (None, None, 0.0, 0.0)
+            if held is None
+            else (held.before, held.after, held.gain, held.gain_sd)
+        )
         return {
             "schema_version": 1,
             "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
@@ -205,12 +211,8 @@ class Diagnosis:
             "p_value": self.p_value,
             "effects": [effect.as_json() for effect in self.effects],
             "improved": self.improved.as_json(),
-            "held_out": {
-                "log_density_before": None if held is None else held.before,
-                "log_density_after": None if held is None else held.after,
-                "gain": 0.0 if held is None else held.gain,
-                "gain_sd": 0.0 if held is None else held.gain_sd,
-            },
+            "held_out": dict(zip(_DENSITIES, densities, strict=True)),
+            "prediction": None if held is None else held.as_json(),
             "unexplained": {
                 "residual_rms_rad": self.unexplained_rms_rad,
                 "p_value": self.unexplained_p_value,
@@ -242,7 +244,6 @@ def not_analysable(
         Goes into the result.
     """
     nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
-    densities = ("log_density_before", "log_density_after", "gain", "gain_sd")
     return {
         "schema_version": 1,
         "baseline": {"name": baseline, **nothing},
@@ -252,7 +253,7 @@ def not_analysable(
         "p_value": None,
         "effects": [],
         "improved": dict(nothing),
-        "held_out": dict.fromkeys(densities),
+        "held_out": dict.fromkeys(_DENSITIES),
         "unexplained": {"residual_rms_rad": None, "p_value": None},
         "statement": f"This recording can't be analysed: {reason}.",
         "figures": [],

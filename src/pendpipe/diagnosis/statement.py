@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
 _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""
+_DOUBTFUL: Final = 0.05
+"""Probability up to which a name only describes and is not to be quoted."""
 _CERTAIN: Final = 0.95
 """Probability from which an effect without rivals needs no further measurement."""
 _IMPROBABLE: Final = 0.01
-"""Probability below which a rival is not named beside more probable ones."""
+"""Probability up to which a rival is called improbable."""
 _SIGNIFICANT: Final = 3.0
 """Standard deviations from which a change of a parameter is reported as a bias."""
 _KINDS = {
@@ -117,11 +119,13 @@ def statement(
         )
         return " ".join([nothing, *(f"{_capital(said)}." for said in noise), *stamps])
     times = before.residual_rms_rad / noise_rms
+    named = [effect for effect in effects if _has_a_name(effect)]
     text = [
         f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
         f" {compact(before.residual_rms_rad, unit)} rms, {_factor(times)} times the noise of"
         f" {compact(noise_rms, unit)}.",
-        *(_effect(effect) for effect in effects),
+        *(_effect(effect) for effect in named),
+        _nameless([effect for effect in effects if effect not in named], rest=bool(named)),
         _improvement(len(effects), before, after, held, unit),
         _changes(len(effects), before.parameters, after.parameters, unit),
         _rest(unexplained, level, remainder),
@@ -129,6 +133,11 @@ def statement(
     if swings is not None:
         text.append(swings.sentence(unit))
     return " ".join([*(part for part in text if part), *stamps])
+
+
+def _has_a_name(effect: FoundEffect) -> bool:
+    """Whether the effect's name deserves a sentence of its own."""
+    return effect.kind != "unnamed" and effect.probability > _DOUBTFUL
 
 
 def _effect(effect: FoundEffect) -> str:
@@ -140,16 +149,48 @@ def _effect(effect: FoundEffect) -> str:
         name = f"{missing} {_KINDS.get(effect.kind, 'from the model')}: {effect.name}"
         meaning = _MEANINGS.get(effect.identifier)
         lead = f"{name}, that is, {meaning}" if meaning else name
-    numbers = [f"{name} = {each}" for name, each in effect.parameters.items()]
-    lead += f" ({'; '.join([f'probability {_percent(effect.probability)}', *numbers])})"
+    facts = [f"probability {_percent(effect.probability)}", *_numbers(effect)]
+    said = [f"{lead} ({'; '.join(facts)})."]
     if effect.location.summary:
-        lead += f"; {effect.location.summary}"
-    if effect.indistinguishable:
-        rivals = _listed(_rivals(effect.indistinguishable), "or")
-        lead += f". This recording alone cannot distinguish it from {rivals}"
-    elif effect.probability > _CERTAIN or effect.kind == "unnamed":
-        return f"{lead}."
-    return _ended(f"{lead}. What to measure next: {effect.discriminating_test}")
+        said.append(f"{_capital(effect.location.summary)}.")
+    said.extend(_rivals(effect.indistinguishable))
+    if effect.indistinguishable or effect.probability <= _CERTAIN:
+        said.append(_ended(f"What to measure next: {effect.discriminating_test}"))
+    return " ".join(said)
+
+
+def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
+    """What describes the misfit, or the rest of it, without a name to rely on."""
+    if not effects:
+        return ""
+    described = [
+        f"{each.name} ({'; '.join(numbers)})" if (numbers := _numbers(each)) else each.name
+        for each in effects
+    ]
+    what = "The rest of the misfit" if rest else "The misfit"
+    text = f"{what} has no certain cause; it is described best by {_listed(described, 'and')}"
+    if len(effects) == 1 and effects[0].indistinguishable:
+        others = [_rival(name) for name, _ in effects[0].indistinguishable]
+        text += f", and almost as well by {_listed(others, 'or')}"
+    return f"{text}. " + _ended(f"What to measure next: {effects[0].discriminating_test}")
+
+
+def _numbers(effect: FoundEffect) -> list[str]:
+    return [f"{name} = {each}" for name, each in effect.parameters.items()]
+
+
+def _rivals(rivals: Sequence[tuple[str, float]]) -> list[str]:
+    """What else the recording allows, a sentence for the probable and one for the others."""
+    probable = [f"{_rival(name)} ({_percent(p)})" for name, p in rivals if p > _IMPROBABLE]
+    others = [_rival(name) for name, p in rivals if p <= _IMPROBABLE]
+    said = []
+    if probable:
+        said.append(f"This recording alone cannot distinguish it from {_listed(probable, 'or')}.")
+    if others:
+        less = "is less probable than 1 %" if len(others) == 1 else "each is less probable than 1 %"
+        fits = f"{_capital(_listed(others, 'or'))} would fit almost as well"
+        said.append(f"{fits}, but {less}.")
+    return said
 
 
 def _improvement(
@@ -164,36 +205,37 @@ def _improvement(
         text += f", by a factor of {_factor(old / new)}"
     if held is None or not math.isfinite(held.gain):
         return text + "."
-    sd = held.gain_sd if math.isfinite(held.gain_sd) else None
-    by = with_error(abs(held.gain), sd)
-    if held.gain < 0.0:
-        return (
-            f"{text}, but cycles left out of the fit are predicted worse, by {by} in"
-            " log-likelihood: the extended model fails this test."
-        )
-    better = f"and cycles left out of the fit are predicted better, by {by} in log-likelihood"
-    return f"{text}, {better}."
+    worse = held.gain < 0.0
+    count = held.blocks - held.better if worse else held.better
+    text += (
+        f". Cycles that were left out of the fit are predicted {'worse' if worse else 'better'} in"
+        f" {count} of {held.blocks} parts of the record (from {compact(held.rms_before, unit)} to"
+        f" {compact(held.rms_after, unit)} rms)"
+    )
+    return f"{text}: the extended model fails this test." if worse else f"{text}."
 
 
 def _changes(
     number: int, before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str
 ) -> str:
     """What it changes in the small-angle period, in Q, and in the other parameters."""
-    parts, period = [], "small-angle period" if unit == "rad" else "period"
+    changed, kept, period = [], [], "small-angle period" if unit == "rad" else "period"
     for name, of in ((period, _period), ("Q limit (pi f/b)", _quality_factor)):
         old, new = of(before), of(after)
         if old is None or new is None:
             continue
         if _biased(old, new):
-            parts.append(f"the {name} from {_like(old, new)} to {new}")
+            changed.append(f"the {name} from {_like(old, new)} to {new}")
         else:
-            parts.append(f"the {name} by less than its error ({new})")
+            kept.append(f"the {name} at {new}, within its error")
+    parts = [f"changes {_listed(changed, 'and')}"] if changed else []
+    parts += [f"leaves {_listed(kept, 'and')}"] if kept else []
     moved = [
         f"{_PARAMETERS[name]} {_like(before[name], new)} instead of {new}"
         for name, new in after.items()
         if name in _PARAMETERS and _biased(before[name], new)
     ]
-    text = f"This changes {_listed(parts, 'and')}." if parts else ""
+    text = f"This {_listed(parts, 'and')}." if parts else ""
     if moved:
         without = "it" if number == 1 else "them"
         text += f" Without {without} the fit is biased: {'; '.join(moved)}."
@@ -255,14 +297,6 @@ def _percent(share: float) -> str:
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):.0f}" if ratio > 9.95 else f"{ratio:.2g}"
-
-
-def _rivals(indistinguishable: Sequence[tuple[str, float]]) -> list[str]:
-    """The names of rivals with their probabilities; improbable ones only if there are no others."""
-    probable = [pair for pair in indistinguishable if pair[1] > _IMPROBABLE]
-    others = [] if len(probable) in (0, len(indistinguishable)) else ["others below 1 %"]
-    shown = probable or indistinguishable
-    return [*(f"{_rival(name)} ({_percent(share)})" for name, share in shown), *others]
 
 
 def _rival(identifier: str) -> str:
