@@ -5,10 +5,11 @@
 
 Each case runs three records (two of a simulated instrument, one file) in a project of its own,
 disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same command
-again and compares every file of the results, byte for byte, with an undisturbed run. Left out
-are the logs, which carry the dates, and temporary files that a killed process left. The table is
-written into docs/integrity.md. What was done is kept in ``.evidence`` for as long as the code is
-the same.
+again and compares every file of the results, byte for byte, with an undisturbed run. One project
+suffers `CHAIN` kills before it may end: after each, what the doctor finds sound is compared. Left
+out are the logs, which carry the dates, and temporary files that a killed process left. The
+table is written into docs/integrity.md. What was done is kept in ``.evidence`` for as long as the
+code is the same.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ import numpy as np
 from benchmarks import journal
 from pendpipe.doctor import TEMPORARY
 from pendpipe.files import sha256
-from pendpipe.manifest import SET_ASIDE
+from pendpipe.manifest import SET_ASIDE, manifests
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 GUARDS: Final = (
@@ -72,6 +73,8 @@ RECORDS: Final = (
     "air\tsimulated\tair\tair\tair-07\t20.0\n"
     "file\tdecay.csv\n"
 )
+CHAIN: Final = 5
+"""Kills of one project, one run after the other."""
 PATIENCE_S: Final = 3600.0
 """No run of the small campaign takes as long, on however busy a machine."""
 
@@ -81,9 +84,9 @@ Case = dict[str, Any]
 
 def decay() -> str:
     """A viscous decay of 20 swings with a little noise, as a file."""
-    noise = np.random.default_rng(1).normal(0.0, 1e-4, 1200)
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, 1200)
     time_s = np.arange(1200) / 60.0
-    angle = 0.3 * np.exp(-time_s / 10.0) * np.cos(2.0 * np.pi * time_s) + noise
+    angle = 0.05 * np.exp(-time_s / 10.0) * np.cos(2.0 * np.pi * time_s) + noise
     rows = zip(time_s.tolist(), angle.tolist(), strict=True)
     return "time_s,angle_rad\n" + "".join(f"{t:.6f},{y:.7f}\n" for t, y in rows)
 
@@ -147,14 +150,15 @@ class Project:
     def wait(self, process: subprocess.Popen[bytes], share: float, files: int) -> bool:
         """Wait until a share of the files is there; return whether the run is still alive.
 
-        A tenth of the instants lie before the first file, when the run is planned.
+        A tenth of the instants lie before the first new file, when the run is planned.
         """
         begun = time.monotonic()
+        there = sum(path.is_file() for path in self.results.rglob("*"))
         while process.poll() is None:
             made = sum(path.is_file() for path in self.results.rglob("*"))
             if share < 0.1 and time.monotonic() - begun > 30.0 * share:
                 return True
-            if made >= max(1.0, (share - 0.1) / 0.9 * files):
+            if made >= max(there + 1.0, (share - 0.1) / 0.9 * files):
                 time.sleep(0.5 * (share * files % 1.0))
                 return process.poll() is None
             time.sleep(0.03)
@@ -281,25 +285,68 @@ def record(project: Project, name: str) -> Any:
     return {key: value for key, value in content.items() if key not in ("repaired", "check")}
 
 
+Part = Callable[[Trial, Project, random.Random], list[Case]]
+
+
 def size_of(folder: Path) -> tuple[int, int]:
     """Bytes, in blocks of 4096, and number of the files and folders."""
     paths = list(folder.rglob("*"))
     return sum(-(-path.lstat().st_size // 4096) * 4096 for path in paths), len(paths)
 
 
-def group(trial: Trial, project: Project, draw: random.Random) -> Case:
+Kill = Callable[[Trial, Project, random.Random, float], Case]
+
+
+def chain(kill: Kill) -> Part:
+    """Kill one run after the other at growing shares of the files, then let one end."""
+
+    def killed(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
+        cases = []
+        began = time.monotonic()
+        for share in sorted(draw.random() for _ in range(CHAIN)):
+            case = kill(trial, project, draw, share)
+            found = project.doctor()
+            case["left"] = count(found)
+            case["wrong"] = wrong(trial, project)
+            if any("--unlock" in finding["safe"] for finding in found):
+                project.run("--unlock")
+            cases.append(case)
+        end = trial.ended(project, {})
+        for case in cases:
+            case |= {key: end[key] for key in ("status", "differ", "after")}
+            case["same"] = end["same"] and not case["wrong"]
+            case["rerun_s"] = round((time.monotonic() - began) / CHAIN, 1)
+        return cases
+
+    return killed
+
+
+def wrong(trial: Trial, project: Project) -> list[str]:
+    """Results that their manifests call sound and that are not as in the undisturbed run."""
+    homes = [project.results, *project.results.glob("*/")]
+    sound = [
+        (home / name).relative_to(project.results).as_posix()
+        for home in homes
+        for entry in manifests(home)
+        if not entry.damages(hash_all=True)
+        for name in (*entry.outputs, *entry.extras)
+    ]
+    sums = project.sums()
+    return [name for name in sound if sums.get(name) != trial.sums.get(name)]
+
+
+def group(trial: Trial, project: Project, _draw: random.Random, share: float) -> Case:
     """Snakemake and all its jobs, killed with signal 9."""
     process = project.start()
-    alive = project.wait(process, draw.random(), len(trial.sums))
+    alive = project.wait(process, share, len(trial.sums))
     kill_group(process)
-    case = {"disturbed": alive, "made": len(project.sums()), "alive": project.alive()}
-    return trial.ended(project, case)
+    return {"disturbed": alive, "made": len(project.sums()), "alive": project.alive()}
 
 
-def job(trial: Trial, project: Project, draw: random.Random) -> Case:
+def job(trial: Trial, project: Project, draw: random.Random, share: float) -> Case:
     """One job, killed with signal 9."""
     process = project.start()
-    project.wait(process, draw.uniform(0.0, 0.9), len(trial.sums))
+    project.wait(process, 0.9 * share, len(trial.sums))
     killed = False
     while not killed and process.poll() is None:
         if jobs := project.jobs():
@@ -309,8 +356,7 @@ def job(trial: Trial, project: Project, draw: random.Random) -> Case:
                 killed = True
         time.sleep(0.02)
     first = end_of(process)
-    made = len(project.sums())
-    return trial.ended(project, {"disturbed": killed, "made": made, "first": first})
+    return {"disturbed": killed, "made": len(project.sums()), "first": first}
 
 
 @contextmanager
@@ -331,7 +377,7 @@ def mount(*words: str | Path) -> bool:
     return not subprocess.run(["mount", *map(str, words)], capture_output=True).returncode
 
 
-def starved(trial: Trial, draw: random.Random, what: str) -> Case | None:
+def starved(trial: Trial, draw: random.Random, what: str) -> list[Case]:
     """A run on a disk that gets full, in a project on a file system of its own."""
     share = draw.uniform(0.05, 0.95)
     files = trial.begun_files + 8 + round(share * (trial.files - trial.begun_files))
@@ -339,31 +385,31 @@ def starved(trial: Trial, draw: random.Random, what: str) -> Case | None:
     room = f"nr_inodes={files}" if what == "inodes" else f"size={blocks}"
     with small_disk(trial.scratch / "small", room) as mounted:
         if not mounted:
-            return None
+            return [{}]
         project = Project(trial.scratch / "small")
         first, said = project.run()
         named = said_why(project, said)
         mount("-o", "remount,size=1g,nr_inodes=100k", project.folder)
         case = {"room": room, "disturbed": first != 0, "named": named}
-        return trial.ended(project, case)
+        return [trial.ended(project, case)]
 
 
-def full(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+def full(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
     """A disk without bytes."""
     return starved(trial, draw, "bytes")
 
 
-def inodes(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+def inodes(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
     """A disk without inodes."""
     return starved(trial, draw, "inodes")
 
 
-def limit(trial: Trial, project: Project, draw: random.Random) -> Case:
+def limit(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
     """A limit on the size of a file."""
     room = draw.randrange(2000, trial.largest)
     first, said = project.run(limit=room)
     named = said_why(project, said)
-    return trial.ended(project, {"room": room, "disturbed": first != 0, "named": named})
+    return [trial.ended(project, {"room": room, "disturbed": first != 0, "named": named})]
 
 
 def said_why(project: Project, said: str) -> str:
@@ -377,12 +423,12 @@ def said_why(project: Project, said: str) -> str:
     return found[0].strip()[:200].replace(str(project.folder), "") if found else ""
 
 
-def read_only(trial: Trial, _project: Project, draw: random.Random) -> Case | None:
+def read_only(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
     """Half-made results that may not be written, or the whole project."""
     whole = draw.random() < 0.5
     with small_disk(trial.scratch / "small", "size=1g") as mounted:
         if not mounted:
-            return None
+            return [{}]
         project = Project(trial.scratch / "small")
         place = project.folder
         if not whole:
@@ -406,13 +452,13 @@ def read_only(trial: Trial, _project: Project, draw: random.Random) -> Case | No
                 "touched": touched,
                 "named": said_why(project, said),
             }
-            return trial.ended(project, case)
+            return [trial.ended(project, case)]
         finally:
             if not whole:
                 subprocess.run(["umount", str(place)], check=True)
 
 
-def two(trial: Trial, project: Project, draw: random.Random) -> Case:
+def two(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
     """Two runs at once."""
     begun = project.start()
     project.wait(begun, draw.uniform(0.0, 0.9), len(trial.sums))
@@ -420,10 +466,10 @@ def two(trial: Trial, project: Project, draw: random.Random) -> Case:
     statuses = [end_of(begun), second]
     named = re.search("LockException|cannot be locked", said)
     case = {"disturbed": 0 in statuses and statuses != [0, 0], "statuses": statuses}
-    return trial.ended(project, case | {"named": named[0] if named else ""})
+    return [trial.ended(project, case | {"named": named[0] if named else ""})]
 
 
-def order(trial: Trial, _project: Project, draw: random.Random) -> Case:
+def order(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
     """Other cores, another order, folder, time zone, language and seed of hashes."""
     project = Project(trial.scratch / f"another folder {draw.randrange(10**6)}")
     cores = draw.choice((1, 2))
@@ -438,10 +484,10 @@ def order(trial: Trial, _project: Project, draw: random.Random) -> Case:
     case = {"disturbed": True, "cores": cores, "environment": environment}
     ended = trial.ended(project, case)
     shutil.rmtree(project.folder)
-    return ended
+    return [ended]
 
 
-def advice(trial: Trial, project: Project, draw: random.Random) -> Case:
+def advice(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
     """Results broken in every way at once: what the doctor says is done to the letter."""
     project.run()
     process = project.start("--forceall")
@@ -470,13 +516,12 @@ def advice(trial: Trial, project: Project, draw: random.Random) -> Case:
     unnamed = [path.name for path in changed if path not in said]
     case["named"] = "" if unnamed else "all"
     case["unnamed"] = unnamed
-    return case
+    return [case]
 
 
-Part = Callable[[Trial, Project, random.Random], Case | None]
 PARTS: Final[dict[str, tuple[str, Part, int]]] = {
-    "group": ("kill -9 of the group", group, 100),
-    "job": ("kill -9 of a job", job, 50),
+    "group": ("kill -9 of the group", chain(group), 100),
+    "job": ("kill -9 of a job", chain(job), 50),
     "full": ("disk full (bytes)", full, 10),
     "inodes": ("disk full (inodes)", inodes, 10),
     "limit": ("limit on a file's size", limit, 10),
@@ -513,11 +558,28 @@ def table(done: dict[str, list[Case]]) -> str:
     """All parts."""
     head = "| what | cases | disturbed | locks left | cut results | temporary files left |"
     lines = [
-        f"{head} reason named | ended as undisturbed | findings after it | rerun, s (median) |",
+        f"{head} reason named | ended as undisturbed | findings after it | a case, s (median) |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     lines += [row(what, done.get(name, []), n) for name, (what, _, n) in PARTS.items()]
     return "\n".join(lines)
+
+
+def try_on(done: dict[str, list[Case]], parts: Sequence[str], more: int | None) -> None:
+    """Try what is left of the parts, or so many cases more of each; keep them as they come."""
+    with tempfile.TemporaryDirectory(prefix="pendpipe-") as scratch:
+        trial = Trial(Path(scratch))
+        for name in parts:
+            what, disturb, asked = PARTS[name]
+            cases = done.setdefault(name, [])
+            stop = asked if more is None else len(cases) + more
+            while (number := len(cases)) < stop:
+                project = Project(Path(scratch) / "project")
+                cases += disturb(trial, project, random.Random(f"{name} {number}"))
+                shutil.rmtree(project.folder)
+                journal.keep("kills", done, GUARDS)
+                bad = [case["differ"] for case in cases[number:] if case and not case["same"]]
+                print(f"{what} {len(cases)} {bad or ''}", file=sys.stderr, flush=True)
 
 
 def main() -> int:
@@ -530,20 +592,8 @@ def main() -> int:
     if unknown := {*arguments.parts} - {*PARTS}:
         parser.error(f"no part is called {', '.join(unknown)}")
     done: dict[str, list[Case]] = journal.read("kills", {}, GUARDS)
-    with tempfile.TemporaryDirectory(prefix="pendpipe-") as scratch:
-        trial = None if arguments.table else Trial(Path(scratch))
-        for name in arguments.parts or PARTS if trial else ():
-            what, disturb, asked = PARTS[name]
-            cases = done.setdefault(name, [])
-            stop = asked if arguments.number is None else len(cases) + arguments.number
-            for number in range(len(cases), stop):
-                project = Project(Path(scratch) / "project")
-                case = disturb(trial, project, random.Random(f"{name} {number}"))
-                shutil.rmtree(project.folder)
-                cases.append(case or {})
-                journal.keep("kills", done, GUARDS)
-                wrong = "" if not case or case["same"] else f": {case['differ']}"
-                print(f"{what} {number}{wrong}", file=sys.stderr, flush=True)
+    if not arguments.table:
+        try_on(done, arguments.parts or [*PARTS], arguments.number)
     printed = f"{table(done)}\n\nMade by commit {journal.commit()}."
     print(printed)
     journal.put("integrity.md", "kills", printed)
