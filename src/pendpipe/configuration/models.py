@@ -25,13 +25,17 @@ class Rod(Section):
     """The rod, pivoted at its middle."""
 
     mass_kg: Positive = Field(description="mass of the rod with what is glued to it")
+    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of that mass")
     length_m: Positive = Field(description="its whole length")
+    length_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that length")
+    radius_m: NotNegative = Field(0.0, description="radius, for the drag of the air; 0 for none")
 
 
 class Weight(Section):
     """A weight that can be clamped anywhere on the rod."""
 
     mass_kg: Positive = Field(description="mass")
+    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of the mass")
     radius_m: NotNegative = Field(
         0.0, description="radius of a solid sphere of that mass; 0 for a point"
     )
@@ -44,6 +48,7 @@ class Sphere(Section):
     """The sphere at the lower end, which swings in the fluid."""
 
     mass_kg: Positive = Field(description="mass with its screw")
+    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of that mass")
     diameter_m: Positive = Field(description="diameter")
     diameter_sd_m: NotNegative = Field(0.0, description="standard uncertainty of the diameter")
     distance_m: Positive = Field(description="from the axis to the centre of the sphere (L)")
@@ -53,6 +58,45 @@ class Sphere(Section):
     )
     screw_distance_m: NotNegative = Field(
         0.0, description="from the axis to the middle of the immersed part of the screw"
+    )
+    screw_radius_m: NotNegative = Field(0.0024, description="radius of the screw, for its drag")
+    screw_length_m: NotNegative = Field(
+        0.0, description="immersed length of the screw that drags; its volume stands above"
+    )
+    screw_length_sd_m: NotNegative = Field(
+        0.0, description="standard uncertainty of the immersed length"
+    )
+
+
+class Tank(Section):
+    """The tank in which the sphere swings, along its length."""
+
+    length_m: Positive = Field(description="inner length, along the motion")
+    width_m: Positive = Field(description="inner width, across it")
+    depth_m: Positive = Field(description="depth of the fluid")
+    depth_sd_m: NotNegative = Field(0.0, description="standard uncertainty of the depth")
+    height_m: Positive | None = Field(
+        None, description="of the sphere's centre above the floor; blank: half the depth"
+    )
+    height_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that height")
+    off_centre_m: NotNegative = Field(0.0, description="of the sphere, across the tank")
+
+
+class Hysteresis(Section):
+    """What is assumed of the loss torque: ``Q_h = k f^2 (I/I_0)^(1 - exponent)``."""
+
+    inertia_exponent: float = Field(
+        0.0,
+        description="of the loss torque per angle: 0 for a constant one (Q_h = I omega^2 over"
+        " it), 1 for the paper's k f^2 whatever the moment of inertia",
+    )
+    inertia_exponent_sd: NotNegative = Field(
+        0.0, description="standard uncertainty of that exponent"
+    )
+    assembly_relative_sd: NotNegative = Field(
+        0.05,
+        description="relative standard uncertainty of the ratio of the loss torques in water and"
+        " in air, between which the pendulum is assembled anew",
     )
 
 
@@ -68,6 +112,16 @@ class Apparatus(Section):
         "boundary-layer",
         description="of the displaced fluid: 1/2 + 9 delta/(4 radius), or the plain 1/2",
     )
+    position_sd_m: NotNegative = Field(
+        1.0e-4, description="standard uncertainty of a weight's distance, each time it is clamped"
+    )
+    scale_zero_sd_m: NotNegative = Field(
+        3.0e-4, description="standard uncertainty of the zero that all these distances share"
+    )
+    hysteresis: Hysteresis = Field(
+        default_factory=Hysteresis, description="the loss torque of the solid parts"
+    )
+    tank: Tank | None = Field(None, description="the tank; none: its walls are far away")
 
 
 class Geometry(Section):
@@ -94,6 +148,9 @@ class Fluid(Section):
         None,
         description="water only: where density and viscosity hold; a record's own temperature"
         " then scales them; blank: they hold for every record",
+    )
+    temperature_sd_k: NotNegative = Field(
+        0.5, description="standard uncertainty of the thermometer, common to all records"
     )
 
 

@@ -23,6 +23,7 @@ COLUMNS: Final = (
     "stop_s",
     "volts_per_radian",
     "temperature_c",
+    "order",
 )
 REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -56,6 +57,8 @@ class Record:
         The sensor's constant; blank: from the file, or from the campaign's calibration.
     temperature_c
         Of the fluid.
+    order
+        When it was taken: a number that rises over the day (an hour, a count); blank: its row.
     """
 
     record: str
@@ -68,6 +71,7 @@ class Record:
     stop_s: float | None = None
     volts_per_radian: float | None = None
     temperature_c: float | None = None
+    order: float | None = None
 
     @property
     def file(self) -> Path | None:
