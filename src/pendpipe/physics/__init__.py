@@ -1,9 +1,17 @@
-"""The paper's equations as pure functions on arrays: SI units, radians, numpy only.
+"""The paper's equations as pure functions on arrays, in SI units and radians; and walls.
 
 Every function takes numbers or arrays that broadcast and returns a number or an array.
 The equations are used in their corrected forms; each docstring names its number.
 """
 
+from pendpipe.physics.confinement import (
+    Confined,
+    concentric_sphere,
+    sloshing_frequency,
+    sphere_between_planes,
+    sphere_in_tank,
+    thin_layer_concentric,
+)
 from pendpipe.physics.decay import amplitude, stopping_time, time_at
 from pendpipe.physics.decay_gradient import amplitude_and_gradient
 from pendpipe.physics.drag import (
@@ -74,6 +82,7 @@ from pendpipe.physics.water import water_density, water_viscosity
 __all__ = [
     "POTENTIAL_FLOW_ADDED_MASS",
     "STANDARD_GRAVITY_M_PER_S2",
+    "Confined",
     "DecayRates",
     "Fluid",
     "Lengthening",
@@ -90,6 +99,7 @@ __all__ = [
     "amplitude_of_largest_quality_factor",
     "amplitude_rate",
     "bearing_friction_rate",
+    "concentric_sphere",
     "damping_coefficient",
     "decay_rates",
     "displaced_moment",
@@ -115,12 +125,16 @@ __all__ = [
     "quality_factors",
     "rates_from_energy_constants",
     "restoring_torque",
+    "sloshing_frequency",
+    "sphere_between_planes",
+    "sphere_in_tank",
     "sphere_volume",
     "static_moment",
     "stokes_drag",
     "stopping_time",
     "structural_quality_factor",
     "swing",
+    "thin_layer_concentric",
     "time_at",
     "universal_acceleration",
     "viscous_acceleration",
