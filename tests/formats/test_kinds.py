@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import subprocess
 import sys
@@ -485,6 +486,15 @@ def test_what_can_not_be_read_is_refused_for_its_reason(
 ) -> None:
     with pytest.raises(InputError, match=said):
         read_text(tmp_path, content, name)
+
+
+def test_a_list_of_amplitudes_is_refused_as_that(tmp_path: Path) -> None:
+    """Turning points of one side only fall; the same readings with their swings are read."""
+    rows = [(1.9 * n, 0.25 * math.exp(-0.03 * n)) for n in range(20)]
+    listed = "".join(f"{t:.2f},{x:.5f}\n" for t, x in rows)
+    with pytest.raises(InputError, match="only falls: amplitudes, not a recording of the swing"):
+        read_text(tmp_path, ("time,theta (rad)\n" + listed).encode(), "peaks.csv")
+    same(read_text(tmp_path, text(TIME, ANGLE, head="time,theta (rad)\n").encode(), "swing.csv"))
 
 
 def test_a_project_of_capstone_and_a_zip_without_a_table_are_refused(tmp_path: Path) -> None:

@@ -137,6 +137,13 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         return Choice(time, counts, picked, channels, roles=roles)
     mine, others = _of_one_run(channels, time, roles)
     readings, notes, weak = _readings(mine, time, roles)
+    falling = [column for column in readings or mine if _only_falls(column.values)]
+    if reading and falling and len(falling) == len(readings or falling):
+        raise InputError(
+            table.place,
+            f"'{falling[0].label}' only falls: amplitudes, not a recording of the swing",
+            "give the recording that they were read from",
+        )
     if not readings and reading:
         names = listed([column.label for column in table.columns])
         raise InputError(
@@ -161,6 +168,14 @@ def find(table: Table, columns: Sequence[Column], key: str) -> Column:
                 return column
     names = listed([column.label for column in columns])
     raise InputError(table.place, f"there is no column '{key}'", f"choose from: {names}")
+
+
+def _only_falls(values: FloatArray) -> bool:
+    """Whether a column holds a decay without its swings: sizes that fall from row to row."""
+    sizes = np.abs(values[np.isfinite(values)])
+    steps = np.diff(sizes)
+    steps = steps[steps != 0.0]
+    return len(steps) >= 5 and sizes[-1] < 0.8 * sizes[0] and bool(np.mean(steps < 0.0) > 0.85)
 
 
 def _parts(table: Table, options: ReadOptions) -> list[str]:
