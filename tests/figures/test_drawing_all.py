@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,7 @@ def test_drawing_leaves_matplotlib_as_it_was(example: Any) -> None:
 def test_a_name_with_a_dollar_is_no_formula(example: Any, tmp_path: Path) -> None:
     entry = next(e for e in example.content["records"] if e["record"] == "air-01")
     found = read_decay(example.folder, entry)
-    hostile = type(found)(**{**vars(found), "record": "$\\frac{ & <b>"})
+    hostile = replace(found, record="$\\frac{ & <b>")
     svg, _ = save(draw_decay(hostile), tmp_path / "decay")
     assert "$\\frac{ & <b>" in "".join(ET.parse(svg).getroot().itertext())
 

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.result import read_fit
+from pendpipe import physics
+from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Release, turning_points
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, without_folders
 from pendpipe.manifest import check
 
@@ -44,40 +45,74 @@ class Decay:
     ----------
     record
         Its name.
-    time_s, amplitude_rad, amplitude_sd_rad, level_rad
-        The turning points: when, how far from the level, its error, the level; shape (n,).
-    parameters
-        The fit's, by name.
-    names, covariance
-        Order and matrix of the covariance of the parameters.
-    unit
-        ``"rad"``, or ``"m"`` for what is no pendulum.
+    points
+        The turning points, from the first that was fitted.
+    fit
+        The fit, whose time begins at the first of them.
     """
 
     record: str
-    time_s: FloatArray
-    amplitude_rad: FloatArray
-    amplitude_sd_rad: FloatArray
-    level_rad: FloatArray
-    parameters: Mapping[str, Estimate]
-    names: tuple[str, ...]
-    covariance: FloatArray
-    unit: str = "rad"
-
-    def value(self, name: str) -> float:
-        """The fitted value of a parameter."""
-        return self.parameters[name].value
+    points: TurningPoints
+    fit: FitResult
 
     @property
-    def rates(self) -> tuple[float, float, float]:
-        """a, b, c of Eq. 13."""
-        return self.value("a"), self.value("b"), self.value("c")
+    def law_name(self) -> str:
+        """The fitted law's, for a key."""
+        return self.fit.equation.replace("the torque of ", "")
+
+    @property
+    def _too_high(self) -> float:
+        """By how much the turning points' level exceeds the one that the fit found."""
+        too_high = float(np.mean(self.points.level_rad)) - self.fit.value("offset")
+        return too_high if math.isfinite(too_high) else 0.0
+
+    @property
+    def level_rad(self) -> FloatArray:
+        """The fitted level, with the course of that of the turning points; shape (n,)."""
+        return self.points.level_rad - self._too_high
+
+    @property
+    def amplitude_rad(self) -> FloatArray:
+        """Angles without their alternating sign, about the level that the fit found.
+
+        A level too high by one lowers the signed angles by the table's ``level_coupling``.
+        """
+        # Signed, so that noise about zero stays noise about zero.
+        shift = self.points.level_coupling * self._too_high
+        return self.points.side * (self.points.angle_rad + shift)
 
     @property
     def elapsed_s(self) -> FloatArray:
         """Time since the first turning point: the t of Eq. 14."""
-        elapsed: FloatArray = self.time_s - self.time_s[0]
-        return elapsed
+        return np.asarray(self.points.time_s - self.points.time_s[0])
+
+    @property
+    def residual_rad(self) -> FloatArray:
+        """Amplitudes less the fitted law's."""
+        return self.amplitude_rad - self.along(self.elapsed_s)[0]
+
+    def along(self, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Amplitude and Q of the law that was fitted, at times since the first turning point.
+
+        Where that is no Eq. 14 (Q: Eq. 15), the amplitudes y are those at which the motion of
+        Eq. 8 turns, and Q is pi/ln(y'/y) from one to the next on the same side.
+        """
+        start, *rates = (self.fit.value(name) for name in ("amplitude", "a", "b", "c"))
+        frequency = self.fit.value("frequency")
+        if self.fit.equation == "Eq. 14":
+            y = physics.amplitude(elapsed_s, start, *rates)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return y, physics.quality_factor(y, frequency, *rates)
+        until_s = float(elapsed_s[-1]) + 2.0 / frequency
+        turned = turning_points(self.fit.law, Release(0.0, start), until_s=until_s)
+        if len(turned.time_s) < 3:
+            raise NothingToDrawError("the fitted law stops within a cycle")
+        y = np.abs(turned.angle_rad)
+        quality = np.pi / np.log(y[:-2] / y[2:])
+        return (
+            np.interp(elapsed_s, turned.time_s, y),
+            np.interp(elapsed_s, turned.time_s[1:-1], quality),
+        )
 
 
 def number(entry: Any) -> float:
@@ -199,27 +234,4 @@ def read_decay(folder: Path, entry: Entry) -> Decay:
         points = points.chosen(keep)
     if len(points) < 3:
         raise NothingToDrawError(f"{name} has fewer than three turning points")
-    offset = fit.parameters.get("offset")
-    return Decay(
-        name,
-        points.time_s,
-        _amplitude(points, math.nan if offset is None else offset.value),
-        points.angle_sd_rad,
-        points.level_rad,
-        fit.parameters,
-        fit.covariance_order,
-        fit.covariance,
-        points.unit,
-    )
-
-
-def _amplitude(points: TurningPoints, offset_rad: float) -> FloatArray:
-    """Angles without their alternating sign, about the level that the fit found.
-
-    A level too high by one lowers the signed angles by the table's ``level_coupling``.
-    """
-    too_high = float(np.mean(points.level_rad)) - offset_rad
-    shift = points.level_coupling * too_high if math.isfinite(too_high) else 0.0
-    # Signed, so that noise about zero stays noise about zero.
-    amplitude: FloatArray = points.side * (points.angle_rad + shift)
-    return amplitude
+    return Decay(name, points, fit)

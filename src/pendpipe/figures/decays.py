@@ -1,15 +1,20 @@
-"""The figures of one record's decay: 7, 8, and its amplitudes beside linear damping."""
+"""The figures of one decay: 7, 8, each record's amplitudes, and that of `FitResult.plot`.
+
+Each draws the law that was fitted, and names it in its key.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from itertools import pairwise
+from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from pendpipe import physics
+from pendpipe.analysis.fit.summary import seen_qualities
 from pendpipe.arrays import FloatArray
 from pendpipe.figures.data import Decay
 from pendpipe.figures.style import (
@@ -18,12 +23,15 @@ from pendpipe.figures.style import (
     INK,
     PALE,
     VERMILION,
+    WIDTH_IN,
+    band,
     figure_with_residuals,
     key_above,
     new_figure,
     plain_numbers,
     plain_text,
     points,
+    quantity_of,
     styled,
 )
 from pendpipe.quantities import axis_unit, compact
@@ -32,7 +40,7 @@ from pendpipe.recording import Recording
 
 @styled
 def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | None) -> Figure:
-    """Draw every sample with the envelope of Eq. 14, and the turning points' residuals.
+    """Draw every sample with the amplitude of the fitted law, and the turning points' residuals.
 
     Parameters
     ----------
@@ -41,19 +49,11 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
     recording
         All the samples, in volts or as motion.
     volts_per_radian
-        Takes the envelope to the recording's unit; ``None`` where that is rad already.
+        Takes the amplitude to the recording's unit; ``None`` where that is rad already.
     """
     scale = volts_per_radian if recording.quantity == "volts" and volts_per_radian else 1.0
     unit = recording.unit
-    level = scale * _level(decay)
-    time = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
-    start, rates = decay.value("amplitude"), decay.rates
-    envelope = scale * physics.amplitude(time, start, *rates)
-    misfit = scale * (decay.amplitude_rad - physics.amplitude(decay.elapsed_s, start, *rates))
-    misfit_sd = abs(scale) * decay.amplitude_sd_rad
     large, large_unit = axis_unit(recording.values[recording.usable], unit)
-    small, small_unit = axis_unit(np.abs(misfit) + misfit_sd, unit)
-
     figure, upper, lower = figure_with_residuals(4.4)
     # Every sample is drawn; as pixels, since ten thousand line segments help nobody.
     upper.plot(
@@ -64,23 +64,130 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
         rasterized=True,
         label=plain_text(f"all {len(recording)} samples of {decay.record}"),
     )
-    moment = decay.time_s[0] + time
-    upper.plot(moment, large * (level + envelope), color=INK, label="envelope of the fit, Eq. 14")
-    upper.plot(moment, large * (level - envelope), color=INK)
-    name = "Sensor output" if unit == "V" else "Motion"
-    upper.set(ylabel=f"{name} ({large_unit})")
+    _fitted(upper, decay, large * scale)
+    upper.set(ylabel=f"{'Sensor output' if unit == 'V' else 'Motion'} ({large_unit})")
     key_above(upper, 1)
-    points(lower, decay.time_s, small * misfit, small * misfit_sd, 2.0)
-    lower.set(xlabel="Time (s)", ylabel=f"Turning points\n− envelope ({small_unit})")
+    _residual(lower, decay, scale=scale, unit=unit, size=2.0)
+    lower.set(xlabel="Time (s)")
     lower.margins(x=0.01, y=0.1)
     return figure
 
 
-def _level(decay: Decay) -> float:
-    """The fitted level, or where there is none that of the turning points."""
-    fitted = decay.parameters.get("offset")
-    known = fitted is not None and np.isfinite(fitted.value)
-    return fitted.value if fitted and known else float(np.median(decay.level_rad))
+def _fitted(axes: Axes, decay: Decay, factor: float) -> None:
+    """Draw the amplitude of the fitted law above and below the level."""
+    elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
+    moment = decay.points.time_s[0] + elapsed
+    level = np.interp(moment, decay.points.time_s, decay.level_rad)
+    amplitude = decay.along(elapsed)[0]
+    for side, label in ((1.0, f"fitted amplitude, {decay.law_name}"), (-1.0, None)):
+        axes.plot(moment, factor * (level + side * amplitude), color=INK, label=label)
+
+
+def _residual(
+    axes: Axes, decay: Decay, *, scale: float = 1.0, unit: str | None = None, size: float = 2.4
+) -> None:
+    """Draw the turning points less the fitted law."""
+    residual = scale * decay.residual_rad
+    sd = abs(scale) * decay.points.angle_sd_rad
+    factor, unit = axis_unit(np.abs(residual) + sd, unit or decay.points.unit)
+    points(axes, decay.points.time_s, factor * residual, factor * sd, size, **_as_pixels(decay))
+    axes.set_ylabel(f"Data − fit ({unit})")
+
+
+MANY = 150
+"""From this many points on they are drawn as pixels inside the SVG, to keep it small."""
+
+
+def _as_pixels(decay: Decay) -> dict[str, bool]:
+    return {"rasterized": len(decay.points) > MANY}
+
+
+@styled
+def draw_fig08(decay: Decay) -> Figure:
+    """Draw the fitted law's Q along the decay with its 95 % band, the maximum and the limit."""
+    elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
+    quality, half_width = quality_with_band(decay, elapsed)
+    moment = decay.points.time_s[0] + elapsed
+
+    figure, axes = new_figure(3.6)
+    band(axes, moment, quality, half_width, label="95 % band")
+    axes.plot(
+        moment, quality, color=BLUE, label=f"fitted law, {decay.law_name.replace('14', '15')}"
+    )
+    _measured_quality(axes, *local_quality(decay))
+    top, limit = float(np.nanmax(quality)), decay.fit.quality_factor_limit
+    if limit is not None and limit.value > 0.0:
+        top = max(top, limit.value)
+        axes.axhline(limit.value, color=VERMILION, linestyle="--", linewidth=1.1)
+        axes.annotate(
+            f"limit for $a = c = 0$: {limit.value:.1f}",
+            (0.02, limit.value),
+            (0.0, 4.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            color=VERMILION,
+            fontsize=8.5,
+        )
+        _mark_maximum(axes, decay, elapsed, quality)
+    axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$")
+    axes.set_ylim(0.0, 1.16 * top)
+    axes.margins(x=0.01)
+    key_above(axes, 2)
+    return figure
+
+
+def _mark_maximum(axes: Axes, decay: Decay, elapsed_s: FloatArray, quality: FloatArray) -> None:
+    """Mark where Q is largest, if that lies inside the record."""
+    index = int(np.nanargmax(quality))
+    if index in (0, len(quality) - 1):
+        return
+    amplitude = float(decay.along(elapsed_s)[0][index])
+    top = (float(decay.points.time_s[0] + elapsed_s[index]), float(quality[index]))
+    axes.plot(*([each] for each in top), "D", color=BLUE, markersize=5, zorder=4)
+    axes.annotate(
+        f"maximum {top[1]:.1f}\nwhere $y$ = {compact(amplitude, decay.points.unit)}",
+        top,
+        (0.0, -30.0),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize=8.5,
+        arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7},
+    )
+
+
+def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Q of the fitted law along a decay, and the half width of its 95 % band.
+
+    The band follows from the fit's covariance of the amplitude and a, b, c by the
+    derivatives of Q, which are differences over a thousandth of a standard deviation.
+
+    Parameters
+    ----------
+    decay
+        The fit with its covariance.
+    elapsed_s
+        Times since the first turning point, shape (n,).
+
+    Returns
+    -------
+    tuple of FloatArray
+        Q and the half width, each of shape (n,); zero width without a covariance.
+    """
+    fit, order = decay.fit, decay.fit.covariance_order
+    quality = decay.along(elapsed_s)[1]
+    variances = dict(zip(order, np.diag(fit.covariance), strict=True))
+    names = [name for name in ("amplitude", "a", "b", "c") if variances.get(name, 0.0) > 0.0]
+    slopes = np.zeros((len(names), len(elapsed_s)))
+    for row, name in zip(slopes, names, strict=True):
+        step, own = 1e-3 * np.sqrt(variances[name]), fit.parameters[name]
+        moved = replace(own, value=own.value + step)
+        changed = replace(decay, fit=replace(fit, parameters={**fit.parameters, name: moved}))
+        row[:] = (changed.along(elapsed_s)[1] - quality) / step
+    places = [order.index(name) for name in names]
+    covariance = fit.covariance[np.ix_(places, places)]
+    variance = np.nan_to_num(np.einsum("in,ij,jn->n", slopes, covariance, slopes))
+    return quality, 1.96 * np.sqrt(np.maximum(variance, 0.0))
 
 
 FALL = 0.75
@@ -95,194 +202,73 @@ class LocalQuality(NamedTuple):
     sd: FloatArray
 
 
-@styled
-def draw_fig08(decay: Decay) -> Figure:
-    """Draw Eq. 15 along the fitted decay with its 95 % band, the maximum and the limit."""
-    time = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
-    quality, half_width = quality_with_band(decay, time)
-    moment = decay.time_s[0] + time
-    b, frequency = decay.value("b"), decay.value("frequency")
-
-    figure, axes = new_figure(3.6)
-    axes.fill_between(
-        moment,
-        quality - half_width,
-        quality + half_width,
-        color=BLUE,
-        alpha=0.22,
-        linewidth=0.0,
-        label="95 % band",
-    )
-    axes.plot(moment, quality, color=BLUE, label="Eq. 15 with the fitted $a$, $b$, $c$")
-    measured = local_quality(decay)
-    axes.errorbar(
-        measured.time_s,
-        measured.value,
-        measured.sd,
-        fmt="o",
-        color=INK,
-        markersize=3.5,
-        markerfacecolor="white",
-        elinewidth=0.8,
-        label="turning points alone, no model",
-    )
-    top = float(np.nanmax(quality))
-    if b > 0.0:
-        limit = float(physics.quality_factor_limit(frequency, b))
-        top = max(top, limit)
-        axes.axhline(limit, color=VERMILION, linestyle="--", linewidth=1.1)
-        axes.annotate(
-            f"limit for $a = c = 0$: {limit:.1f}",
-            (0.02, limit),
-            (0.0, 4.0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            color=VERMILION,
-            fontsize=8.5,
-        )
-        _mark_maximum(axes, decay, time, quality)
-    axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$")
-    axes.set_ylim(0.0, 1.16 * top)
-    axes.margins(x=0.01)
-    key_above(axes, 2)
-    return figure
-
-
-def _mark_maximum(axes: Axes, decay: Decay, time: FloatArray, quality: FloatArray) -> None:
-    """Mark where Q is largest, if that lies inside the record."""
-    index = int(np.nanargmax(quality))
-    if index in (0, len(time) - 1):
-        return
-    a, b, c = decay.rates
-    largest = float(physics.largest_quality_factor(decay.value("frequency"), a, b, c))
-    moment = float(decay.time_s[0] + time[index])
-    axes.plot([moment], [largest], "D", color=BLUE, markersize=5, zorder=4)
-    axes.annotate(
-        f"maximum {largest:.1f}\nwhere $y$ = √($c$/$a$)",
-        (moment, largest),
-        (0.0, -30.0),
-        textcoords="offset points",
-        ha="center",
-        va="top",
-        fontsize=8.5,
-        arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7},
-    )
-
-
-def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Eq. 15 along a decay, and the half width of its 95 % band.
-
-    The band follows from the fit's covariance of the amplitude and a, b, c by the
-    derivatives of Q.
-
-    Parameters
-    ----------
-    decay
-        The fit with its covariance.
-    elapsed_s
-        Times since the first turning point, shape (n,).
-
-    Returns
-    -------
-    tuple of FloatArray
-        Q and the half width, each of shape (n,); zero width without a covariance.
-    """
-    names = ("amplitude", "a", "b", "c")
-    start, a, b, c = (decay.value(name) for name in names)
-    frequency = decay.value("frequency")
-    y, by_parameter = physics.amplitude_and_gradient(elapsed_s, start, a, b, c)
-    known = [name for name in names if name in decay.names] if decay.covariance.size else []
-    columns, places = [names.index(n) for n in known], [decay.names.index(n) for n in known]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        quality = physics.quality_factor(y, frequency, a, b, c)
-        # Of the loss a y + b + c/y: by itself, and through y.
-        own = np.stack([0.0 * y, y, np.ones_like(y), 1.0 / y], axis=-1)
-        by_loss = (own + (a - c / y**2)[:, np.newaxis] * by_parameter)[:, columns]
-    covariance = decay.covariance[np.ix_(places, places)]
-    variance = np.nan_to_num(np.einsum("ni,ij,nj->n", by_loss, covariance, by_loss))
-    return quality, 1.96 * quality**2 / (np.pi * frequency) * np.sqrt(np.maximum(variance, 0.0))
-
-
 def local_quality(decay: Decay) -> LocalQuality:
     """Q from the logarithmic decrement between turning points, without a model.
 
-    ``Q = pi f (t2 - t1)/ln(y1/y2)`` over spans in which the amplitude falls to `FALL`;
+    ``Q = pi n/ln(y1/y2)`` over n cycles in which the amplitude falls to `FALL`;
     the error is that of the two amplitudes.
     """
-    frequency, rows, first = decay.value("frequency"), [], 0
-    time, y, sd = decay.time_s, decay.amplitude_rad, decay.amplitude_sd_rad
+    rows, first = [], 0
+    time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
     for last in range(1, len(time)):
         if min(y[first], y[last]) <= 10.0 * max(sd[first], sd[last]):
             break
         if y[last] > FALL * y[first]:
             continue
         decrement = np.log(y[first] / y[last])
-        value = np.pi * frequency * (time[last] - time[first]) / decrement
+        half_cycles = decay.points.half_cycle[last] - decay.points.half_cycle[first]
+        value = 0.5 * np.pi * half_cycles / decrement
         spread = value * np.hypot(sd[first] / y[first], sd[last] / y[last]) / decrement
         rows.append((0.5 * (time[first] + time[last]), value, spread))
         first = last
     return LocalQuality(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
-MANY = 150
-"""From this many points on they are drawn as pixels inside the SVG, to keep it small."""
+def _measured_quality(axes: Axes, x: FloatArray, value: FloatArray, sd: FloatArray) -> None:
+    label = "turning points alone, no model"
+    look = {"color": INK, "markerfacecolor": "white", "capsize": 2.0, "elinewidth": 0.8}
+    points(axes, x, value, sd, 3.5, label=label, **look)
 
 
 @styled
 def draw_decay(decay: Decay) -> Figure:
     """Draw the amplitudes of the turning points against time, and data minus fit."""
-    time, y, sd = decay.time_s, decay.amplitude_rad, decay.amplitude_sd_rad
-    fitted = physics.amplitude(decay.elapsed_s, decay.value("amplitude"), *decay.rates)
+    time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
     start, rate = fit_exponential(decay.elapsed_s, y, sd)
     linear = start * np.exp(-rate * decay.elapsed_s)
-    moment = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
-    smooth = physics.amplitude(moment, decay.value("amplitude"), *decay.rates)
-    large, large_unit = axis_unit(y, decay.unit)
-    residual = y - fitted
-    small, small_unit = axis_unit(np.abs(residual) + sd, decay.unit)
-
+    elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
+    unit = decay.points.unit
+    factor, shown_unit = axis_unit(y, unit)
     figure, upper, lower = figure_with_residuals(4.2, constrained=False, residual_share=0.5)
-    _amplitudes(upper, time, large * y, large * sd)
-    upper.plot(
-        time[0] + moment,
-        large * smooth,
-        color=INK,
-        linewidth=1.0,
-        zorder=3,
-        label=f"Eq. 14 (rms misfit {_rms(residual, decay.unit)})",
+    points(
+        upper, time, factor * y, factor * sd, label=f"{len(y)} turning points", **_as_pixels(decay)
     )
-    upper.plot(
-        time[0] + moment,
-        large * start * np.exp(-rate * moment),
-        color=VERMILION,
-        linestyle="--",
-        linewidth=1.1,
-        zorder=3,
-        label=f"linear damping ({_rms(y - linear, decay.unit)})",
-    )
+    for curve, misfit, name, colour, dashes in (
+        (decay.along(elapsed)[0], decay.residual_rad, decay.law_name, INK, "-"),
+        (start * np.exp(-rate * elapsed), y - linear, "linear damping", VERMILION, "--"),
+    ):
+        rms = compact(float(np.sqrt(np.mean(misfit**2))), unit)
+        upper.plot(
+            time[0] + elapsed,
+            factor * curve,
+            color=colour,
+            linestyle=dashes,
+            linewidth=1.1,
+            zorder=3,
+            label=f"{name} (rms misfit {rms})",
+        )
     # The logarithm of an amplitude within its own noise is chance.
     lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
     upper.set_yscale("log")
-    upper.set_ylim(0.75 * large * lowest, 1.35 * large * float(np.max(y)))
+    upper.set_ylim(0.75 * factor * lowest, 1.35 * factor * float(np.max(y)))
     plain_numbers(upper.yaxis, _round_steps(*upper.get_ylim()))
     upper.yaxis.set_minor_locator(NullLocator())
-    upper.set_ylabel(f"Amplitude ({large_unit})")
+    upper.set_ylabel(f"Amplitude ({shown_unit})")
     key_above(upper, 2)
-
-    _amplitudes(lower, time, small * residual, small * sd)
-    lower.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel=f"Data − fit ({small_unit})")
+    _residual(lower, decay)
+    lower.set(xlabel=plain_text(f"Time in {decay.record} (s)"))
     lower.margins(x=0.015)
     return figure
-
-
-def _amplitudes(axes: Axes, time_s: FloatArray, values: FloatArray, errors: FloatArray) -> None:
-    label = f"{len(time_s)} turning points"
-    points(axes, time_s, values, errors, rasterized=len(time_s) > MANY, label=label)
-
-
-def _rms(misfit: FloatArray, unit: str) -> str:
-    """Root mean square with its unit."""
-    return compact(float(np.sqrt(np.mean(misfit**2))), unit)
 
 
 def _round_steps(low: float, high: float) -> tuple[float, ...]:
@@ -309,11 +295,80 @@ def fit_exponential(
     """
     from scipy.optimize import curve_fit
 
-    def shape(time_s: FloatArray, start: float, rate: float) -> FloatArray:
-        return np.asarray(start * np.exp(-rate * time_s))
-
     seen = amplitude_rad > 0.1 * np.max(amplitude_rad)
     slope, level = np.polyfit(time_s[seen], np.log(amplitude_rad[seen]), 1)
     error = np.maximum(sd_rad, np.max(sd_rad) * 1e-6)
-    found, _ = curve_fit(shape, time_s, amplitude_rad, (np.exp(level), -slope), error)
+    found, _ = curve_fit(
+        lambda t, start, rate: start * np.exp(-rate * t),
+        time_s,
+        amplitude_rad,
+        (np.exp(level), -slope),
+        error,
+    )
     return float(found[0]), float(found[1])
+
+
+COLUMNS: Final = 1200
+"""A waveform of more samples than twice this is drawn as its lowest and highest in so many."""
+
+
+@styled
+def draw_fit(decay: Decay, recording: Recording) -> Figure:
+    """Draw a recording with its fitted law.
+
+    Parameters
+    ----------
+    decay
+        The turning points and the fit.
+    recording
+        The decay, in the unit of the turning points.
+
+    Returns
+    -------
+    Figure
+        Three panels: readings with the fitted amplitude; turning points less the fitted law;
+        Q against amplitude, with the Q that the turning points show without a model.
+    """
+    unit = decay.points.unit
+    factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
+    figure = Figure(figsize=(WIDTH_IN, 6.6), layout="constrained")
+    upper, rest, quality = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.3, 0.7, 1.0]})
+    time, values = _thinned(recording.time_s[recording.usable], recording.values[recording.usable])
+    upper.plot(time, factor * values, color=BLUE, linewidth=0.5, alpha=0.6, label="readings")
+    _fitted(upper, decay, factor)
+    upper.set(xlabel="Time (s)", ylabel=f"{quantity_of(unit)} ({shown_unit})")
+    key_above(upper, 2)
+    rest.axhline(0.0, color=INK, linewidth=0.9)
+    _residual(rest, decay)
+    rest.set(xlabel="Time (s)")
+    rest.sharex(upper)
+    _quality_by_amplitude(quality, decay, factor)
+    quality.set(xlabel=f"Amplitude ({shown_unit})", ylabel="Q", ylim=(0.0, None))
+    key_above(quality, 2)
+    return figure
+
+
+def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Keep the lowest and the highest reading of each of `COLUMNS` stretches."""
+    if len(time) <= 2 * COLUMNS:
+        return time, values
+    edges = np.linspace(0, len(time), COLUMNS + 1).astype(int)
+    kept = [
+        first + extreme
+        for first, last in pairwise(edges.tolist())
+        for extreme in sorted((np.argmin(values[first:last]), np.argmax(values[first:last])))
+    ]
+    return time[kept], values[kept]
+
+
+def _quality_by_amplitude(axes: Axes, decay: Decay, factor: float) -> None:
+    amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
+    axes.plot(factor * amplitude, quality, color=INK, label="fitted law")
+    seen = [(factor * y, quality.value, quality.sd) for y, quality in seen_qualities(decay.fit)]
+    _measured_quality(axes, *np.array(seen).reshape(-1, 3).T)
+    limit = decay.fit.quality_factor_limit
+    if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):
+        axes.axhline(limit.value, color=GREY, linestyle=":", label="limit πf/b")
+    if np.max(amplitude) > 5.0 * np.min(amplitude):
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis, (1.0, 2.0, 5.0))

@@ -147,8 +147,15 @@ def points(
     axes: Axes, x: FloatArray, y: FloatArray, sd: FloatArray, size: float = 2.4, **look: Any
 ) -> None:
     """Draw many measured points with thin error bars."""
-    look.setdefault("elinewidth", 0.6)
-    axes.errorbar(x, y, sd, fmt="o", color=BLUE, markersize=size, capsize=0.0, **look)
+    look = {"fmt": "o", "color": BLUE, "capsize": 0.0, "elinewidth": 0.6, **look}
+    axes.errorbar(x, y, sd, markersize=size, **look)
+
+
+def band(
+    axes: Axes, x: FloatArray, y: FloatArray, half: FloatArray, colour: str = BLUE, **look: Any
+) -> None:
+    """Draw the band of a curve's uncertainty."""
+    axes.fill_between(x, y - half, y + half, color=colour, alpha=0.22, linewidth=0.0, **look)
 
 
 def plain_numbers(axis: Axis, steps: Sequence[float] | None = None) -> None:

@@ -45,15 +45,15 @@ CAPTIONS: Final = {
     ),
     "fig07": Caption(
         "Figure 7. A typical free decay",
-        "Every sample of the typical record and the fitted envelope, Eq. 14.",
-        "The lower panel is data minus fit: the turning points less the envelope, with their"
+        "Every sample of the typical record and the amplitude of the fitted law.",
+        "The lower panel is data minus fit: the turning points less that amplitude, with their"
         " standard deviations. A trend there would be physics that the model does not have.",
     ),
     "fig08": Caption(
         "Figure 8. The same decay's dissipation history",
-        "Q against time from Eq. 15 with the fitted a, b, c. Circles are the logarithmic"
+        "Q of the fitted law against time. Circles are the logarithmic"
         " decrement between turning points: they owe nothing to the model.",
-        "Q rises while the quadratic drag (a) dies away, is largest where y = √(c/a), and falls"
+        "Q rises while the quadratic drag (a) dies away, is largest near y = √(c/a), and falls"
         " when the bearing's friction (c) takes over. The dashed line is what exponential losses"
         " alone would give. The band (95 %) may be thinner than the line.",
     ),
@@ -90,11 +90,10 @@ CAPTIONS: Final = {
     ),
     "decay": Caption(
         "Decay",
-        "Amplitudes of the turning points, with Eq. 14 from the fitted a, b, c and, for contrast,"
+        "Amplitudes of the turning points, with those of the fitted law and, for contrast,"
         " the best fit of linear damping alone.",
         "The upper scale is logarithmic: linear damping is a straight line there. Below: data"
-        " minus Eq. 14, bars of one standard deviation. Eq. 14 is of first order in 1/Q: below a Q"
-        " of about 20 a waveform fit may differ from it by a few parts in ten thousand.",
+        " minus the fitted law, bars of one standard deviation.",
     ),
 }
 

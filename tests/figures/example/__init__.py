@@ -87,7 +87,7 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
     limit = np.pi * truth.frequency / values[2]
     fit = {
         "schema_version": 1,
-        "method": "waveform",
+        "method": "turning-points",
         "baseline": "eq8",
         "parameters": parameters,
         "quality_factor_limit": estimate(limit, limit * sd[2] / values[2], ""),

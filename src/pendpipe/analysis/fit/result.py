@@ -143,6 +143,13 @@ class FitResult:
         return f"<pre>{escape(str(self))}</pre>"
 
     @property
+    def equation(self) -> str:
+        """Name of the law that was fitted."""
+        if self.restoring == "sine":
+            return "Eq. 8 with the torque of sin x"
+        return "Eq. 14" if self.method == "turning-points" else "Eq. 8"
+
+    @property
     def law(self) -> Eq8:
         """Eq. 8 with the fitted numbers; b is halved where its parts are not known."""
         from pendpipe.dynamics import Eq8
@@ -161,11 +168,12 @@ class FitResult:
 
     def plot(self) -> Figure:
         """Draw the decay with its fit, what the fit leaves, and Q against amplitude."""
-        from pendpipe.figures.fit import draw_fit
+        from pendpipe.figures.data import Decay
+        from pendpipe.figures.decays import draw_fit
 
         if self.points is None or self.decay is None:
             raise InputError("plot", "the readings are not with this fit", "fit the recording anew")
-        return draw_fit(self, self.points, self.decay)
+        return draw_fit(Decay("", self.points, self), self.decay)
 
     def to_frame(self) -> DataFrame:
         """Return a table with a row a parameter: value, sd, low95, high95, unit."""

@@ -151,13 +151,10 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     """
     found = [f"{result.light}: {result.light_reason}"]
     unit = result.parameters["amplitude"].unit
-    torque = " with the torque of sin x" if result.restoring == "sine" else ""
-    by_points = result.method == "turning-points" and result.restoring == "linear"
-    equation = "Eq. 14" if by_points else f"Eq. 8{torque}"
     found.append(
-        f"  {equation} fitted to {result.turning_points} turning points"
+        f"  {result.equation} fitted to {result.turning_points} turning points"
         if result.method == "turning-points"
-        else f"  {equation} fitted to {result.samples} readings"
+        else f"  {result.equation} fitted to {result.samples} readings"
     )
     if not (result.light != "red" if law is None else law):
         found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
