@@ -154,7 +154,7 @@ def _effect(effect: FoundEffect) -> str:
     if effect.location.summary:
         said.append(f"{_capital(effect.location.summary)}.")
     said.extend(_rivals(effect.indistinguishable))
-    if effect.indistinguishable or effect.probability <= _CERTAIN:
+    if effect.probability <= _CERTAIN or any(p > _IMPROBABLE for _, p in effect.indistinguishable):
         said.append(_ended(f"What to measure next: {effect.discriminating_test}"))
     return " ".join(said)
 
