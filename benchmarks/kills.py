@@ -52,7 +52,7 @@ GUARDS: Final = (
 STAGES: Final = (
     *GUARDS,
     *("pendpipe.commands.acquire", "pendpipe.commands.calibrate", "pendpipe.commands.fit"),
-    *("pendpipe.commands.turning_points", "pendpipe.commands.diagnose", "pendpipe.stages.caliper"),
+    *("pendpipe.commands.turning_points", "pendpipe.commands.diagnose", "pendpipe.stages.acquire"),
     *("pendpipe.commands.separate", "pendpipe.commands.compare", "pendpipe.commands.figures"),
     *("pendpipe.commands.report", "config/*.yaml"),
 )

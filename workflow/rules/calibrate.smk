@@ -12,7 +12,7 @@ rule caliper:
         arm=jobs.caliper_arm(CAMPAIGN),
         depends=jobs.caliper(CAMPAIGN),
         repaired=repaired("calibration", "caliper", "sensor"),
-        code=code_version("pendpipe.stages.caliper")
+        code=code_version("pendpipe.stages.acquire")
         + code_version("pendpipe.commands.calibrate"),
     message:
         "the sensor against a caliper"

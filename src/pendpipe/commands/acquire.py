@@ -184,7 +184,7 @@ def _stage(arguments: argparse.Namespace) -> int:
     if arguments.caliper:
         from pendpipe.configuration.jobs import caliper_source
         from pendpipe.manifest import job
-        from pendpipe.stages.caliper import run_caliper
+        from pendpipe.stages.acquire import run_caliper
 
         if not arguments.out:
             raise InputError("--out", "no file is named", "give --out FILE.csv")

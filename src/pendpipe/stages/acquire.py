@@ -1,4 +1,4 @@
-"""A record's recording from its source: simulated, instrument or file."""
+"""What the instrument has recorded, real or simulated: a record, or the caliper run."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
 from pendpipe.errors import InputError
+from pendpipe.files import replaced
 from pendpipe.manifest import SET_ASIDE
 from pendpipe.recording import Recording, read_plain, write_plain
 
@@ -165,3 +167,58 @@ def _file(record: Record) -> Recording:
     recording = read(path, options)
     # The folder is the user's own business: the results name the file only.
     return replace(recording, metadata={**recording.metadata, "source": path.name})
+
+
+CALIPER_HZ = 200.0
+"""Scans a second of the caliper run."""
+SETTLING = 0.1
+"""Part of each dwell that is left out at either end, where the caliper is moved."""
+
+
+def run_caliper(campaign: Campaign, table: Path) -> None:
+    """Make the table of a caliper run, or copy the one that the configuration names.
+
+    Columns ``displacement_m``, ``volts``, ``volts_sd``: the caliper's reading, the mean of
+    the samples at that position, and the mean's standard deviation.
+    """
+    from pendpipe.acquisition.simulated import acquire_simulated
+    from pendpipe.simulation.record import SensorVolts, generator
+
+    settings = campaign.configuration
+    run, truth = settings.calibration, settings.simulated
+    assert run is not None
+    if run.source != "simulated":
+        # The user's own table is kept beside the results that were made with it.
+        from pendpipe.formats.reading import file_bytes
+
+        with replaced(table, "wb") as copy:
+            copy.write(file_bytes(Path(run.source)))
+        return
+    if truth is None:
+        raise InputError("calibration", "a simulated run needs the section simulated", "add it")
+    random = generator(campaign, "caliper run")
+    displacement = np.linspace(-run.travel_m, run.travel_m, run.points)
+    reading = displacement + run.displacement_sd_m * random.standard_normal(run.points)
+    dwell_s = run.samples / CALIPER_HZ / (1.0 - 2.0 * SETTLING)
+
+    def held(time_s: FloatArray) -> FloatArray:
+        """The rod's angle while the caliper holds one position after the other."""
+        position = np.floor(time_s / dwell_s).astype(np.int64)
+        return np.asarray(displacement[np.clip(position, 0, run.points - 1)] / run.arm_m)
+
+    noise = np.random.default_rng([settings.seed, run.points])
+    recording = acquire_simulated(
+        truth.device.kind,
+        SensorVolts(held, truth.sensor, noise),
+        rate_hz=CALIPER_HZ,
+        duration_s=run.points * dwell_s,
+        clock_scale=truth.device.clock_scale,
+    )
+    dwells = recording.time_s / dwell_s
+    steps, settled = np.floor(dwells), np.abs(dwells % 1.0 - 0.5) < 0.5 - SETTLING
+    with replaced(table) as stream:
+        stream.write(f"# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n")
+        for index, length in enumerate(reading.tolist()):
+            volts = recording.values[settled & (steps == index)]
+            spread = float(np.std(volts, ddof=1) / np.sqrt(len(volts)))
+            stream.write(f"{length!r},{float(np.mean(volts))!r},{spread!r}\n")
