@@ -267,3 +267,15 @@ def test_sin_x_is_not_combined_with_effects_and_ends_at_the_top(tmp_path: Path) 
         simulate(model(tmp_path, table("sensor-cubic", s3=0.05), SINE))
     with pytest.raises(InputError, match="beyond pi"):
         simulate(model(tmp_path, text=SINE.replace("2.5", "3.2")))
+
+
+@pytest.mark.parametrize("angle", [1.0, 2.0, 2.6])
+def test_two_engines_agree_on_sin_x_with_losses_that_are_the_same_in_both(angle: float) -> None:
+    # Viscous damping and dry friction depend on no energy, and so not on the torque.
+    pendulum = {"frequency_hz": 0.5, "quality_factor_viscous": 100.0, "c": 1e-3}
+    pendulum["release_angle_rad"] = angle
+    sampling = {"sample_rate_hz": 50.0, "duration_s": 60.0}
+    effect = {"pendulum": pendulum, "sampling": sampling, "effects": [{"id": "circular-error"}]}
+    torque = {"pendulum": pendulum | {"restoring": "sine"}, "sampling": sampling}
+    values = [simulate(read_model(each)).values for each in (effect, torque)]
+    np.testing.assert_allclose(*values, rtol=0, atol=2e-7 * angle)

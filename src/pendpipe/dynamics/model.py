@@ -48,6 +48,11 @@ class Eq8:
     and the angular frequency :math:`\pi\omega/(2 K)`. For small y this is Eq. 13,
     :math:`-(c + b y + a y^2)`, so that a, b and c mean the same.
 
+    A drag that follows :math:`\dot x |\dot x|` has another cycle integral with the sine. If it has
+    the same a at small amplitudes, it takes :math:`3 (\sin y - y \cos y)/[2 y (1 - \cos y)]` of
+    what the energy form takes in half a swing: :math:`1 - y^2/60`, 0.98 at 1 rad, 0.87 at 2.5 rad.
+    By so much the a of such a drag comes out too small where most of the loss is at y.
+
     At rest at an amplitude y the friction is that of the square bracket with
     :math:`\rho = \omega y` (sine: :math:`2 \omega \sin(y/2)`), whatever its terms; the pendulum
     moves only if :math:`\omega^2 y` (:math:`\omega^2 \sin y`) exceeds it. So hysteretic friction

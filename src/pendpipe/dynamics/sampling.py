@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -78,11 +77,9 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     """
     order = motion.clock.order
     nodes = motion.time_s
-    half = np.clip(np.searchsorted(nodes[:, 0], time_s, side="right") - 1, 0, len(nodes) - 1)
-    # Where in the half cycle, nearly: the nodes are equally spaced in the angle theta.
-    share = (time_s - nodes[half, 0]) / (nodes[half, -1] - nodes[half, 0])
-    theta = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0)) / math.pi * order
-    left = np.clip(np.rint(theta - 0.5 * (_POINTS - 1)), 0, order + 1 - _POINTS)
+    behind = np.searchsorted(nodes.reshape(-1), time_s)
+    half = np.clip((behind - 1) // (order + 1), 0, len(nodes) - 1)
+    left = np.clip(behind - half * (order + 1) - _POINTS // 2, 0, order + 1 - _POINTS)
     first = (half * (order + 1) + left).astype(np.intp)
     weights = lagrange(nodes.reshape(-1), first, time_s)
     omega = motion.angular_frequency

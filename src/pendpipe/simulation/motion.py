@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
 from pendpipe.simulation.effects import Given
 
+_ORDER: Final = 64
+"""Nodes of a half cycle: with sin x from 2.6 rad the readings are then good to 2e-7 rad."""
 Pieces = list[tuple[float, Motion]]
 
 
@@ -47,9 +50,8 @@ def angles(
         release.time_s,
     )
     value = np.concatenate([value, *(one.values for one in given)])
-    order = 24 if abs(release.angle_rad) < 1.5 else 64
     interval = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0
-    model = Model(time_s, interval, effects, order)
+    model = Model(time_s, interval, effects, _ORDER)
     pieces = _longest(model, value, equation.angular_frequency, place)
     stamps = model.taken_at(value)
     end = float(pieces[-1][1].time_s[-1, -1])
