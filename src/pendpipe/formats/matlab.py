@@ -1,31 +1,33 @@
-"""MATLAB files (version 4 to 7): plain arrays, structures, Simulink's logs.
+"""MATLAB files (version 4 to 7) as trees of arrays: plain ones, structures, Simulink's logs.
 
-Their tags are gone through before scipy's reader sees them: it trusts the sizes in the file, and
-a damaged one can make it crash. Layout after MathWorks' "MAT-File Format", version 5: elements of
-a type, a byte count and the data, padded to eight bytes; arrays are elements that hold elements.
+Read here and not by scipy, whose reader trusts the sizes in a file, so that a damaged one makes it
+crash. Layout after MathWorks' "MAT-File Format", version 5: elements of a type, a byte count and
+the data, padded to eight bytes; arrays are elements that hold elements.
 """
 
 from __future__ import annotations
 
-import io
+import re
 import struct
-import warnings
 import zlib
-from dataclasses import dataclass
+from collections.abc import Iterator
+from itertools import islice
 from math import prod
-from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.table import NotThisFormatError, Table
-from pendpipe.formats.trees import table_of_tree
+import numpy as np
 
-_SIZES: Final = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
+from pendpipe.arrays import AnyArray
+from pendpipe.formats.table import NotThisFormatError
+
+_STORED: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"} | {
+    12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4"
+}  # fmt: skip
 _MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _OBJECT, _CHARACTERS = 1, 2, 3, 4
+_CELL, _STRUCT, _CHARACTERS = 1, 2, 4
 _NUMERIC: Final = range(6, 16)
 _COMPLEX: Final = 0x0800
-_LARGEST: Final = 1 << 31
+_DEEPEST: Final = 32
 
 
 class DamagedError(ValueError):
@@ -37,176 +39,125 @@ def most_unpacked(size: int) -> int:
     return max(256 << 20, 100 * size)
 
 
-@dataclass
-class _Elements:
-    """Elements one after the other in `data`, from `at` on."""
-
-    data: bytes
-    order: str
-    at: int = 0
-
-    def next(self) -> tuple[int, bytes]:
-        """Return the next element's type and content."""
-        if self.at + 8 > len(self.data):
-            raise DamagedError(f"it ends within a tag at byte {self.at}")
-        kind, size = struct.unpack_from(self.order + "II", self.data, self.at)
-        if kind >> 16 and kind >> 16 <= 4:
-            content = self.data[self.at + 4 : self.at + 4 + (kind >> 16)]
-            self.at += 8
-            return kind & 0xFFFF, content
-        start, stop = self.at + 8, self.at + 8 + size
-        if stop > len(self.data):
-            raise DamagedError(f"an element of {size} bytes does not fit at byte {self.at}")
-        self.at = stop if kind == _COMPRESSED else min(stop + -size % 8, len(self.data))
-        return kind, self.data[start:stop]
-
-    def plain(self, *kinds: int) -> bytes:
-        """Return the next element's content, which must be of one of these types."""
-        kind, content = self.next()
-        if kind not in kinds or len(content) % _SIZES[kind]:
-            raise DamagedError(f"an element of type {kind} stands where {kinds} is due")
-        return content
-
-    def more(self) -> bool:
-        """Say whether anything is left but padding."""
-        return self.at + 8 <= len(self.data)
+def is_matlab(data: bytes) -> bool:
+    """Say whether a file is one of version 5 to 7 by its head; version 7.3 is HDF5."""
+    head = data[:10] == b"MATLAB 5.0" or data[126:128] in (b"IM", b"MI")
+    return head and b"MATLAB 7.3" not in data[:128]
 
 
-def sound_variables(data: bytes) -> list[str]:
-    """List the variables of numbers, cells and structures; raise if anything is damaged.
+def tree_of(data: bytes) -> dict[str, Any]:
+    """Read the variables of a file of version 5 to 7.
 
     Raises
     ------
     DamagedError
         When a size or a type can't be true.
     """
-    if len(data) < 136 or data[126:128] not in (b"IM", b"MI"):
+    order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
+    if order is None:
         raise DamagedError("its header is damaged")
-    order = "<" if data[126:128] == b"IM" else ">"
-    most = most_unpacked(len(data))
-    elements = _Elements(data, order, 128)
-    names = []
-    while elements.more():
-        kind, content = elements.next()
+    most, tree = most_unpacked(len(data)), {}
+    for kind, content in _elements(data, order, 128):
         if kind == _COMPRESSED:
             unpacker = zlib.decompressobj()
-            try:
-                unpacked = unpacker.decompress(content, most)
-            except zlib.error as fault:
-                raise DamagedError(f"its compressed data are damaged ({fault})") from None
-            if not unpacker.eof and len(unpacked) >= most:
-                raise DamagedError(f"its compressed data are more than {most >> 20} MB")
+            unpacked = unpacker.decompress(content, most)
             if not unpacker.eof:
-                raise DamagedError("its compressed data are cut short")
+                many = len(unpacked) >= most
+                fault = f"are more than {most >> 20} MB" if many else "are cut short"
+                raise DamagedError(f"its compressed data {fault}")
             most -= len(unpacked)
-            kind, content = _Elements(unpacked, order).next()
-        if kind != _MATRIX:
-            raise DamagedError(f"an element of type {kind} stands where a variable is due")
-        name, known = _array(_Elements(content, order))
-        if known:
-            names.append(name)
-    return names
+            kind, content = next(_elements(unpacked, order), (0, b""))
+        name, value = _array(kind, content, order)
+        tree[name] = value
+    return tree
 
 
-def _array(parts: _Elements, depth: int = 0) -> tuple[str, bool]:
-    """Go through one array; return its name, and whether all of it is of a known class."""
-    if depth > 32:
-        raise DamagedError("its structures are nested too deeply")
-    if not parts.data:
-        return "", True
-    flags = parts.plain(6)
-    shape = parts.plain(5)
-    name = parts.plain(1, 2, 16).decode("latin-1")
-    if len(flags) != 8 or len(shape) < 8:
-        raise DamagedError("an array has no class or no size")
-    word = struct.unpack_from(parts.order + "I", flags)[0]
-    sizes = struct.unpack_from(f"{parts.order}{len(shape) // 4}i", shape)
-    count = prod(sizes)
-    if min(sizes) < 0 or count > _LARGEST:
-        raise DamagedError(f"an array has the size {sizes}")
-    return name, _content(parts, word & 0xFF, bool(word & _COMPLEX), count, depth)
+def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Give type and content of the elements that stand one after the other."""
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from(order + "II", data, at)
+        start, small = at + 8, kind >> 16
+        if 0 < small <= 4:  # so few bytes stand in the tag itself
+            start, kind, size = at + 4, kind & 0xFFFF, small
+        if start + size > len(data):
+            raise DamagedError(f"an element of {size} bytes does not fit at byte {at}")
+        yield kind, data[start : start + size]
+        at = start + size + (0 if kind == _COMPRESSED else -(start + size - at) % 8)
 
 
-def _content(parts: _Elements, kind: int, is_complex: bool, count: int, depth: int) -> bool:
-    """Go through an array's content by its class; ``False`` for a class left alone."""
-    if kind in _NUMERIC:
-        for _ in range(2 if is_complex else 1):
-            stored, content = parts.next()
-            if stored not in _SIZES or len(content) != count * _SIZES[stored]:
-                raise DamagedError(f"an array of {count} numbers holds {len(content)} bytes")
-        return True
-    if kind == _CHARACTERS:
-        stored, content = parts.next()
-        if stored not in _SIZES or len(content) > 4 * count:
-            raise DamagedError(f"a text of {count} letters holds {len(content)} bytes")
-        return stored != 16 or len(content) == count
-    fields = 1
-    if kind == _OBJECT:
-        parts.plain(1)
-    if kind in (_STRUCT, _OBJECT):
-        length = parts.plain(5)
-        names = parts.plain(1)
-        width = struct.unpack(parts.order + "i", length)[0] if len(length) == 4 else 0
+def _numbers(parts: Iterator[tuple[int, bytes]], order: str, *kinds: int) -> AnyArray:
+    """Read the next element, which must be of one of these types."""
+    kind, content = next(parts, (0, b""))
+    if kind not in kinds:
+        raise DamagedError(f"an element of type {kind} stands where {kinds} is due")
+    return np.frombuffer(content, order + _STORED[kind])
+
+
+def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, Any]:
+    """Read an array: its name; numbers, text, or cells and structures as an array of objects.
+
+    ``None`` stands for what holds no readings: complex numbers, functions, objects.
+    """
+    if kind != _MATRIX or depth > _DEEPEST:
+        raise DamagedError(f"an element of type {kind} stands where an array is due")
+    if not content:
+        return "", None
+    parts = _elements(content, order)
+    flags, shape = _numbers(parts, order, 6), _numbers(parts, order, 5).tolist()
+    name = _numbers(parts, order, 1, 2, 16).tobytes().decode("latin-1")
+    if not len(flags) or min(shape, default=-1) < 0:
+        raise DamagedError(f"an array has the size {shape}")
+    group, count = int(flags[0]) & 0xFF, prod(shape)
+    if group in _NUMERIC:
+        values = _numbers(parts, order, *_STORED).reshape(shape, order="F")
+        return name, None if flags[0] & _COMPLEX else np.squeeze(values)
+    if group == _CHARACTERS:
+        return name, "".join(map(chr, _numbers(parts, order, *_STORED).tolist()))
+    if group not in (_CELL, _STRUCT):
+        return name, None
+    fields = [""]
+    if group == _STRUCT:
+        width = int(_numbers(parts, order, 5).sum())
+        names = _numbers(parts, order, 1).tobytes().decode("latin-1")
         if width < 1 or len(names) % width:
             raise DamagedError("the names of a structure's fields are damaged")
-        fields = len(names) // width
-    elif kind != _CELL:
-        return False
-    known = True
-    for _ in range(count * fields):
-        stored, content = parts.next()
-        if stored != _MATRIX:
-            raise DamagedError(f"an element of type {stored} stands where an array is due")
-        known &= _array(_Elements(content, parts.order), depth + 1)[1]
-    return known and kind != _OBJECT
+        starts = range(0, len(names), width)
+        fields = [names[at : at + width].partition("\0")[0] for at in starts]
+    held = [_array(*each, order, depth + 1)[1] for each in islice(parts, count * len(fields))]
+    if len(held) < count * len(fields):
+        raise DamagedError(f"{len(held)} arrays stand where {count * len(fields)} are due")
+    entries = np.empty(len(held) // max(len(fields), 1), dtype=object)
+    for place in range(len(entries)):
+        some = held[place * len(fields) : (place + 1) * len(fields)]
+        entries[place] = some[0] if group == _CELL else dict(zip(fields, some, strict=True))
+    return name, entries
 
 
-def _version_4(data: bytes) -> list[str] | None:
-    """List the variables of a file of version 4; ``None`` where it is none.
+def tree_of_version_4(data: bytes) -> dict[str, Any]:
+    """Read the variables of a file of version 4.
 
     Each has five words (type, rows, columns, whether complex, length of the name), its name and
     its numbers. Type MOPT has the byte order in its thousands, 0 in its hundreds, the kind of
     number in its tens, and 0 for a full matrix in its ones.
-    """
-    names, at = [], 0
-    while at + 20 <= len(data):
-        kind, rows, columns, is_complex, length = struct.unpack_from("<5I", data, at)
-        if kind not in (0, 10, 20, 30, 40, 50) or is_complex > 1 or not 1 < length < 64:
-            return None
-        name = data[at + 20 : at + 20 + length]
-        if not name[:-1].isalnum() and not name[:-1].replace(b"_", b"").isalnum():
-            return None
-        size = rows * columns * (1 + is_complex) * (8, 4, 4, 2, 2, 1)[kind // 10]
-        names.append(name[:-1].decode("latin-1"))
-        at += 20 + length + size
-    return names if names and at == len(data) else None
-
-
-def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the arrays of one length, with the names of the variables they are in.
 
     Raises
     ------
     NotThisFormatError
-        When the file is none of MATLAB's, or of version 7.3 (which is HDF5).
-    InputError
-        When it holds no numbers.
-    Exception
-        Whatever scipy's parser raises that stumbles on a damaged file.
+        When the file is none of that version.
     """
-    form, names = "matlab-v5", None
-    if not data.startswith(b"MATLAB 5.0") and data[126:128] not in (b"IM", b"MI"):
-        form, names = "matlab-v4", _version_4(data)
-        if names is None:
+    tree, at = {}, 0
+    while at < len(data):
+        try:
+            kind, rows, columns, is_complex, length = struct.unpack_from("<5I", data, at)
+            name = re.fullmatch(rb"(\w{1,63})\0", data[at + 20 : at + 20 + length])
+            stored = {0: "f8", 10: "f4", 20: "i4", 30: "i2", 40: "u2", 50: "u1"}[kind]
+            count = rows * columns * (1 + is_complex)
+            values = np.frombuffer(data, "<" + stored, count, at + 20 + length)
+        except (struct.error, KeyError, ValueError):
+            name = None
+        if name is None or is_complex > 1:
             raise NotThisFormatError("the file does not begin with 'MATLAB 5.0'")
-    if b"MATLAB 7.3" in data[:128]:
-        raise NotThisFormatError("version 7.3 is HDF5")
-    names = names or sound_variables(data)
-    from scipy.io import loadmat
-
-    stream: Any = io.BytesIO(data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        loaded = loadmat(stream, squeeze_me=True, variable_names=names)
-    tree = {name: value for name, value in loaded.items() if not name.startswith("__")}
-    return table_of_tree(place, tree, form, options)
+        if not is_complex:
+            tree[name[1].decode()] = values.reshape(rows, columns, order="F")
+        at += 20 + length + values.nbytes
+    return tree

@@ -40,7 +40,7 @@ _OTHERS: Final = (
 )
 """What some give that holds no table, or none that is read; by its first bytes."""
 
-_BY_LIBRARIES: Final = ("MATLAB file", "file of arrays", "zip archive")
+_BY_LIBRARIES: Final = ("file of arrays", "zip archive")
 """Of these a library takes the file apart, and raises whatever it stumbles on."""
 
 Reader = Callable[[Path, bytes, ReadOptions], Table]
@@ -55,9 +55,6 @@ def readers() -> Iterator[tuple[str, Reader]]:
     from pendpipe.formats import windaq
 
     yield "WinDaq", windaq.read_table
-    from pendpipe.formats import matlab
-
-    yield "MATLAB file", matlab.read_table
     from pendpipe.formats import trees
 
     yield "file of arrays", trees.read_table

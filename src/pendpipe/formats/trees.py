@@ -1,4 +1,4 @@
-"""Files of named arrays: HDF5 (and MATLAB 7.3), NumPy, JSON, sound; and MATLAB's own."""
+"""Files of named arrays: HDF5 (and MATLAB 7.3), MATLAB, NumPy, JSON, sound."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.layout import column_of_clock_times
+from pendpipe.formats.matlab import is_matlab, tree_of, tree_of_version_4
 from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.swing import swing_of
 from pendpipe.formats.table import Column, NotThisFormatError, Table
@@ -69,27 +70,21 @@ def table_of_tree(
 
 def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, FloatArray]]:
     """Walk through dictionaries, lists and structures; give every real array as columns."""
-    if depth > 12:
+    if depth > 12 or tree is None:
         return
     if isinstance(tree, dict):
+        # Simulink's "structure with time" names a signal in its label.
+        label = tree.get("label")
+        if isinstance(label, str) and label.strip() and "values" in tree:
+            path, tree = label.strip(), {"values": tree["values"]}
         for name, value in tree.items():
             yield from _numbers(value, f"{path}.{name}" if path else str(name), depth + 1)
         return
     if isinstance(tree, list):
         tree = _array_of_list(tree)
     array = np.asarray(tree)
-    if array.dtype.names and array.size > 64:  # a table of records
+    if array.dtype.names:  # a table of records
         yield from _numbers({name: array[name] for name in array.dtype.names}, path, depth + 1)
-        return
-    if array.dtype.names:
-        for number, record in enumerate(array.reshape(-1), start=1):
-            fields = {name: record[name] for name in array.dtype.names}
-            name = path if array.size == 1 else f"{path}({number})"
-            # Simulink's "structure with time" names a signal in its label.
-            label = fields.get("label")
-            if isinstance(label, str) and label.strip() and "values" in fields:
-                name, fields = label.strip(), {"values": fields["values"]}
-            yield from _numbers(fields, name, depth + 1)
         return
     if array.dtype == object:
         for number, entry in enumerate(array.reshape(-1)[:64], start=1):
@@ -165,7 +160,7 @@ def _interval(arrays: dict[str, FloatArray]) -> float | None:
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read a file of HDF5, NumPy, JSON or sound (.wav).
+    """Read a file of HDF5, MATLAB, NumPy, JSON or sound (.wav).
 
     Raises
     ------
@@ -179,7 +174,11 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     for form, begins, reader in _FORMS:
         if begins(data):
             return reader(place, data, form, options)
-    raise NotThisFormatError("the file is none of HDF5, NumPy, JSON, sound")
+    return table_of_tree(place, tree_of_version_4(data), "matlab-v4", options)
+
+
+def _of_matlab(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    return table_of_tree(place, tree_of(data), form, options)
 
 
 def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
@@ -259,5 +258,6 @@ _FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
         _of_numpy,
     ),
     ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
+    ("matlab-v5", is_matlab, _of_matlab),
     ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),
 )
