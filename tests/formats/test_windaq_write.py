@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
-from pendpipe.formats.windaq_write import WrittenChannel, WrittenEvent, pack
+from pendpipe.formats.windaq import Channel, Event, pack
 from pendpipe.formats.writing import windaq_hires, write
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording, read_plain, write_plain
 
@@ -48,8 +48,8 @@ SWING = np.rint(swing(1500, 100.0)[1] * 30000).astype(np.int64)
 def test_the_worked_bytes_of_a_header() -> None:
     # dataq-facts B1, B2: two scans of two channels, 250 Hz, +-10 V, an event with a comment.
     channels = [
-        WrittenChannel(1, 10 / 8192, 0.0, "Volt", 10.0, "Angle"),
-        WrittenChannel(4, 5 / 8192, -1.5, "degree", 5.0),
+        Channel(1, 10 / 8192, 0.0, "Volt", 10.0, "Angle"),
+        Channel(4, 5 / 8192, -1.5, "degree", 5.0),
     ]
     counts = np.array([[1, -2], [32767, -32768]])
     data = pack(
@@ -58,7 +58,7 @@ def test_the_worked_bytes_of_a_header() -> None:
         0.004,
         opened=1_700_000_000,
         closed=1_700_000_001,
-        events=[WrittenEvent(1, 9, "hit")],
+        events=[Event(1, 9, "hit")],
     )
     assert data[0:2] == b"\x02\x00"
     assert data[4:8] == b"\x6e\x24\x84\x04"  # 110, 36, 1156
@@ -97,7 +97,7 @@ def test_the_worked_bytes_of_a_header() -> None:
     ],
 )
 def test_the_gain_code_is_that_of_the_range(range_volts: float | None, code: int) -> None:
-    channel = WrittenChannel(1, 1.0, 0.0, "V", range_volts)
+    channel = Channel(1, 1.0, 0.0, "V", range_volts)
     assert pack(np.zeros((1, 1), dtype=np.int64), [channel], 1.0)[143] == code
 
 
@@ -145,9 +145,9 @@ def test_a_pause_is_told_by_a_stamp_and_exactly_by_a_comment(tmp_path: Path) -> 
 def test_a_strangers_stamp_overrules_a_comment_that_disagrees(tmp_path: Path) -> None:
     data = pack(
         SWING[:, None],
-        [WrittenChannel(1, 10 / 8192, 0.0, "Volt")],
+        [Channel(1, 10 / 8192, 0.0, "Volt")],
         0.01,
-        events=[WrittenEvent(500, 5, "gap 7.000000000 s"), WrittenEvent(900, 60)],
+        events=[Event(500, 5, "gap 7.000000000 s"), Event(900, 60)],
     )
     path = tmp_path / "a.wdh"
     path.write_bytes(data)

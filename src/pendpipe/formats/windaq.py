@@ -1,8 +1,10 @@
-"""WinDaq recordings: .WDQ (14 bit), .WDH (HiRes), .WDC and .WHC (circular).
+"""WinDaq recordings: .WDQ (14 bit), .WDH (HiRes), .WDC and .WHC (circular); a .WDH is written too.
 
 Layout after the CODAS data-format description: little-endian throughout, no magic at the
 start; the only mark is 0x8001 in the header's last two bytes. Behind the samples stand events,
-annotations and comments, which also hold pauses, and what a damaged header lost.
+annotations and comments, which also hold pauses, and what a damaged header lost. What WinDaq's
+screen needs (windows, keys, cursors) is written as in the files that WinDaq itself writes for one
+time window; nothing of it concerns the samples.
 """
 
 from __future__ import annotations
@@ -12,9 +14,8 @@ import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,43 +25,91 @@ from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
-_MARK: Final = 0x8001
-_SIZES: Final = (1156, 1536, 5296)
+_FIELDS: Final = {
+    "channels": (0, "<u2"), "one": (2, "<u2"), "table": (4, "u1"), "entry": (5, "u1"),
+    "size": (6, "<i2"), "data_bytes": (8, "<u4"), "event_bytes": (12, "<u4"),
+    "annotation_bytes": (16, "<u2"), "screen": (18, "(3,)<i2"), "windows": (24, "(4,)u1"),
+    "interval_s": (28, "<f8"), "opened": (36, "<i4"), "closed": (40, "<i4"),
+    "compression": (44, "<i4"), "next_write": (56, "<u4"), "shown": (64, "(4,)u1"),
+    "order": (68, "(32,)u1"), "flags": (100, "<u2"),
+}  # fmt: skip
+_ENTRY_FIELDS: Final = {
+    "scale": (0, "<f4"), "offset": (4, "<f4"), "slope": (8, "<f8"), "intercept": (16, "<f8"),
+    "unit": (24, "S6"), "divisor": (31, "u1"), "number": (32, "u1"), "gain": (33, "u1"),
+}  # fmt: skip
+_MARK: Final = b"\x01\x80"
+_HEADER_BYTES, _TABLE, _ENTRY = 1156, 110, 36
+_SIZES: Final = (_HEADER_BYTES, 1536, 5296)
 _HIRES, _PACKED = 1 << 1, 1 << 14
-
-
 _LARGEST_SCALE: Final = 1e30
 """No unit makes a count worth more than this: a greater scale is a damaged one."""
+MOST_SAMPLES: Final = 1 << 29
+"""Pointers count samples in 31 bits, the data size bytes in 32."""
+
+
+def _layout(fields: dict[str, tuple[int, str]], size: int) -> np.dtype[Any]:
+    offsets, formats = zip(*fields.values(), strict=True)
+    return np.dtype(
+        {"names": list(fields), "formats": formats, "offsets": offsets, "itemsize": size}
+    )
+
+
+_HEADER: Final = _layout(_FIELDS, 102)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel's scale: value = slope * count + intercept, in `unit`; its rate divisor."""
+    """How a channel's counts are to be understood.
+
+    Parameters
+    ----------
+    number
+        The channel as printed on the box, where it is written; its place, where it was read.
+    slope, intercept
+        value = slope * count + intercept for counts of 14 bits; the slope of a HiRes file is four
+        times the step, as if the two low bits were not there.
+    unit
+        At most five letters of Latin-1 reach a file.
+    range_volts
+        Full scale of the input, for WinDaq's page of gains; ``None`` where it is no voltage.
+    annotation
+        A text that WinDaq shows beside the trace.
+    divisor
+        The channel stands in the scans that this divides.
+    """
 
     number: int
     slope: float
     intercept: float
     unit: str
-    divisor: int
+    range_volts: float | None = None
+    annotation: str = ""
+    divisor: int = 1
+
+
+@dataclass(frozen=True)
+class Event:
+    """Before which scan; how many whole seconds after the opening, where given; comment."""
+
+    scan: int
+    stamp_s: int | None
+    comment: str = ""
 
 
 @dataclass(frozen=True)
 class WindaqHeader:
-    """The fields that decoding needs; sizes in bytes, times in seconds."""
+    """The fields that decoding needs, sizes in bytes; `told` holds them all as in the file."""
 
+    told: Any
     size: int
     channels: tuple[Channel, ...]
     data_bytes: int
     event_bytes: int
-    annotation_bytes: int
     interval_s: float
-    opened: int
     hires: bool
     packed: bool
     circular: bool
-    next_write: int
-    wrapped: bool
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
 
     @property
     def scans(self) -> int:
@@ -78,109 +127,89 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     InputError
         When the file is a WinDaq file, and damaged beyond repair.
     """
-    ours = place.suffix.lower() in SUFFIXES
+
+    def damaged(what: str, remedy: str = "give another copy") -> InputError:
+        return InputError(place, what, remedy)
+
+    suffix = place.suffix.lower()
     size, notes = _size(data)
     if not size:
-        if not ours:
+        if suffix not in SUFFIXES:
             raise NotThisFormatError("the mark 0x8001 at the end of a WinDaq header is missing")
-        raise InputError(
-            place,
+        raise damaged(
             "this is no WinDaq file, or its header is damaged (the mark 0x8001 is missing)",
             "open and save it in WinDaq, or give another copy",
         )
-    word = struct.unpack_from("<H", data, 0)[0]
-    count = word & (0x1F if size <= 1536 else 0xFF)
-    table, entry = data[4], data[5]
-    if not count or table + count * entry > size - 2 or entry < 36:
-        raise InputError(
-            place,
-            f"the WinDaq header is damaged ({count} channels of {entry} bytes at {table})",
-            "give another copy",
+    told = np.frombuffer(data, _HEADER, 1)[0]
+    count = int(told["channels"]) & (0x1F if size <= 1536 else 0xFF)
+    table, entry = int(told["table"]), int(told["entry"])
+    if not count or table + count * entry > size - 2 or entry < _ENTRY:
+        raise damaged(
+            f"the WinDaq header is damaged ({count} channels of {entry} bytes at {table})"
         )
-    interval = struct.unpack_from("<d", data, 28)[0]
-    if not (isfinite(interval) and 1e-7 < interval < 1e6):
+    interval = float(told["interval_s"])
+    if not 1e-7 < interval < 1e6:
         if options.sample_rate is None:
-            raise InputError(
-                place,
+            raise damaged(
                 f"the WinDaq header is damaged (sample interval {interval:g} s)",
                 "give the true rate with --sample-rate",
             )
         notes.append(f"the sample interval in the header ({interval:g} s) can't be true")
         interval = 1.0 / options.sample_rate
-    compression = struct.unpack_from("<i", data, 44)[0]
-    if compression < 1:
-        # WinDaq itself refuses such a file, by its byte 44.
-        notes.append(f"the header's compression of the display ({compression}) can't be true")
-    flags = struct.unpack_from("<H", data, 100)[0]
-    state = data[65] >> 6
-    circular = size == 1536 or place.suffix.lower() in (".wdc", ".whc")
-    low, high = struct.unpack_from("<HH", data, 56)
-    header = WindaqHeader(
-        size=size,
-        channels=tuple(_channel(data, table + i * entry, i) for i in range(count)),
-        data_bytes=struct.unpack_from("<I", data, 8)[0],
-        event_bytes=struct.unpack_from("<I", data, 12)[0],
-        annotation_bytes=struct.unpack_from("<H", data, 16)[0],
-        interval_s=interval,
-        opened=struct.unpack_from("<i", data, 36)[0],
-        hires=bool(flags & _HIRES),
-        packed=bool(flags & _PACKED),
-        circular=circular,
-        next_write=low | high << 16,
-        wrapped=circular and state == 2,
-    )
-    for channel in header.channels:
-        # (Infinities and NaN fail the comparisons as well.)
-        if not (0.0 < abs(channel.slope) < _LARGEST_SCALE > abs(channel.intercept)):
-            raise InputError(
-                place,
-                f"the scale of channel {channel.number} is damaged ({channel.slope:g})",
-                "give another copy",
-            )
-    # A scan without a word would let a damaged header claim any number of scans.
-    if header.packed and min(channel.divisor for channel in header.channels) > 1:
-        raise InputError(
-            place, "no channel of this packed file is in every scan", "give another copy"
-        )
-    promised = place.suffix.lower() in (".wdh", ".whc")
-    if ours and promised != header.hires:
-        kind = "HiRes" if header.hires else "14-bit"
+    if told["compression"] < 1:  # WinDaq itself refuses such a file, by its byte 44
         notes.append(
-            f"the header is that of {kind}, the name {place.suffix} is not: the header is believed"
+            f"the header's compression of the display ({told['compression']}) can't be true"
         )
-    return replace(header, notes=tuple(notes))
+    channels: list[Channel] = []
+    for each in np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table):
+        # DOS wrote the degree sign as byte 0xF8, which is another letter today.
+        unit = each["unit"].split(b"\0")[0].decode("latin-1").strip().replace("ø", "°")
+        slope, intercept = float(each["slope"]), float(each["intercept"])
+        number, divisor = len(channels) + 1, max(int(each["divisor"]), 1)
+        # (Infinities and NaN fail the comparisons as well.)
+        if not (0.0 < abs(slope) < _LARGEST_SCALE > abs(intercept)):
+            raise damaged(f"the scale of channel {number} is damaged ({slope:g})")
+        channels.append(Channel(number, slope, intercept, unit, divisor=divisor))
+    hires, packed = bool(told["flags"] & _HIRES), bool(told["flags"] & _PACKED)
+    # A scan without a word would let a damaged header claim any number of scans.
+    if packed and min(channel.divisor for channel in channels) > 1:
+        raise damaged("no channel of this packed file is in every scan")
+    if suffix in SUFFIXES and (suffix in (".wdh", ".whc")) != hires:
+        notes.append(
+            f"the header is that of {'HiRes' if hires else '14-bit'}, the name {place.suffix} is"
+            " not: the header is believed"
+        )
+    return WindaqHeader(
+        told,
+        size,
+        tuple(channels),
+        int(told["data_bytes"]),
+        int(told["event_bytes"]),
+        interval,
+        hires,
+        packed,
+        circular=size == 1536 or suffix in (".wdc", ".whc"),
+        notes=tuple(notes),
+    )
 
 
 def _size(data: bytes) -> tuple[int, list[str]]:
-    """Find the header's size: as stated, or by the mark."""
-    if len(data) < 1156:
+    """Find the header's size: as stated, or by the mark; 0 where there is none."""
+    if len(data) < _HEADER_BYTES:
         return 0, []
-
-    def marked(size: int) -> bool:
-        return 110 < size <= len(data) and struct.unpack_from("<H", data, size - 2)[0] == _MARK
-
-    stated = struct.unpack_from("<h", data, 6)[0]
-    if marked(stated):
-        return stated, []
-    for size in _SIZES:
-        if marked(size) and data[4] == 110 and data[5] == 36:
-            return size, [f"the header's own size ({stated}) is damaged: {size} bytes by its mark"]
+    stated = int(np.frombuffer(data, _HEADER, 1)["size"][0])
+    usual = _SIZES if data[4:6] == bytes((_TABLE, _ENTRY)) else ()
+    for size in (stated, *usual):
+        if size > _TABLE and data[size - 2 : size] == _MARK:
+            why = f"the header's own size ({stated}) is damaged: {size} bytes by its mark"
+            return size, [why] if size != stated else []
     return 0, []
 
 
-def _channel(data: bytes, at: int, place: int) -> Channel:
-    slope, intercept = struct.unpack_from("<dd", data, at + 8)
-    unit = data[at + 24 : at + 30].split(b"\0")[0].decode("latin-1").strip()
-    # DOS wrote the degree sign as byte 0xF8, which is another letter today.
-    unit = unit.replace("ø", "°")
-    return Channel(place + 1, slope, intercept, unit, max(data[at + 31], 1))
-
-
-_COMMENT_FLAG: Final = -0x80000000
+_COMMENT: Final = 1 << 31
 _PAUSE: Final = 2.0
 """Stamps are whole seconds: less than this is no pause."""
 _GAP: Final = re.compile(r"gap (\d{1,9}\.\d{1,9}) s\b")
-_WORD: Final = struct.Struct("<i")
 _LONGEST_TEXT: Final = 1024
 _LONGEST_TAIL: Final = 4096
 """Bytes behind the samples of a recording with a damaged header; more is not sought."""
@@ -191,33 +220,10 @@ def gap_comment(missing_s: float) -> str:
     return f"gap {missing_s:.9f} s"
 
 
-@dataclass(frozen=True)
-class Event:
-    """An event: scan, its stamp (seconds after the opening, where given), comment."""
-
-    scan: int
-    stamp_s: int | None
-    comment: str
-
-
-@dataclass(frozen=True)
-class Trailers:
-    """Events in the order of the file, and a text for each channel."""
-
-    events: tuple[Event, ...]
-    annotations: tuple[str, ...]
-
-
 def parse_trailers(
-    data: bytes,
-    at: int,
-    event_bytes: int,
-    header: WindaqHeader,
-    scans: int,
-    *,
-    rising: bool = False,
-) -> Trailers | None:
-    """Read the trailers from byte `at`; ``None`` if what stands there can't be trailers.
+    data: bytes, at: int, header: WindaqHeader, *, rising: bool = False
+) -> tuple[list[Event], list[str]] | None:
+    """Read events, and a text for each channel, from byte `at`; ``None`` if there are none.
 
     With `rising` no two events may be at one scan: samples of zero would read as a list.
 
@@ -225,118 +231,81 @@ def parse_trailers(
     files), then a time stamp if the pointer is not negative, then a comment's place if the
     next integer has its top bit set.
     """
-    count = event_bytes // 4
-    if event_bytes % 4 or at + event_bytes > len(data):
+    texts_at = at + header.event_bytes
+    if header.event_bytes % 4 or texts_at > len(data):
         return None
-    texts_at = at + event_bytes
-    per_scan = len(header.channels) if header.hires else 1
+    per_scan, width = len(header.channels) if header.hires else 1, len(header.channels)
     events: list[Event] = []
-    place, last = 0, -1
+    last = -1
 
-    def word(place: int) -> int:
+    def word() -> int:
         # One by one: a damaged size may promise a list as long as the file.
-        return int(_WORD.unpack_from(data, at + 4 * place)[0])
+        nonlocal at
+        at += 4
+        return int(struct.unpack_from("<i", data, at - 4)[0])
 
-    while place < count:
-        pointer = word(place)
-        place += 1
+    while at < texts_at:
+        pointer = word()
         scan = abs(pointer) // per_scan
-        if not (last + rising <= scan <= scans):
+        if not (last + rising <= scan <= header.scans) or (pointer >= 0 and at >= texts_at):
             return None
-        stamp, comment = None, ""
-        if pointer >= 0:
-            if place >= count:
-                return None
-            stamp = word(place)
-            place += 1
+        stamp, comment, last = word() if pointer >= 0 else None, "", scan
         # Pointers end at the number of samples; what lies far below zero is a comment.
-        if place < count and word(place) < _COMMENT_FLAG // 2:
-            offset = word(place) & 0x7FFFFFFF
-            place += 1
-            if texts_at + offset >= len(data):
+        if at < texts_at and struct.unpack_from("<i", data, at)[0] < -_COMMENT // 2:
+            begin = texts_at + (word() & 0x7FFFFFFF)
+            if begin >= len(data):
                 return None
-            comment = _text(
-                data[texts_at + offset : texts_at + offset + _LONGEST_TEXT].split(b"\0", 1)[0]
-            )
+            comment = _decoded(data[begin : begin + _LONGEST_TEXT].split(b"\0", 1)[0])
         events.append(Event(scan, stamp, comment))
-        last = scan
-    width = len(header.channels)
     names = data[texts_at : texts_at + width * _LONGEST_TEXT].split(b"\0", width)[:width]
-    return Trailers(tuple(events), tuple(map(_text, names)))
+    return events, list(map(_decoded, names))
 
 
-def _text(text: bytes) -> str:
+def _decoded(text: bytes) -> str:
     """Turn a text of the file into one line."""
     return " ".join(text[:_LONGEST_TEXT].decode("latin-1").split())
 
 
-def _texts_from(data: bytes) -> int:
-    """Find the byte from which on there is nothing but printable signs and NULs."""
-    tail = np.frombuffer(data[-_LONGEST_TAIL:], dtype=np.uint8)
-    odd = np.flatnonzero((tail != 0) & (tail < 32) & ((tail < 9) | (tail > 13)) | (tail == 255))
-    return len(data) - len(tail) + (int(odd[-1]) + 1 if len(odd) else 0)
-
-
-def repaired(data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, Trailers] | None:
+def repaired(data: bytes, header: WindaqHeader) -> WindaqHeader | None:
     """Find sizes under which a file with damaged ones makes sense from end to end.
 
     The data size is sought among the header's with bits taken away (a bit that was set by
     damage is the commonest damage), then among all. The trailers it implies must read as
     events, then as texts to the end of the file.
     """
-    unit = 2 * len(header.channels)
+    unit, masks = 2 * len(header.channels), [0]
     available = len(data) - header.size
-    tail = available // unit * unit
-    texts_from = _texts_from(data)
-    sizes = [size for size in _submasks(header.data_bytes) if 0 < size <= available]
-    for size in (size for size in sizes if size % unit == 0):
-        found = _consistent(data, header, size, texts_from)
-        if found is not None:
-            return found
+    bits = [1 << place for place in range(32) if header.data_bytes >> place & 1]
+    for bit in bits if len(bits) <= 12 else []:
+        masks += [mask | bit for mask in masks]
+    # From here on there is nothing but printable signs and NULs.
+    tail = np.frombuffer(data[-_LONGEST_TAIL:], dtype=np.uint8)
+    odd = np.flatnonzero((tail != 0) & (tail < 32) & ((tail < 9) | (tail > 13)) | (tail == 255))
+    texts_from = len(data) - len(tail) + (int(odd[-1]) + 1 if len(odd) else 0)
+
+    def consistent(size: int) -> tuple[bool, int, WindaqHeader] | None:
+        """Try one data size: some length of the event list must leave texts to the end."""
+        at = header.size + size
+        # The last number of the list may end in NULs, which read as empty texts.
+        least = max(8, -(-(texts_from - at) // 4) * 4)
+        for events_in in sorted({8, least, least + 4, least + 8}, reverse=True):
+            end = at + events_in
+            if not texts_from <= end <= len(data) or data.count(0, end) < len(header.channels):
+                continue
+            changed = replace(header, data_bytes=size, event_bytes=events_in)
+            found = parse_trailers(data, at, changed, rising=True)
+            if found is not None and found[0]:
+                return found[0][0].stamp_s is not None, len(found[0]), changed
+        return None
+
+    likely = (size for size in sorted(masks, reverse=True) if 0 < size <= available)
+    first = next(filter(None, (consistent(size) for size in likely if size % unit == 0)), None)
     # A recording without comments ends a few hundred bytes after its samples. Part of an
     # event list reads as a list too: the one that begins with the start, else the longest.
-    tries = [
-        _consistent(data, header, size, texts_from)
-        for size in range(tail, max(tail - _LONGEST_TAIL, 0), -unit)
-    ]
-    found_all = [found for found in tries if found is not None]
-    return max(
-        found_all,
-        key=lambda found: (found[1].events[0].stamp_s is not None, len(found[1].events)),
-        default=None,
-    )
-
-
-def _submasks(value: int) -> list[int]:
-    """List the numbers that have no bit which `value` has not, largest first."""
-    bits = [bit for bit in range(32) if value >> bit & 1]
-    if len(bits) > 12:
-        return []
-    masks = [0]
-    for bit in bits:
-        masks += [mask | 1 << bit for mask in masks]
-    return sorted(masks, reverse=True)
-
-
-def _consistent(
-    data: bytes, header: WindaqHeader, size: int, texts_from: int
-) -> tuple[WindaqHeader, Trailers] | None:
-    """Try one data size: some length of the event list must leave texts to the end."""
-    at = header.size + size
-    rest = len(data) - at
-    # The last number of the list may end in NULs, which read as empty texts.
-    least = max(8, -(-(texts_from - at) // 4) * 4)
-    for event_bytes in sorted({8, least, least + 4, least + 8}, reverse=True):
-        if event_bytes > rest or at + event_bytes < texts_from:
-            continue
-        if data.count(0, at + event_bytes) < len(header.channels):
-            continue
-        changed = replace(header, data_bytes=size, event_bytes=event_bytes)
-        scans = size // (2 * len(header.channels))
-        trailers = parse_trailers(data, at, event_bytes, header, scans, rising=True)
-        if trailers is not None and trailers.events:
-            return changed, trailers
-    return None
+    end = available // unit * unit
+    others = range(end, max(end - _LONGEST_TAIL, 0), -unit) if first is None else ()
+    found = [first, *map(consistent, others)]
+    return max(filter(None, found), key=lambda each: each[:2], default=(False, 0, None))[2]
 
 
 def scan_times(
@@ -349,8 +318,7 @@ def scan_times(
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
     known to a second. A comment of `gap_comment` gives it exactly, where the stamp agrees.
     """
-    steps = np.zeros(scans)
-    notes = []
+    steps, notes = np.zeros(scans), []
     lag, since = 0.0, 0.0
     for event in events:
         if event.stamp_s is None or not 0 < event.scan < scans:
@@ -366,20 +334,8 @@ def scan_times(
         else:
             missing = 0.0
         steps[event.scan] += missing
-        lag += missing
-        since = event.stamp_s
+        lag, since = lag + missing, event.stamp_s
     return np.arange(scans, dtype=np.float64) * header.interval_s + np.cumsum(steps), notes
-
-
-def markers(events: Sequence[Event], time_s: FloatArray) -> tuple[Marker, ...]:
-    """Turn events into markers of the recording."""
-    last = len(time_s) - 1
-    return tuple(
-        Marker(event.scan, float(time_s[min(event.scan, last)]), event.comment) for event in events
-    )
-
-
-_ENOUGH: Final = 32
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -395,71 +351,63 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     InputError
         When it is one, and damaged beyond repair.
     """
-    header = parse_header(place, data, options)
-    header, trailers, notes = _checked(place, data, header)
-    raw = np.frombuffer(data, dtype="<i2", count=_words(header), offset=header.size)
-    counts = _counts(header, raw)
-    scans = max(map(len, counts))
-    events = trailers.events if trailers else ()
-    time, pauses = scan_times(header, scans, events)
-    names = trailers.annotations if trailers else ()
+    header, notes = _checked(place, data, parse_header(place, data, options))
+    at = header.size + 2 * _words(header)
+    events, names = (parse_trailers(data, at, header) if header.event_bytes else None) or ([], [])
+    counts = _counts(header, np.frombuffer(data, "<i2", _words(header), header.size))
+    time, pauses = scan_times(header, max(map(len, counts)), events)
+    packed = ["packed: channels have rates of their own"] if header.packed else []
     columns = [
-        _column(header, channel, counts[place], time, names[place] if place < len(names) else "")
-        for place, channel in enumerate(header.channels)
+        _column(header, channel, raw, time, name)
+        for channel, raw, name in zip(
+            header.channels, counts, names or [""] * len(counts), strict=False
+        )
     ]
-    if header.packed:
-        notes.append("packed: channels have rates of their own")
-    metadata = {}
-    if header.opened > 0:
-        opened = dt.datetime.fromtimestamp(header.opened, dt.UTC)
-        metadata["recorded_at"] = opened.isoformat()
+    opened = int(header.told["opened"])
     return Table(
         place=place,
         format="windaq" + "-hires" * header.hires + "-circular" * header.circular,
         columns=tuple(columns),
-        markers=markers(events, time),
-        metadata=metadata,
-        notes=(*header.notes, *notes, *pauses),
+        markers=tuple(
+            Marker(event.scan, float(time[min(event.scan, len(time) - 1)]), event.comment)
+            for event in events
+        ),
+        metadata={"recorded_at": dt.datetime.fromtimestamp(opened, dt.UTC).isoformat()}
+        if opened > 0
+        else {},
+        notes=(*header.notes, *notes, *packed, *pauses),
     )
 
 
-def _checked(
-    place: Path, data: bytes, header: WindaqHeader
-) -> tuple[WindaqHeader, Trailers | None, list[str]]:
-    """Make the sizes in the header agree with the file, and read what follows the samples."""
+def _checked(place: Path, data: bytes, header: WindaqHeader) -> tuple[WindaqHeader, list[str]]:
+    """Make the sizes in the header agree with the file; no events where they are damaged."""
     available = len(data) - header.size
     unit = 2 * len(header.channels)
     at = header.size + 2 * _words(header)
+    seen = f"data size {header.data_bytes} in a file of {len(data)} bytes"
     if header.data_bytes and at <= len(data) and header.data_bytes % unit == 0:
-        trailers = parse_trailers(data, at, header.event_bytes, header, header.scans)
-        notes = [] if trailers else ["the list of events is damaged: no markers"]
-        if trailers and at + header.event_bytes + header.annotation_bytes > len(data):
-            notes.append(
-                f"the header's size of the annotations ({header.annotation_bytes}) is wrong"
-            )
-        return header, trailers, notes
+        if parse_trailers(data, at, header) is None:
+            return replace(header, event_bytes=0), ["the list of events is damaged: no markers"]
+        texts = int(header.told["annotation_bytes"])
+        wrong = at + header.event_bytes + texts > len(data)
+        return header, [f"the header's size of the annotations ({texts}) is wrong"] * wrong
     found = repaired(data, header)
     if found is not None:
-        header_found, trailers = found
-        note = (
-            f"the header is damaged (data size {header.data_bytes} in a file of {len(data)} bytes):"
-            f" repaired to {header_found.scans} scans, which agree with the trailers"
-        )
-        return header_found, trailers, [note]
+        return found, [
+            f"the header is damaged ({seen}): repaired to {found.scans} scans, which agree with"
+            " the trailers"
+        ]
     if header.data_bytes > 64 * max(available, 1) or available < unit:
         raise InputError(
             place,
-            f"the WinDaq header is damaged (data size {header.data_bytes} in a file of"
-            f" {len(data)} bytes) and nothing in the file tells the true one",
+            f"the WinDaq header is damaged ({seen}) and nothing in the file tells the true one",
             "repair it with the vendor's tool, or give another copy",
         )
-    whole = available // unit * unit
+    whole, left = available // unit * unit, available % unit
     cause = "is still being written" if not header.data_bytes else "is cut short"
     note = f"the file {cause}: {whole // unit} whole scans are there (of {header.scans} promised)"
-    left = available - whole
     return (
-        replace(header, data_bytes=whole),
-        None,
+        replace(header, data_bytes=whole, event_bytes=0),
         [note + (f"; {left} byte(s) of a part scan left out" if left else "")],
     )
 
@@ -475,13 +423,12 @@ def _counts(header: WindaqHeader, raw: IntArray) -> list[IntArray]:
     """Part the interleaved words into channels, oldest first."""
     if header.packed:
         divisors = np.array([channel.divisor for channel in header.channels])
-        due = np.arange(header.scans)[:, None] % divisors == 0
-        owner = np.nonzero(due)[1]
+        owner = np.nonzero(np.arange(header.scans)[:, None] % divisors == 0)[1]
         return [raw[owner == place] for place in range(len(divisors))]
     scans = raw.reshape(-1, len(header.channels))
-    if header.wrapped:
-        scans = np.roll(scans, -(header.next_write % len(scans)), axis=0)
-    return [scans[:, place] for place in range(scans.shape[1])]
+    if header.circular and header.told["shown"][1] >> 6 == 2:  # it has gone round
+        scans = np.roll(scans, -(int(header.told["next_write"]) % len(scans)), axis=0)
+    return list(scans.T)
 
 
 def _column(
@@ -490,25 +437,99 @@ def _column(
     """Scale one channel."""
     slope = channel.slope * (0.25 if header.hires else 1.0)
     whole = raw if header.hires else raw >> 2
-    counts = whole.astype(np.float64)
-    ladder = _unused_low_bits(whole)
-    ends = (-32768, 32768 - ladder) if header.hires else (-8192, 8192 - ladder)
-    limits = sorted(slope * end + channel.intercept for end in ends)
+    # A 12-bit converter in a 16-bit word never sets the lowest four bits. (A few samples may all
+    # be even by chance.)
+    used = int(np.bitwise_or.reduce(whole)) if len(whole) >= 32 else 1
+    ladder = used & -used or 1
+    half = 32768 if header.hires else 8192
+    limits = sorted(slope * end + channel.intercept for end in (-half, half - ladder))
     return Column(
         name=name or f"channel {channel.number}",
         unit=channel.unit,
-        values=counts * slope + channel.intercept,
+        values=whole.astype(np.float64) * slope + channel.intercept,
         number=channel.number,
-        time_s=time[:: channel.divisor][: len(counts)] if header.packed else time,
+        time_s=time[:: channel.divisor][: len(whole)] if header.packed else time,
         resolution=abs(slope) * ladder,
         limits=(limits[0], limits[1]),
     )
 
 
-def _unused_low_bits(counts: IntArray) -> int:
-    """Return 2^k when the low k bits are never set: a 12-bit converter in a 16-bit word has k = 4.
+_FULL_SCALE_MILLIVOLTS: Final = (5000, 10_000, 2500, 2048, 1280, 500_000, 1_000_000)
+_GAINS: Final = (1, 2, 5, 10, 50, 100, 500, 1000, 4, 8, 20, 200, 10_000, 100_000, 40, 80)
 
-    1 for a few samples, which may all be even by chance.
+
+def pack(
+    counts: IntArray,
+    channels: Sequence[Channel],
+    interval_s: float,
+    *,
+    opened: int = 0,
+    closed: int = 0,
+    events: Sequence[Event] = (),
+) -> bytes:
+    """Put a HiRes file (.WDH) together.
+
+    Parameters
+    ----------
+    counts
+        Signed 16-bit counts, shape (scans, channels).
+    channels
+        One for each column of `counts`.
+    interval_s
+        Seconds between scans.
+    opened, closed
+        Seconds since 1970 (UTC); 0 where they are not known.
+    events
+        In the order of their scans; without one at scan 0, which is always there.
+
+    Returns
+    -------
+    bytes
+        Header (1156 bytes), interleaved little-endian words, list of events, annotations,
+        comments.
     """
-    used = int(np.bitwise_or.reduce(counts)) if len(counts) >= _ENOUGH else 1
-    return used & -used or 1
+    scans, width = counts.shape
+    texts = b"".join(_encoded(channel.annotation) for channel in channels)
+    # Pointers count samples, not scans: so in the vendor's HiRes sample of two channels. (The
+    # vendor's own control counts scans. For one channel both are the same.)
+    words = [0, 0] if not events or events[0].scan else []
+    comments = b""
+    for event in events:
+        words += [event.scan * width, event.stamp_s or 0]
+        if event.comment:  # its place counts from the annotations' first byte
+            words.append(_COMMENT | len(texts) + len(comments))
+            comments += _encoded(event.comment)
+    listed = np.array(words, "<u4").tobytes()
+    header = bytearray(_HEADER_BYTES)
+    header[-2:] = _MARK
+    sizes = 2 * scans * width, len(listed), len(texts)
+    # Screen in lines and points, cursor in the middle; one time window, a window a channel; not
+    # compressed. Event markers, grid and annotations shown; no window chosen.
+    screen, windows, shown = (400, 640, 0), (1, 1, min(width, 16), 0), (0xD7, 0x07, 0xFF, 0x30)
+    moments = interval_s, opened, closed
+    np.frombuffer(header, _HEADER, 1)[0] = (
+        *(width, 1, _TABLE, _ENTRY, _HEADER_BYTES, *sizes, screen, windows, *moments),
+        *(1, 0, shown, range(32), _HIRES),
+    )
+    entries = np.frombuffer(header, _layout(_ENTRY_FIELDS, _ENTRY), width, _TABLE)
+    for place, channel in enumerate(channels):
+        unit, gain = channel.unit.encode("latin-1", "replace")[:5], _gain(channel.range_volts)
+        scale = 1.0, 0.0, channel.slope, channel.intercept
+        entries[place] = (*scale, unit, 1, channel.number, gain)
+    return bytes(header) + counts.astype("<i2").tobytes() + listed + texts + comments
+
+
+def _gain(range_volts: float | None) -> int:
+    """Say the input's full scale as a code of its millivolts (high nibble) and a gain (low)."""
+    codes = (
+        code << 4 | gain_code
+        for code, full_scale in enumerate(_FULL_SCALE_MILLIVOLTS)
+        for gain_code, gain in enumerate(_GAINS)
+        if range_volts is not None and np.isclose(full_scale / gain, 1000.0 * range_volts)
+    )
+    return next(codes, 1 << 4)
+
+
+def _encoded(text: str) -> bytes:
+    """Encode a text as WinDaq has it: Latin-1, ended by a NUL."""
+    return text.replace("\0", " ").encode("latin-1", "replace") + b"\0"

@@ -16,8 +16,7 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
 from pendpipe.formats.plain import markers_of
-from pendpipe.formats.windaq import gap_comment
-from pendpipe.formats.windaq_write import MOST_SAMPLES, WrittenChannel, WrittenEvent, pack
+from pendpipe.formats.windaq import MOST_SAMPLES, Channel, Event, gap_comment, pack
 from pendpipe.recording import SUSPECT, Recording, write_plain
 
 _UNEVEN: Final = 0.25
@@ -167,7 +166,7 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         )
     slope, intercept, counts, notes = _scaled(recording, values)
     number = recording.metadata.get("channel", "1")
-    channel = WrittenChannel(
+    channel = Channel(
         number=int(number) if number.isdecimal() and 0 < int(number) < 32 else 1,
         slope=slope,
         intercept=intercept,
@@ -226,7 +225,7 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
     return 4.0 * step, intercept, counts.astype(np.int64), [note]
 
 
-def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> list[WrittenEvent]:
+def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> list[Event]:
     """Gather pauses, markers and the starts of suspect stretches, in the order of scans."""
     time_s = recording.time_s[rows]
     by_scan: dict[int, list[str]] = {}
@@ -243,7 +242,7 @@ def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> 
         for scan in np.flatnonzero(starts).tolist():
             by_scan.setdefault(scan, []).append("suspect")
     return [
-        WrittenEvent(scan, round(float(time_s[scan] - time_s[0])), _joined(comments))
+        Event(scan, round(float(time_s[scan] - time_s[0])), _joined(comments))
         for scan, comments in sorted(by_scan.items())
     ]
 
