@@ -81,6 +81,8 @@ def test_an_exponent_is_no_unit_where_a_cell_is_empty(read_as: Callable[..., Rec
         (",", '"', str.maketrans("", "")),
         (";", "", str.maketrans(",.", ".,")),
         (";", "", str.maketrans(",", "'")),
+        (";", "", str.maketrans(",.", "\N{NARROW NO-BREAK SPACE},")),
+        (";", "", str.maketrans(",", "\N{THIN SPACE}")),
     ],
 )
 def test_signs_between_thousands(

@@ -27,6 +27,8 @@ from pendpipe.formats.options import ReadOptions
 from pendpipe.formats.table import Column, NotThisFormatError, Table
 
 _CONTROLS: Final = bytes([*range(1, 9), *range(14, 27)])
+_BLANKS: Final = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{FIGURE SPACE}\N{THIN SPACE}"
+"""What is typeset between thousands; without them whatever splits at blanks splits a number."""
 _WIDEST: Final = 64
 """Cells that a row may have, however narrow the others are; else at most four times theirs."""
 _LARGEST: Final = 512 << 20
@@ -63,7 +65,9 @@ def _unified(text: str) -> str:
     for wrong in "°µ²³":  # UTF-8 that a program took for Windows-1252, and wrote anew
         text = text.replace(f"Â{wrong}", wrong)
     text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    return text.replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", " ")
+    for blank in _BLANKS:
+        text = text.replace(blank, " ")
+    return text.replace("\N{MINUS SIGN}", "-")
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
