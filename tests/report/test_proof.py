@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 from markupsafe import Markup
 
-from pendpipe.report.page import render
-from pendpipe.report.proof import proof
-from pendpipe.report.vector import Room
+from pendpipe.report.page import Room, proof, render
 
 SVG = '<?xml version="1.0"?><svg viewBox="0 0 9 9"><path id="p" d="M 0 0 L 9 9"/></svg>'
 
@@ -137,8 +135,8 @@ def test_a_figure_beyond_the_budget_is_left_out(scored: Path) -> None:
     whole, poor = proof(scored, ample), proof(scored, Room(100))
     assert whole is not None
     assert poor is not None
-    assert [type(figure.svg) for figure in whole.figures] == [Markup]
-    assert [type(svg) for svg in whole.cases] == [Markup]
+    assert [type(figure["svg"]) for figure in whole["figures"]] == [Markup]
+    assert [type(svg) for svg in whole["cases"]] == [Markup]
     assert ample.left < 10_000 - 100
-    assert poor.figures == []
-    assert poor.cases == [None]
+    assert poor["figures"] == []
+    assert poor["cases"] == [None]

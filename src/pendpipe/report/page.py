@@ -7,21 +7,25 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any, Final
 
 from markupsafe import Markup
 
 from pendpipe.analysis.fit.result import read_fit
+from pendpipe.figures.data import number
+from pendpipe.files import read_json, without_folders
+from pendpipe.quantities import compact
 from pendpipe.report import remarks
-from pendpipe.report.captions import CAPTIONS, GLOSSARY
-from pendpipe.report.diagnoses import diagnoses
+from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
 from pendpipe.report.headline import headline
-from pendpipe.report.health import CHI2_RANGE
-from pendpipe.report.proof import proof
-from pendpipe.report.records import Line, Table, table_of_records
-from pendpipe.report.vector import Room
+from pendpipe.report.records import CHI2_RANGE, Column, Health, table_of_records
 from pendpipe.templates import render as fill_template
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -62,7 +66,7 @@ def render(
     """
     entries = list(comparison["records"])
     has_theory = bool(comparison.get("has_theory"))
-    table = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
+    columns, lines = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
     room = Room(BUDGET_BYTES)
     drawn = {
         name: svg
@@ -70,7 +74,7 @@ def render(
         if (svg := room.drawing(figures / f"{name}.svg", name, words.title, words.shows))
     }
     room.left -= _RESERVE_BYTES + _RECORD_BYTES * len(entries)
-    decays, outside = _decays(folder, table.lines, room)
+    decays, outside = _decays(folder, lines, room)
     proven = proof(challenge, room)
     asked = configuration.get("diagnose") or {}
     names = [str(entry["record"]) for entry in entries if asked.get("enabled", True)]
@@ -83,24 +87,24 @@ def render(
         rows=headline(comparison, configuration.get("simulated") or {}),
         figures=drawn,
         captions=CAPTIONS,
-        table=table,
+        columns=columns,
         diagnosed=diagnoses(folder, names, room),
         asked=asked,
         proof=proven,
-        records=table.lines,
-        counts=_counts(table.lines),
+        records=lines,
+        counts=Counter(line["health"][:3] for line in lines),
         chi2_range=CHI2_RANGE,
         decays=decays,
         outside=outside,
         glossary=GLOSSARY,
         provenance=comparison.get("provenance") or {},
-        downloads=_downloads(table, summary),
-        **_own_files(),
+        downloads=_downloads(columns, lines, summary),
+        **own_files(),
         **remarks.of_campaign(comparison, list(drawn), folder),
     )
 
 
-def _own_files() -> dict[str, str]:
+def own_files() -> dict[str, str]:
     """The package's own style and script; the policy names the script by its hash."""
     script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
     return {
@@ -126,22 +130,21 @@ def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
     return [path for path in files if path.is_file()]
 
 
-def _decays(folder: Path, table: list[Line], room: Room) -> tuple[dict[str, Markup], list[str]]:
+def _decays(
+    folder: Path, lines: list[dict[str, Any]], room: Room
+) -> tuple[dict[str, Markup], list[str]]:
     """Each record's decay figure while there is room, and the records beyond it."""
-    decays: dict[str, Markup] = {}
-    outside: list[str] = []
-    for line in table:
-        path = folder / line.name / "figures" / "decay.svg"
-        if line.refused or not path.is_file():
-            continue
+    drawn = {
         # The prefix is a number: a record's name need not be an identifier.
-        words = f"{CAPTIONS['decay'].shows} Record {line.name}."
-        svg = room.drawing(path, line.anchor, f"Decay of {line.name}", words)
-        if svg is None:
-            outside.append(line.name)
-        else:
-            decays[line.name] = svg
-    return decays, outside
+        name: room.drawing(
+            path, line["anchor"], f"Decay of {name}", f"{CAPTIONS['decay'].shows} Record {name}."
+        )
+        for line in lines
+        if not line["refused"]
+        and (path := folder / (name := line["name"]) / "figures" / "decay.svg").is_file()
+    }
+    decays = {name: svg for name, svg in drawn.items() if svg is not None}
+    return decays, [name for name in drawn if name not in decays]
 
 
 def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
@@ -154,26 +157,25 @@ def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
     }
 
 
-def _counts(table: list[Line]) -> list[tuple[str, str, str, int]]:
-    """How many records stand in each state that occurs: word, symbol, colour, number."""
-    found = [(line.health.word, line.health.symbol, line.health.colour) for line in table]
-    return [(*state, found.count(state)) for state in dict.fromkeys(found)]
-
-
-def _downloads(table: Table, summary: Content) -> dict[str, str]:
+def _downloads(
+    columns: list[Column], lines: list[dict[str, Any]], summary: Content
+) -> dict[str, str]:
     """Files inside the page, as data addresses: they can be saved without a script."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    names = [f"{c.head} ({c.unit})" if c.unit else c.head for c in table.columns]
+    names = [f"{c.head} ({c.unit})" if c.unit else c.head for c in columns]
     pairs = [name for head in names for name in (head, f"sd of {head}")]
     writer.writerow(["record", "fit", "fluid", "branch", *pairs])
-    for line in table.lines:
-        numbers = [text for cell in line.cells for text in (cell.value, cell.sd)]
-        words = [line.name, line.health.word, line.fluid, line.branch]
+    for line in lines:
+        numbers = [text for cell in line["cells"] for text in (cell.value, cell.sd)]
+        words = [line["name"], line["health"].word, line["fluid"], line["branch"]]
         writer.writerow([*map(_no_formula, words), *numbers])
     return {
-        "records.csv": _data_address("text/csv", stream.getvalue()),
-        "campaign.json": _data_address("application/json", json.dumps(summary, indent=1)),
+        name: f"data:{kind};base64,{base64.b64encode(text.encode()).decode()}"
+        for name, kind, text in (
+            ("records.csv", "text/csv", stream.getvalue()),
+            ("campaign.json", "application/json", json.dumps(summary, indent=1)),
+        )
     }
 
 
@@ -182,5 +184,169 @@ def _no_formula(text: str) -> str:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
-def _data_address(kind: str, text: str) -> str:
-    return f"data:{kind};base64,{base64.b64encode(text.encode()).decode()}"
+VERDICTS: Final = {
+    "consistent": Health("consistent", "✔", "good", "the noise explains what the model leaves"),
+    "missing-physics": Health("missing physics", "▲", "look", "something was left out"),
+    "not-analysable": Health("not analysable", "○", "none", "there is no diagnosis"),
+}
+"""How each verdict is shown."""
+
+
+def diagnoses(folder: Path, names: list[str], room: Room) -> list[dict[str, Any]]:
+    """Read every record's diagnosis; none where the campaign was not diagnosed.
+
+    Parameters
+    ----------
+    folder
+        The campaign's results.
+    names
+        Of the records.
+    room
+        What the page has left for figures.
+    """
+    found = []
+    for index, name in enumerate(names, start=1):
+        place, anchor = folder / name / "diagnosis", f"diagnosis-{index}"
+        if not (place / "diagnosis.json").is_file():
+            continue
+        content = read_json(place / "diagnosis.json")
+        figure = None
+        if content["verdict"] == "missing-physics":
+            words = f"{CAPTIONS['residual_map'].shows} Record {name}."
+            title = f"Residual of {name} before and after"
+            figure = room.drawing(place / "residual_map.svg", anchor, title, words)
+        models = (content["baseline"], content["improved"])[: 2 if content["effects"] else 1]
+        parameters = content["baseline"]["parameters"] or {}
+        unit = str((parameters.get("amplitude") or {}).get("unit", "rad"))
+        noise, p_value = number(content["noise_rms_rad"]), number(content["p_value"])
+        found.append(
+            {
+                "name": name,
+                "anchor": anchor,
+                "light": VERDICTS[content["verdict"]],
+                "p_value": f"{p_value:.2g}" if math.isfinite(p_value) else "–",
+                "effects": [_effect(effect) for effect in content["effects"]],
+                "residual": _steps(models, "residual_rms_rad", partial(compact, unit=unit)),
+                "noise": compact(noise, unit) if math.isfinite(noise) else "–",
+                "chi2": _steps(models, "chi2_per_dof", _three_digits),
+                "statement": without_folders(str(content["statement"])),
+                "figure": figure,
+            }
+        )
+    return found
+
+
+def _steps(models: Sequence[Mapping[str, Any]], name: str, printed: Callable[[float], str]) -> str:
+    """What is known of each model, one after the other."""
+    known = [value for model in models if math.isfinite(value := number(model[name]))]
+    return " → ".join(map(printed, known)) or "–"
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:.3g}" if value < 1e4 else f"{value:.0f}"
+
+
+def _effect(effect: Mapping[str, Any]) -> str:
+    """An effect with its probability and what it can't be distinguished from."""
+    rest = ", ".join(
+        f"{other['id']} {100.0 * other['probability']:.0f} %"
+        for other in effect["indistinguishable_from"]
+    )
+    chance = number(effect["probability"])
+    own = f"{effect['id']} {100.0 * chance:.0f} %" if math.isfinite(chance) else str(effect["id"])
+    return f"{own} (or {rest})" if rest else own
+
+
+KEPT: Final = {
+    True: Health("kept", "✔", "good", "what was promised came out"),
+    False: Health("not kept", "▲", "look", "less came out than was promised"),
+    None: Health("not judged", "○", "none", "too few items to judge"),
+}
+"""How each promise is shown."""
+
+
+def proof(folder: Path | None, room: Room) -> dict[str, Any] | None:
+    """Read a set's scores and figures; None where there is no scored set.
+
+    Parameters
+    ----------
+    folder
+        Where ``pendpipe challenge score`` has put ``scores.json`` and ``figures/``.
+    room
+        What the page has left for figures.
+    """
+    if folder is None or not (folder / "scores.json").is_file():
+        return None
+    scores = read_json(folder / "scores.json")
+    promises = [(row["promise"], row["measured"], KEPT[row["kept"]]) for row in scores["promises"]]
+
+    def drawn(name: str, title: str, shows: str) -> Markup | None:
+        return room.drawing(folder / "figures" / f"{name}.svg", f"proof-{name}", title, shows)
+
+    figures = [
+        {"svg": svg, "caption": caption}
+        for name, caption in PROOF_CAPTIONS.items()
+        if (svg := drawn(name, caption.title, caption.shows)) is not None
+    ]
+    words = CAPTIONS["residual_map"]
+    cases = [
+        drawn(str(row["figure"]).removesuffix(".svg"), f"{words.title}: {row['item']}", words.shows)
+        if row.get("figure") and row["same_answer"]
+        else None
+        for row in scores["six_cases"]
+    ]
+    return {"scores": scores, "promises": promises, "figures": figures, "cases": cases}
+
+
+_DROPPED = re.compile(
+    r"<\?xml.*?\?>|<!DOCTYPE.*?>|<!--.*?-->|<metadata>.*?</metadata>"
+    r"|<style type=\"text/css\">.*?</style>",
+    re.DOTALL,
+)
+_NAME = re.compile(r'(\bid="|url\(#|href="#)([^")]+)')
+_COORDINATES = re.compile(r'( (?:d|x|y)=")([^"]*)')
+_DIGITS = re.compile(r"(\d+\.\d{2})\d+")
+
+
+def inline_svg(text: str, prefix: str, title: str, description: str) -> Markup:
+    """Return the SVG element of a file for use inside HTML.
+
+    Parameters
+    ----------
+    text
+        The file's content, as matplotlib writes it.
+    prefix
+        Set before every identifier, so that several figures in one page do not clash.
+    title, description
+        What a screen reader reads out: the name, and what the figure shows.
+    """
+    body = _DROPPED.sub("", text)
+    start = body.index("<svg")
+    head, _, rest = body[start:].partition(">")
+    box = re.search(r'viewBox="([^"]+)"', head)
+    rest = rest.replace("xlink:href", "href")
+    rest = _NAME.sub(lambda found: f"{found.group(1)}{prefix}-{found.group(2)}", rest)
+    # A hundredth of a point is finer than any screen or printer.
+    rest = _COORDINATES.sub(lambda found: found.group(1) + _DIGITS.sub(r"\1", found.group(2)), rest)
+    name, words = f"{prefix}-title", f"{prefix}-description"
+    opening = (
+        f'<svg class="figure" role="img" viewBox="{escape(box.group(1) if box else "")}"'
+        f' aria-labelledby="{name} {words}">'
+        f'<title id="{name}">{escape(title)}</title><desc id="{words}">{escape(description)}</desc>'
+    )
+    return Markup(opening + rest.strip())
+
+
+class Room:
+    """The bytes that a page has left for figures."""
+
+    def __init__(self, left: int) -> None:
+        self.left = left
+
+    def drawing(self, path: Path, prefix: str, title: str, description: str) -> Markup | None:
+        """Return a drawn SVG as `inline_svg` does; None where there is none, or no room for it."""
+        if not path.is_file():
+            return None
+        svg = inline_svg(path.read_text(encoding="utf-8"), prefix, title, description)
+        self.left -= len(svg.encode())
+        return svg if self.left > 0 else None

@@ -5,9 +5,6 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-
 from pendpipe.analysis.fit.summary import (
     LOSSES,
     WITHOUT_LAW,
@@ -18,8 +15,8 @@ from pendpipe.analysis.fit.summary import (
     small_period,
 )
 from pendpipe.quantities import compact, with_error
-from pendpipe.report.page import TEMPLATES
-from pendpipe.report.vector import inline_svg
+from pendpipe.report.page import inline_svg, own_files
+from pendpipe.templates import render as fill_template
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,16 +79,11 @@ def render_recording(
             for each in qualities(result)
         ]
     drawn = [("The decay with its fit", result.plot()), *figures]
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("recording.html").render(
-        name=name,
-        style=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
+    return fill_template(
+        "pendpipe.report",
+        "recording.html",
+        name_of_recording=name,
+        style=own_files()["style"],
         light=(result.light, *LIGHTS[result.light]),
         reason=result.light_reason,
         numbers=numbers,

@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 from pendpipe.figures.data import Entry, error, number
 from pendpipe.files import without_folders
 from pendpipe.quantities import compact, pretty_unit, with_error
-from pendpipe.report.health import Health, health
 
 
 class Column(NamedTuple):
@@ -44,45 +43,20 @@ class Cell(NamedTuple):
     sd: str
 
 
-class Line(NamedTuple):
-    """A row of the table, and the record's own section."""
-
-    name: str
-    anchor: str
-    health: Health
-    fluid: str
-    branch: str
-    frequency: str
-    cells: list[Cell]
-    facts: list[tuple[str, str]]
-    cuts: list[str]
-    warnings: list[str]
-    refused: str
-    sha256: str
-
-
-class Table(NamedTuple):
-    """The table of records: its columns of numbers and its lines."""
-
-    columns: list[Column]
-    lines: list[Line]
-
-    @property
-    def has_fluid(self) -> bool:
-        """Whether any record names its fluid."""
-        return any(line.fluid for line in self.lines)
-
-    @property
-    def has_branch(self) -> bool:
-        """Whether any record names its branch."""
-        return any(line.branch for line in self.lines)
-
-
-def table_of_records(entries: list[Entry], hashes: Mapping[str, str], *, has_theory: bool) -> Table:
+def table_of_records(
+    entries: list[Entry], hashes: Mapping[str, str], *, has_theory: bool
+) -> tuple[list[Column], list[dict[str, Any]]]:
     """Prepare every record, refused ones included, in the order of the table of records.
 
     A column that no record fills is left out. Beside a theory there is no room for the
     misfits, which then stand in each record's own section only.
+
+    Returns
+    -------
+    columns
+        Of numbers.
+    lines
+        Each a row of the table, and what the record's own section lists.
     """
     columns = [
         column._replace(unit=_common_unit(entries, column.quantity))
@@ -90,10 +64,28 @@ def table_of_records(entries: list[Entry], hashes: Mapping[str, str], *, has_the
         if any(_cell(column, entry).value for entry in entries)
         and not (has_theory and column.quantity in _MISFITS)
     ]
-    return Table(
-        columns,
-        [_line(entry, index, columns, hashes) for index, entry in enumerate(entries, start=1)],
-    )
+    lines = [
+        {
+            "name": str(entry["record"]),
+            "anchor": f"record-{index}",
+            "health": health(entry),
+            "fluid": entry.get("fluid") or "",
+            "branch": entry.get("branch") or "",
+            "frequency": _cell(COLUMNS[0], entry).text,
+            "cells": [_cell(column, entry) for column in columns],
+            "facts": [] if entry.get("refused") else list(_facts(entry)),
+            "cuts": [
+                f"{number(cut.get('start_s')):.4g} s to {number(cut.get('stop_s')):.4g} s:"
+                f" {cut.get('reason', '')}"
+                for cut in entry.get("cuts") or []
+            ],
+            "warnings": [str(warning) for warning in entry.get("warnings") or []],
+            "refused": without_folders(str(entry.get("refused") or "")),
+            "sha256": hashes.get(str(entry["record"]), ""),
+        }
+        for index, entry in enumerate(entries, start=1)
+    ]
+    return columns, lines
 
 
 def _common_unit(entries: list[Entry], quantity: str) -> str:
@@ -112,25 +104,6 @@ def _found(entry: Entry, quantity: str) -> Any:
         return entry.get(quantity)
     value = number((entry.get("misfit") or {}).get(quantity))
     return {"value": value, "unit": (entry.get("amplitude") or {}).get("unit", "rad")}
-
-
-def _line(entry: Entry, index: int, columns: list[Column], hashes: Mapping[str, str]) -> Line:
-    name = str(entry["record"])
-    refused = str(entry.get("refused") or "")
-    return Line(
-        name=name,
-        anchor=f"record-{index}",
-        health=health(entry),
-        fluid=entry.get("fluid") or "",
-        branch=entry.get("branch") or "",
-        frequency=_cell(COLUMNS[0], entry).text,
-        cells=[_cell(column, entry) for column in columns],
-        facts=[] if refused else list(_facts(entry)),
-        cuts=[_cut(cut) for cut in entry.get("cuts") or []],
-        warnings=[str(warning) for warning in entry.get("warnings") or []],
-        refused=without_folders(refused),
-        sha256=hashes.get(name, ""),
-    )
 
 
 def _cell(column: Column, entry: Entry) -> Cell:
@@ -193,10 +166,6 @@ def _facts(entry: Entry) -> Iterator[tuple[str, str]]:
             f" {number(entry.get('start_s')):.4g} s to {number(entry.get('stop_s')):.4g} s"
         ),
     )
-    yield from _noise(entry)
-
-
-def _noise(entry: Entry) -> Iterator[tuple[str, str]]:
     unit = (entry.get("amplitude") or {}).get("unit", "rad")
     pair = (number(entry.get("noise_rms_rad")), number(entry.get("residual_rms_rad")))
     if all(map(math.isfinite, pair)):
@@ -211,6 +180,68 @@ def _noise(entry: Entry) -> Iterator[tuple[str, str]]:
         yield "Misfit of the amplitudes (rms)", f"{own}; with linear damping alone {linear}"
 
 
-def _cut(cut: Mapping[str, Any]) -> str:
-    start, stop = number(cut.get("start_s")), number(cut.get("stop_s"))
-    return f"{start:.4g} s to {stop:.4g} s: {cut.get('reason', '')}"
+CHI2_RANGE: Final = (0.5, 2.0)
+"""Chi^2 per degree of freedom within which a fit is called ok."""
+
+
+class Health(NamedTuple):
+    """How a record's fit stands."""
+
+    word: str
+    symbol: str
+    colour: str
+    """A class of the style sheet."""
+    reason: str
+
+
+STATES: Final = {
+    "ok": ("✔", "good"),
+    "look": ("▲", "look"),
+    "failed": ("✖", "bad"),
+    "not run": ("○", "none"),
+}
+
+
+def health(entry: Mapping[str, Any]) -> Health:
+    """Judge one record of comparison.json.
+
+    ok
+        a, b, c and the frequency have values, and the misfit is what the noise explains.
+    look
+        They have values, but chi^2 per degree of freedom is outside `CHI2_RANGE`, or the
+        exponential losses came out as zero, so that no limiting Q exists.
+    failed
+        The fit has no finite values, or its law contradicts the decay (a red light).
+    not run
+        The record was refused, so nothing was fitted.
+    """
+    missing = [each for each in ("frequency", "a", "b", "c") if not _known(entry.get(each))]
+    chi2 = number(entry.get("chi2_per_dof"))
+    states = (
+        ("not run", entry.get("refused"), "refused"),
+        ("failed", missing, f"no value of {', '.join(missing)}"),
+        ("failed", entry.get("light") == "red", str(entry.get("light_reason"))),
+        ("look", not math.isfinite(chi2), "the fit's χ² is unknown"),
+        (
+            "look",
+            chi2 > CHI2_RANGE[1],
+            f"χ² per degree of freedom is {chi2:.3g}: the model misses something",
+        ),
+        (
+            "look",
+            chi2 < CHI2_RANGE[0],
+            f"χ² per degree of freedom is {chi2:.2g}: the noise is overestimated",
+        ),
+        (
+            "look",
+            not _known(entry.get("quality_factor_limit")),
+            "b came out as zero: there is no limiting Q",
+        ),
+        ("ok", True, "the noise explains the misfit"),
+    )
+    word, reason = next((word, reason) for word, holds, reason in states if holds)
+    return Health(word, *STATES[word], reason)
+
+
+def _known(quantity: Any) -> bool:
+    return math.isfinite(number(quantity))

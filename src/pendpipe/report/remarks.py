@@ -6,11 +6,11 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pendpipe.figures.data import Entry, error, number, used
 from pendpipe.quantities import with_error
-from pendpipe.report.health import STATES
+from pendpipe.report.records import STATES
 
 Comparison = Mapping[str, Any]
 
@@ -107,24 +107,7 @@ def _exponents(comparison: Comparison) -> Iterator[str]:
             )
 
 
-class Step(NamedTuple):
-    """A stage of the campaign and how it went."""
-
-    name: str
-    word: str
-    symbol: str
-    colour: str
-    remark: str
-
-
-class Warned(NamedTuple):
-    """A warning and the records that it concerns."""
-
-    text: str
-    records: list[str]
-
-
-def steps(comparison: Comparison, drawn: Sequence[str], folder: Path) -> list[Step]:
+def steps(comparison: Comparison, drawn: Sequence[str], folder: Path) -> list[dict[str, str]]:
     """The stages, done or not."""
     entries = comparison["records"]
     fitted = used(comparison)
@@ -137,52 +120,47 @@ def steps(comparison: Comparison, drawn: Sequence[str], folder: Path) -> list[St
         (folder / str(entry["record"]) / "diagnosis" / "diagnosis.json").is_file()
         for entry in entries
     )
-    return [
-        _step("acquire", bool(entries), f"{len(entries)} records{left}"),
-        _step(
-            "calibrate",
-            bool(calibration),
+    found = {
+        "acquire": (entries, f"{len(entries)} records{left}"),
+        "calibrate": (
+            calibration,
             "caliper run"
             if calibration
             else "no caliper run: records bring their own constant, or are in rad already",
         ),
-        _step(
-            "turning points",
-            bool(fitted),
+        "turning points": (
+            fitted,
             f"{sum(int(e.get('turning_points') or 0) for e in fitted)} found",
         ),
-        _step("fit a, b, c", bool(fitted), f"{len(fitted)} records"),
-        _step(
-            "separate (Eq. 17)",
-            bool(coefficient),
+        "fit a, b, c": (fitted, f"{len(fitted)} records"),
+        "separate (Eq. 17)": (
+            coefficient,
             "k from the benchmark in air" if coefficient else "no benchmark in air",
         ),
-        _step("compare (Eq. 16)", theory, "" if theory else "no apparatus is described"),
-        _step(
-            "diagnose",
-            bool(diagnosed),
+        "compare (Eq. 16)": (theory, "" if theory else "no apparatus is described"),
+        "diagnose": (
+            diagnosed,
             f"{diagnosed} records"
             if diagnosed
             else "not part of this run: pendpipe diagnose looks for physics left out",
         ),
-        _step("figures", bool(drawn), f"{len(drawn)} of the campaign"),
+        "figures": (drawn, f"{len(drawn)} of the campaign"),
+    }
+    return [
+        dict(zip(("symbol", "colour"), STATES["ok" if done else "not run"], strict=True))
+        | {"name": name, "word": "done" if done else "skipped", "remark": remark}
+        for name, (done, remark) in found.items()
     ]
 
 
-def _step(name: str, done: bool, remark: str) -> Step:
-    symbol, colour = STATES["ok" if done else "not run"]
-    return Step(name, "done" if done else "skipped", symbol, colour, remark)
-
-
-def grouped_warnings(entries: Sequence[Entry]) -> list[Warned]:
+def grouped_warnings(entries: Sequence[Entry]) -> list[tuple[str, list[str]]]:
     """Warnings that differ in their numbers only, listed once with all their records."""
-    groups: dict[str, Warned] = {}
+    groups: dict[str, tuple[str, list[str]]] = {}
     for entry in entries:
         for warning in entry.get("warnings") or []:
             key = re.sub(r"[-+]?\d[\d.e+-]*", "#", str(warning))
-            group = groups.setdefault(key, Warned(str(warning), []))
-            group.records.append(str(entry["record"]))
-    return sorted(groups.values(), key=lambda group: -len(group.records))
+            groups.setdefault(key, (str(warning), []))[1].append(str(entry["record"]))
+    return sorted(groups.values(), key=lambda group: -len(group[1]))
 
 
 def exponent_tables(comparison: Comparison) -> list[dict[str, Any]]:
