@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from pendpipe.figures.comparison import (
+from pendpipe.figures.campaign import (
     draw_fig03,
     draw_fig04,
     draw_fig05,

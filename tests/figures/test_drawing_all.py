@@ -12,8 +12,7 @@ import matplotlib as mpl
 import pytest
 
 from pendpipe.cli import main
-from pendpipe.figures.campaign import draw_all
-from pendpipe.figures.comparison import draw_fig03, draw_fig09
+from pendpipe.figures.campaign import draw_all, draw_fig03, draw_fig09
 from pendpipe.figures.data import read_decay
 from pendpipe.figures.decays import draw_decay
 from pendpipe.figures.style import save

@@ -1,6 +1,6 @@
 """Figures: the paper's for a campaign, and a record's decay and diagnosis.
 
-A figure of a campaign is a function, a row in `campaign` and a caption in
+A figure of a campaign is a function and a row in `campaign`, and a caption in
 `pendpipe.report.captions`; a figure of a diagnosis is a function, a row in `diagnosis` and
 its name below, where it can be read without matplotlib.
 """

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedFormatter
 
 from pendpipe.arrays import FloatArray
@@ -23,7 +22,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.lattice import find_lattice
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Diagnosis, FoundEffect
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import Outcome
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Evaluated
@@ -35,6 +34,7 @@ from pendpipe.figures.style import (
     INK,
     VERMILION,
     WIDTH_IN,
+    band,
     framed,
     key_above,
     plain_numbers,
@@ -80,11 +80,14 @@ class Shown:
         return NAMES.get(self.diagnosis.baseline_name, self.diagnosis.baseline_name)
 
     @property
-    def extended_name(self) -> str:
-        """For legends: what was added."""
-        found = [effect.identifier for effect in self.diagnosis.effects]
-        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-        return f"with {found[0]}{more}"
+    def models(self) -> list[tuple[str, Fit]]:
+        """The baseline and, where something was found, the extended model, named for legends."""
+        named = [(self.baseline_name, self.baseline)]
+        if self.extended is not None:
+            found = [effect.identifier for effect in self.diagnosis.effects]
+            more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+            named.append((f"with {found[0]}{more}", self.extended))
+        return named
 
     def residual(self, fit: Fit) -> FloatArray:
         """Readings minus model, NaN where a reading is masked; shape (n,)."""
@@ -123,8 +126,8 @@ def shown(outcome: Outcome) -> Shown:
     return Shown(outcome.diagnosis, found.data, found.noise, found.baseline, extended)
 
 
-Model = tuple[str, Fit, str]
-"""A model's name in the key, its fit and its colour."""
+COLOURS: Final = (VERMILION, BLUE)
+"""Of the baseline and of the extended model."""
 _CYCLES: Final = 4.0
 """Cycles at the end of the decay that are drawn with each reading."""
 
@@ -132,44 +135,30 @@ _CYCLES: Final = 4.0
 @styled
 def draw_decay(content: Shown) -> Figure:
     """Draw the amplitude's decay, the last cycles, and the residuals against time."""
-    models: list[Model] = [(content.baseline_name, content.baseline, VERMILION)]
-    if content.extended is not None:
-        models.append((content.extended_name, content.extended, BLUE))
     data, figure = content.data, Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
     decay, end, rest = figure.subplots(3, 1)
-    quantity = quantity_of(data.unit)
     values = np.where(data.weight > 0.0, data.values, np.nan)
     factor, unit = axis_unit(values, data.unit)
+    # The last cycles are where a wrong model is most out of phase.
+    last = data.time_s > data.time_s[-1] - _CYCLES * content.baseline.at.span.period_s
     decay.plot(data.time_s, factor * values, color=GREY, linewidth=0.4, label="readings")
-    for name, fit, colour in models:
-        middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
-        for side in (1.0, -1.0):
-            outline = factor * (middle + side * fit.at.sampled.amplitude)
-            label = name if side > 0.0 else None
-            decay.plot(data.time_s, outline, color=colour, linewidth=1.2, label=label)
-    decay.set_ylabel(f"{quantity} ({unit})")
-    key_above(decay, 3)
-    _draw_end(end, content, values, models)
-    end.set_ylabel(f"{quantity} ({unit})")
-    residuals = [content.residual(fit) for _, fit, _ in models]
+    end.plot(data.time_s[last], factor * values[last], "o", color=GREY, markersize=2.0)
+    residuals = [content.residual(fit) for _, fit in content.models]
     small, small_unit = axis_unit(np.stack(residuals), data.unit)
     rest.axhline(0.0, color=INK, linewidth=0.8)
-    for residual, (_, _, colour) in zip(residuals, models, strict=True):
+    for (name, fit), colour, residual in zip(content.models, COLOURS, residuals, strict=False):
+        middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
+        for side, label in ((1.0, name), (-1.0, None)):
+            outline = factor * (middle + side * fit.at.sampled.amplitude)
+            decay.plot(data.time_s, outline, color=colour, linewidth=1.2, label=label)
+        end.plot(data.time_s[last], factor * fit.at.reading[last], color=colour, linewidth=1.0)
         rest.plot(data.time_s, small * residual, ".", color=colour, markersize=1.5)
+    label = f"{quantity_of(data.unit)} ({unit})"
+    decay.set(ylabel=label)
+    key_above(decay, 3)
+    end.set(title="The last cycles", xlabel="Time (s)", ylabel=label)
     rest.set(xlabel="Time (s)", ylabel=f"Readings − model ({small_unit})")
     return figure
-
-
-def _draw_end(axes: Axes, content: Shown, values: FloatArray, models: list[Model]) -> None:
-    """Draw the last cycles, where a wrong model is most out of phase."""
-    time = content.data.time_s
-    factor, _ = axis_unit(values, content.data.unit)
-    last = time > time[-1] - _CYCLES * content.baseline.at.span.period_s
-    axes.plot(time[last], factor * values[last], "o", color=GREY, markersize=2.0)
-    for _, fit, colour in models:
-        axes.plot(time[last], factor * fit.at.reading[last], color=colour, linewidth=1.0)
-    axes.set_title("The last cycles")
-    axes.set_xlabel("Time (s)")
 
 
 PHASES: Final = 24
@@ -186,10 +175,7 @@ _COLOURS = LinearSegmentedColormap.from_list(
 @styled
 def draw_residual_map(content: Shown) -> Figure:
     """Draw mean residuals over their standard errors, the baseline's and the extended model's."""
-    models = [(content.baseline_name, content.baseline)]
-    if content.extended is not None:
-        models.append((content.extended_name, content.extended))
-    maps = [residual_map(content, fit) for _, fit in models]
+    maps = [residual_map(content, fit) for _, fit in content.models]
     largest = max([4.0] + [float(np.nanmax(np.abs(each))) for each in maps])
     norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
     height = 2.0 * len(maps) + 0.95
@@ -199,9 +185,20 @@ def draw_residual_map(content: Shown) -> Figure:
     margins = {"bottom": 0.46 / height, "top": 1.0 - 0.28 / height, "hspace": 0.28}
     margins |= {"left": 0.105, "right": right}
     figure, panels = framed(height, margins, len(maps), sharex=True, squeeze=False)
-    rows = panels[:, 0]
-    for axes, (name, fit), values in zip(rows, models, maps, strict=True):
-        image = _panel(axes, content, values, norm)
+    rows, time = panels[:, 0], content.data.time_s
+    for axes, (name, fit), values in zip(rows, content.models, maps, strict=True):
+        image = axes.imshow(
+            values,
+            norm=norm,
+            cmap=_COLOURS,
+            aspect="auto",
+            origin="lower",
+            interpolation="nearest",
+            extent=(float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
+        )
+        axes.grid(visible=False)
+        axes.set_yticks(np.linspace(0.0, 2.0 * math.pi, 5), ["0", "π/2", "π", "3π/2", "2π"])
+        axes.set_ylabel("Phase of the cycle", labelpad=1)
         rms = math.sqrt(float(np.nanmean(content.residual(fit) ** 2)))
         axes.set_title(f"{name}: residual {compact(rms, content.data.unit)} rms")
     rows[-1].set_xlabel("Time (s)")
@@ -213,30 +210,11 @@ def draw_residual_map(content: Shown) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, content: Shown, values: FloatArray, norm: AsinhNorm) -> AxesImage:
-    time = content.data.time_s
-    image = axes.imshow(
-        values,
-        norm=norm,
-        cmap=_COLOURS,
-        aspect="auto",
-        origin="lower",
-        interpolation="nearest",
-        extent=(float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
-    )
-    axes.grid(visible=False)
-    axes.set_yticks(
-        [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi, 2.0 * math.pi], ["0", "π/2", "π", "3π/2", "2π"]
-    )
-    axes.set_ylabel("Phase of the cycle", labelpad=1)
-    return image
-
-
 def _ticks(largest: float) -> list[float]:
     """Round numbers, both signs."""
     steps = [2.0, 4.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6]
     inside = [step for step in steps if step <= largest]
-    kept = inside[:: max(1, math.ceil(len(inside) / 4))]
+    kept = inside[:: math.ceil(len(inside) / 4)]
     return sorted([-step for step in kept] + [0.0] + kept)
 
 
@@ -276,24 +254,23 @@ _HARMONICS: Final = 8
 @styled
 def draw_residual_spectrum(content: Shown) -> Figure:
     """Draw the amplitude spectral density of what each model leaves."""
-    frequency, baseline = spectrum(content, content.baseline)
-    curves = [(content.baseline_name, baseline, VERMILION, 1.3)]
-    if content.extended is not None:
-        extended = spectrum(content, content.extended)[1]
-        curves.append((content.extended_name, extended, BLUE, 0.8))
-    level = noise_level(content, frequency)
-    factor, unit = axis_unit(
-        np.array([float(np.max(each)) for _, each, _, _ in curves]), content.data.unit
-    )
+    spectra = [spectrum(content, fit) for _, fit in content.models]
+    frequency, level = spectra[0][0], noise_level(content, spectra[0][0])
+    highest = float(max(np.max(density) for _, density in spectra))
+    factor, unit = prefixed(highest, content.data.unit)
     figure, axes = framed(3.3, {"bottom": 0.14, "top": 0.8})
-    for name, density, colour, width in curves:
+    looks = zip(content.models, spectra, COLOURS, (1.3, 0.8), strict=False)
+    for (name, _), (_, density), colour, width in looks:
         axes.plot(frequency, factor * density, color=colour, linewidth=width, label=name)
     axes.plot(frequency, factor * level, color=INK, linestyle="--", linewidth=1.1, label="noise")
-    axes.set(xscale="log", yscale="log", xlabel="Frequency (Hz)")
-    axes.set_ylabel(f"Residual, density ({unit}/√Hz)")
-    axes.set_xlim(float(frequency[0]), float(frequency[-1]))
-    lowest = 0.1 * float(np.min(level))
-    axes.set_ylim(factor * lowest, 2.0 * factor * max(float(np.max(each[1])) for each in curves))
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="Frequency (Hz)",
+        ylabel=f"Residual, density ({unit}/√Hz)",
+        xlim=(float(frequency[0]), float(frequency[-1])),
+        ylim=(0.1 * factor * float(np.min(level)), 2.0 * factor * highest),
+    )
     for axis in (axes.xaxis, axes.yaxis):
         plain_numbers(axis)
     axes.tick_params(which="minor", length=0)
@@ -324,17 +301,6 @@ def _mark_harmonics(axes: Axes, content: Shown) -> None:
             )
 
 
-def even_residual(content: Shown, fit: Fit) -> FloatArray:
-    """The residual at even times: uneven readings are interpolated, masked ones bridged."""
-    residual = content.residual(fit)
-    known = np.isfinite(residual)
-    if content.data.uniform and known.all():
-        return residual
-    time = content.data.time_s
-    even = np.linspace(time[0], time[-1], len(time))
-    return np.interp(even, time[known], residual[known])
-
-
 def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     """Amplitude spectral density of a residual, in bands of equal ratio.
 
@@ -343,28 +309,27 @@ def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
     frequency_hz, density
         Shape (k,): in rad/sqrt(Hz) (one-sided, Hann's window), rms over each band.
     """
-    residual = even_residual(content, fit)
-    count = len(residual)
+    residual, time = content.residual(fit), content.data.time_s
+    known, count = np.isfinite(residual), len(residual)
     if count < 32:
         raise NothingToDrawError("there are too few readings for a spectrum")
-    time = content.data.time_s
+    if not (content.data.uniform and known.all()):
+        # Uneven readings are interpolated, masked ones bridged.
+        even = np.linspace(time[0], time[-1], count)
+        residual = np.interp(even, time[known], residual[known])
     interval = float(time[-1] - time[0]) / (count - 1)
     window = np.hanning(count)
-    lines = np.fft.rfft((residual - np.mean(residual)) * window)
-    density = np.asarray(2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2), dtype=np.float64)
-    frequency = np.fft.rfftfreq(count, interval)
-    return _banded(np.asarray(frequency[2:-1], dtype=np.float64), density[2:-1])
-
-
-def _banded(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means of the power over bands, so that a long record makes no black carpet."""
+    lines = np.fft.rfft((residual - np.mean(residual)) * window)[2:-1]
+    power = 2.0 * interval * np.abs(lines) ** 2 / np.sum(window**2)
+    frequency = np.fft.rfftfreq(count, interval)[2:-1]
+    # Means of the power over bands, so that a long record makes no black carpet.
     edges = np.geomspace(frequency[0], frequency[-1], _BANDS)
-    band = np.searchsorted(edges, frequency, side="right")
-    count = np.bincount(band, minlength=_BANDS + 1)
-    full = count > 0
-    mean = np.bincount(band, weights=density, minlength=_BANDS + 1)[full] / count[full]
-    place = np.bincount(band, weights=frequency, minlength=_BANDS + 1)[full] / count[full]
-    return place, np.sqrt(mean)
+    inside = np.searchsorted(edges, frequency, side="right")
+    number, middle, mean = (
+        np.bincount(inside, weights=of, minlength=_BANDS + 1) for of in (None, frequency, power)
+    )
+    full = number > 0
+    return middle[full] / number[full], np.sqrt(mean[full] / number[full])
 
 
 def noise_level(content: Shown, frequency: FloatArray) -> FloatArray:
@@ -374,6 +339,10 @@ def noise_level(content: Shown, frequency: FloatArray) -> FloatArray:
     known = np.arange(len(noise.variance)) / (2.0 * len(noise.variance) * interval)
     found = noise.rms**2 * np.interp(frequency, known, noise.variance) / np.mean(noise.variance)
     return np.sqrt(2.0 * interval * found)
+
+
+Curves = list[tuple[str, str, str, Spans]]
+"""Name, colour, dashes and spans of models."""
 
 
 @styled
@@ -424,16 +393,13 @@ def draw_frequency(content: Shown) -> Figure:
     return figure
 
 
-Curves = list[tuple[str, str, str, Spans]]
-"""Name, colour, dashes and spans of models."""
-
-
 def _models(content: Shown) -> Curves:
     """The baseline and the extended model."""
-    found = [(content.baseline_name, VERMILION, "--", content.of_model(content.baseline))]
-    if content.extended is not None:
-        found.append((content.extended_name, INK, "-", content.of_model(content.extended)))
-    return found
+    looks = ((VERMILION, "--"), (INK, "-"))
+    return [
+        (name, *look, content.of_model(fit))
+        for (name, fit), look in zip(content.models, looks, strict=False)
+    ]
 
 
 def _against_amplitude(
@@ -449,7 +415,16 @@ def _against_amplitude(
     points(axes, x, quantity(content.measured), sd, 3.2, elinewidth=0.7, label="readings")
     for name, colour, dashes, spans in curves:
         axes.plot(x, quantity(spans), color=colour, linestyle=dashes, label=name, linewidth=1.2)
-    _amplitude_axis(axes, x, unit)
+    axes.set_xlabel(f"Amplitude ({unit})")
+    fall = float(np.max(x)) / float(np.min(x))
+    if fall < 3.0:
+        return
+    axes.set_xscale("log")
+    few = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+    plain_numbers(
+        axes.xaxis, (1.0, 3.0) if fall > 100.0 else (1.0, 2.0, 5.0) if fall > 10.0 else few
+    )
+    axes.tick_params(which="minor", length=0)
 
 
 def _power(values: FloatArray) -> tuple[str, float]:
@@ -462,89 +437,68 @@ def _power(values: FloatArray) -> tuple[str, float]:
     return "10⁻⁶", 1e6
 
 
-def _amplitude_axis(axes: Axes, x: FloatArray, unit: str) -> None:
-    """Amplitude along the axis: logarithmic where it falls far."""
-    axes.set_xlabel(f"Amplitude ({unit})")
-    if float(np.max(x)) < 3.0 * float(np.min(x)):
-        return
-    axes.set_xscale("log")
-    decades = math.log10(float(np.max(x)) / float(np.min(x)))
-    between = (1.0, 3.0) if decades > 2.0 else (1.0, 2.0, 5.0)
-    few = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
-    plain_numbers(axes.xaxis, between if decades > 1.0 else few)
-    axes.tick_params(which="minor", length=0)
-
-
 @styled
 def draw_curve(content: Shown) -> Figure:
     """Draw the curve of each unnamed effect, one below the other."""
     unnamed = [effect for effect in content.diagnosis.effects if effect.curve is not None]
     if not unnamed:
         raise NothingToDrawError("every effect has a name")
-    rows = sum(2 if _exponents(effect) else 1 for effect in unnamed)
+    rows = sum(1 + ("local_exponent" in (effect.curve or {})) for effect in unnamed)
     height = 2.7 * rows
     margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
     figure, drawn = framed(height, margins, rows, squeeze=False)
     panels = iter(drawn[:, 0])
     for effect in unnamed:
-        panel = next(panels)
-        _curve(panel, effect)
+        panel, curve = next(panels), effect.curve or {}
+        at, argument = _scaled(curve["at"], curve["argument"])
+        _curve(panel, at, curve)
+        panel.set(xlabel=argument, xmargin=0.01)
         if not panel.get_legend():
             panel.set_title(effect.name[:1].upper() + effect.name[1:])
-        if _exponents(effect):
-            _exponent(next(panels), effect)
+        if "local_exponent" in curve:
+            panel = next(panels)
+            _exponent(panel, at, curve)
+            panel.set(xlabel=argument, xmargin=0.01)
     return figure
 
 
-def _exponents(effect: FoundEffect) -> bool:
-    return effect.curve is not None and "local_exponent" in effect.curve
-
-
-def _curve(axes: Axes, effect: FoundEffect) -> None:
-    assert effect.curve is not None
-    curve = effect.curve
-    at, argument = _scaled(curve["at"], curve["argument"])
-    sizes = [curve["value"], *([curve["quadrature"]] if "quadrature" in curve else [])]
-    largest = max(float(np.max(np.abs(size))) for size in sizes)
-    name, _, unit = str(curve["ordinate"]).replace("omega^2", "ω²").partition(", ")
-    factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
-    looks = [("value", "sd", BLUE, "-", "in phase" if len(sizes) > 1 else "")]
-    if len(sizes) > 1:
+def _curve(axes: Axes, at: FloatArray, curve: Mapping[str, Any]) -> None:
+    """Draw a curve, or its two parts: in phase and in quadrature."""
+    looks = [("value", "sd", BLUE, "-", "in phase")]
+    if "quadrature" in curve:
         looks.append(("quadrature", "quadrature_sd", GREEN, "--", "in quadrature"))
+    name, _, unit = str(curve["ordinate"]).replace("omega^2", "ω²").partition(", ")
+    largest = max(float(np.max(np.abs(curve[key]))) for key, *_ in looks)
+    factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
     axes.axhline(0.0, color=INK, linewidth=0.9)
     for key, sd, colour, dashes, label in looks:
-        value, half = factor * np.asarray(curve[key]), 1.96 * factor * np.asarray(curve[sd])
-        axes.fill_between(at, value - half, value + half, color=colour, alpha=0.22, linewidth=0.0)
-        axes.plot(at, value, color=colour, linestyle=dashes, label=label or None)
+        value = factor * np.asarray(curve[key])
+        band(axes, at, value, 1.96 * factor * np.asarray(curve[sd]), colour)
+        axes.plot(at, value, color=colour, linestyle=dashes, label=label)
     label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
-    axes.set(xlabel=argument, ylabel="\n".join(textwrap.wrap(label, 30)))
-    axes.margins(x=0.01)
-    if len(sizes) > 1:
+    axes.set_ylabel("\n".join(textwrap.wrap(label, 30)))
+    if len(looks) > 1:
         key_above(axes, 2)
 
 
-def _exponent(axes: Axes, effect: FoundEffect) -> None:
-    """The power of the velocity that the whole loss follows, by amplitude."""
-    assert effect.curve is not None
-    at, argument = _scaled(effect.curve["at"], effect.curve["argument"])
-    value = np.asarray(effect.curve["local_exponent"])
-    half = 1.96 * np.asarray(effect.curve["local_exponent_sd"])
-    axes.fill_between(at, value - half, value + half, color=BLUE, alpha=0.22, linewidth=0.0)
+def _exponent(axes: Axes, at: FloatArray, curve: Mapping[str, Any]) -> None:
+    """Draw the power of the velocity that the whole loss follows, by amplitude."""
+    value = np.asarray(curve["local_exponent"])
+    band(axes, at, value, 1.96 * np.asarray(curve["local_exponent_sd"]))
     axes.plot(at, value, color=BLUE)
     for power in (0, 1, 2):
         axes.axhline(power, color=INK, linewidth=0.6, linestyle=":")
-    axes.set(xlabel=argument, ylabel="Local exponent $n$ of |v|ⁿ")
+    axes.set_ylabel("Local exponent $n$ of |v|ⁿ")
     axes.set_ylim(max(float(np.min(value)) - 1.0, -2.0), min(float(np.max(value)) + 1.0, 5.0))
-    axes.margins(x=0.01)
 
 
-def _scaled(at: object, argument: str) -> tuple[np.ndarray, str]:
+def _scaled(at: object, argument: str) -> tuple[FloatArray, str]:
     """Arguments in a handy unit, and the axis's name."""
     values = np.asarray(at, dtype=np.float64)
     name, _, unit = argument.partition(", ")
-    factor, short = (1.0, unit)
+    factor, short = 1.0, unit
     if unit in ("rad", "m") and not name.startswith("phase"):
-        factor, short = prefixed(float(np.max(np.abs(values))), unit)
+        factor, short = axis_unit(values, unit)
     return factor * values, f"{name[:1].upper()}{name[1:]} ({short})"
 
 
