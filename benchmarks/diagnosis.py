@@ -82,7 +82,7 @@ def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
         found.noise,
         lead,
         held=outcome.beginning.held,
-        gross=is_gross(base, found.data),
+        phase_lost=is_gross(base, found.data),
         origin=outcome.beginning.value,
     )
     return [rival.fit for rival in rivals]

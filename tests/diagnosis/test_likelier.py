@@ -43,7 +43,7 @@ def having_taken(outcome: Outcome, name: str) -> Search:
         improved=fit,
         steps=(replace(step, rivals=(first, *rest)),),
         held=held,
-        named=found.named._replace(fit=fit),
+        named=fit,
     )
 
 

@@ -1,4 +1,4 @@
-"""Refits side by side: which are carried to the end."""
+"""Which effects are refitted, and which refits are carried to the end."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis.detect import Lead
-from pendpipe.diagnosis.evidence import Rival, of_one_class
-from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.refits import OF_A_CURVE, side_by_side, useful_chi2
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.detect import Detection, Lead
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, of_one_class
+from pendpipe.diagnosis.refine import pulled, refine
+from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads, side_by_side, useful_chi2
+from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 
-from .records import null_fit, stribeck_record
+from .records import INTERVAL_S, LINEAR, TIME_S, TRUTH, null_fit, prepared, stribeck_record, white
 
 
 @pytest.mark.parametrize("gain", [0.0, 20.0, 100.0, 400.0, 1e4])
@@ -37,8 +40,8 @@ def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
     base = refine(model.bare(), data, noise, truth[:-2])
     names = {"stribeck-friction": (float(truth[-1]),), "damping-drift": (100.0,)}
     leads = [Lead(by_identifier(name), shape, 0.0, 0.0) for name, shape in names.items()]
-    whole = side_by_side(base, data, noise, leads, (), gross=True)
-    near = side_by_side(base, data, noise, leads, (), gross=False)
+    whole = side_by_side(base, data, noise, leads, (), phase_lost=True)
+    near = side_by_side(base, data, noise, leads, (), phase_lost=False)
     for lead, fit in whole:
         assert fit is not None
         start = np.concatenate([base.value, [0.0], lead.shape])
@@ -51,3 +54,35 @@ def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
     assert best.chi2 == pytest.approx(whole[0][1].chi2, abs=1.0)
     assert rival.chi2 > best.chi2 + 50.0
     assert not rival.converged
+
+
+def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
+    """The result of a scan, with negligible p-values."""
+    leads = [
+        Lead(by_identifier(name), shape, score, 0.0) for name, (score, shape) in scores.items()
+    ]
+    return Detection(tuple(leads), 0.0, NO_SCAN)
+
+
+@pytest.mark.parametrize(("others", "at_a_bound"), [(LINEAR, True), (TRUTH, False)])
+def test_an_effect_whose_score_a_bound_halves_is_refitted(
+    others: FloatArray, at_a_bound: bool
+) -> None:
+    """A loss between b and a needs a negative c, which the score keeps at zero."""
+    power = by_identifier("power-law-damping")
+    truth = np.concatenate([others, [5e-4, 1.4, 1.0]])
+    readings = Model(TIME_S, INTERVAL_S, (power,)).reading(truth)
+    data, noise = prepared(readings + white(3))
+    base = refine(Model(TIME_S, INTERVAL_S), data, noise, others)
+    assert ({A, C} & set(pulled(base)) != set()) == at_a_bound
+    rivals = refit_leads(
+        base,
+        data,
+        noise,
+        _detection({"damping-drift": (100.0, (40.0,)), "power-law-damping": (50.0, (1.5, 0.0))}),
+        held=(),
+        phase_lost=False,
+        origin=base.value,
+    )
+    asked = {rival.identifier for rival in rivals}
+    assert ("power-law-damping" in asked) == at_a_bound

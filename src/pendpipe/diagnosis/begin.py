@@ -106,11 +106,19 @@ def begin(
     )
     value = with_parts(value, parts)
     data = _far_from_the_stop(data, value)
-    order = order_for(abs(angle), samples.unit)
-    data, model = _before_the_stop(data, value, order, parts)
-    at = model.evaluate(value)
+    model = Model(
+        data.time_s,
+        data.interval_s,
+        order=order_for(abs(angle), samples.unit),
+        fold=data.fold,
+        first_s=float(data.time_s[0]),
+        parts=parts,
+    )
+    data, model, at = _before_the_stop(data, model, value)
     if sine is not None:
-        data, model, at = _moving_with_sine(data, model, sine)
+        law = model.adding(by_identifier(SINE))
+        data, law, at = _before_the_stop(data, law, np.append(sine, 1.0))
+        model = model.at_times(data.time_s)
     data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
     return Beginning(data, model, value, held, data.noise_rms, points, sine)
@@ -125,20 +133,6 @@ def _values(named: FloatArray) -> FloatArray:
     return value
 
 
-def _moving_with_sine(data: Data, model: Model, sine: FloatArray) -> tuple[Data, Model, Evaluated]:
-    """Leave out readings at the end until the pendulum with the start values moves throughout."""
-    effect = by_identifier(SINE)
-    while True:
-        try:
-            return data, model, model.adding(effect).evaluate(np.append(sine, 1.0))
-        except NoMotionError:
-            keep = int(0.97 * len(data))
-            if keep < _FEWEST_READINGS:
-                raise
-            data = data.first(keep)
-            model = model.at_times(data.time_s)
-
-
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
     """Leave out readings whose amplitude is within a few widths of the Coulomb dead band."""
     rates = [max(float(value[k]), 0.0) for k in (A, B, C)]
@@ -151,28 +145,17 @@ def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
     return data.first(keep) if _FEWEST_READINGS < keep < len(data) else data
 
 
-def _before_the_stop(
-    data: Data, value: FloatArray, order: int, parts: Mapping[str, float]
-) -> tuple[Data, Model]:
+def _before_the_stop(data: Data, model: Model, value: FloatArray) -> tuple[Data, Model, Evaluated]:
     """Leave out readings at the end until the model with the start values moves throughout."""
     while True:
-        model = Model(
-            data.time_s,
-            data.interval_s,
-            order=order,
-            fold=data.fold,
-            first_s=float(data.time_s[0]),
-            parts=parts,
-        )
         try:
-            model.evaluate(value)
+            return data, model, model.evaluate(value)
         except NoMotionError:
-            keep = int(0.93 * len(data))
+            keep = int(0.97 * len(data))
             if keep < _FEWEST_READINGS:
                 raise
             data = data.first(keep)
-        else:
-            return data, model
+            model = model.at_times(data.time_s)
 
 
 def order_for(amplitude: float, unit: str) -> int:

@@ -46,7 +46,7 @@ def reconsider_red_noise(
     if other.p_value > level * CATALOGUE_SHARE:
         return
     rivals = refit_leads(
-        fit, data, noise, other, held=state.held, gross=False, most=3, origin=state.origin
+        fit, data, noise, other, held=state.held, phase_lost=False, most=3, origin=state.origin
     )
     if not rivals:
         return

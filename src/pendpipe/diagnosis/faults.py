@@ -17,7 +17,7 @@ from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import at_even_times
-from pendpipe.diagnosis.evidence import Rival, equivalent
+from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples
 from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
@@ -42,8 +42,6 @@ _CLEAN_CHI2: Final = 1.3
 """Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
 """Largest phase error in rad at which residuals reveal errors of the time stamps."""
-_CURVE_MARGIN: Final = 15.0
-"""Margin in chi^2 by which random kicks are preferred to a curve in time, which can follow them."""
 
 
 class Forensics:
@@ -214,13 +212,7 @@ class Forensics:
         finding, p_value = self._tested(name, state)
         if p_value > self.level:
             return False
-        worth = equivalent(p_value, finding.delta_chi2)
-        if rival.lead.effect.kind == "unnamed":
-            worth += _CURVE_MARGIN
-            if not state.steps:
-                # A large misfit: its p-value is extreme, and a curve can follow any random walk.
-                worth = max(worth, finding.delta_chi2 + _CURVE_MARGIN)
-        if worth < rival.evidence:
+        if finding.delta_chi2 < rival.gain - rival.charge:
             return False
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))

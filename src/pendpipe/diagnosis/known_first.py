@@ -51,16 +51,16 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
     fit = fitted_from(before.model, state, effect, start)
     if fit is None or not _leads(fit, before, effect, state):
         return
-    if state.first is None:
-        task.scanned(state)
-    state.settle(fit)
+    task.scanned(state)
+    assert state.now is not None
     task.progress("refitting what may imitate it")
-    fits = [(Lead(effect, (), before.chi2 - fit.chi2, 0.0), fit), *_imitated(state, effect, task)]
+    known = Lead(effect, (), before.chi2 - fit.chi2, 0.0), fit
+    fits = [known, *_imitated(fit, effect, state, task)]
     best = min((fit for _, fit in fits), key=lambda fit: fit.chi2)
     scale = Scale.of(best, state.data, state.noise)
     rivals = [Rival.of(lead, fit, before.chi2, scale, NO_SCAN) for lead, fit in fits]
-    assert state.now is not None
     state.steps.append(Step(tuple(rivals), state.now.p_value / CATALOGUE_SHARE, before))
+    state.settle(fit)
 
 
 def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
@@ -78,9 +78,9 @@ def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
     return worth + effect.prior > 0.0
 
 
-def _imitated(state: State, effect: Effect, task: Task) -> list[tuple[Lead, Fit]]:
+def _imitated(fit: Fit, effect: Effect, state: State, task: Task) -> list[tuple[Lead, Fit]]:
     """Refit what changes the readings as sin x does, each from the values that imitate it."""
-    fit, noise = state.fit, state.noise
+    noise = state.noise
     change = whitened(fit, noise, effect, [()])[0]
     others = applicable(task.catalogue, fit, task.baseline, state.data.unit)
     names = [other for other in others if other.kind == "dynamics" and other.sizes == 1]

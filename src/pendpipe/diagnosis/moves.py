@@ -107,7 +107,7 @@ def _drops(state: State) -> Iterator[Proposed]:
         effect = step.winner.lead.effect
         if isinstance(effect, ReleasedParameter):
             continue
-        without = fit_without(state, step)
+        without = _without(state, [step])
         if without is not None:
             others = tuple(other for other in state.steps if other is not step)
             yield Proposed(without, others, f"{effect.name} is no longer needed")
@@ -121,7 +121,8 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
     own = [step for step in state.steps if _is_further(step)]
     if own and not math.isinf(Scale.of(state.fit, state.data, state.noise).floor):
         own.remove(max(own, key=lambda step: step.winner.gain))
-    steady = [step for step in own if not (step.winner.lead.effect.local or _line(step))]
+    effects = [(step, step.winner.lead.effect) for step in own]
+    steady = [step for step, effect in effects if not (effect.local or effect.spectral)]
     tried: list[list[Step]] = []
     for replaced in (own, steady):
         if len(replaced) < 2 or replaced in tried or any(s.winner.drawn for s in state.steps):
@@ -147,17 +148,11 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         )
 
 
-def _line(step: Step) -> bool:
-    return step.winner.lead.effect.spectral
-
-
-def fit_without(state: State, step: Step) -> Fit | None:
-    """Fit the model without one effect; None where it has no such motion: the effect is needed."""
-    return _without(state, [step])
-
-
 def _without(state: State, steps: Sequence[Step]) -> Fit | None:
-    """Refit the model without some effects, from the present values and from the baseline's."""
+    """Refit the model without some effects, from the present values and from the baseline's.
+
+    None where it has no such motion: they are needed.
+    """
     model, value = state.fit.model, state.fit.value
     for step in steps:
         model, value = model.dropping(step.winner.lead.effect, value)
@@ -277,7 +272,7 @@ def _refitted_beside(
         state.noise,
         found,
         held=held,
-        gross=False,
+        phase_lost=False,
         most=most,
         origin=state.origin,
     )

@@ -54,17 +54,17 @@ def refit_leads(
     detection: Detection,
     *,
     held: Sequence[int],
-    gross: bool,
+    phase_lost: bool,
     origin: FloatArray,
     most: int = _MOST_REFITTED,
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
-    leads = _worth_refitting(detection, gross, most, wide=bool(pulled(base)))
+    leads = _worth_refitting(detection, phase_lost, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
-    for lead, fit in side_by_side(base, data, noise, leads, held, gross=gross):
+    for lead, fit in side_by_side(base, data, noise, leads, held, phase_lost=phase_lost):
         lost = base.max_phase_error_rad > LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
         # With the baseline's friction the motion may stop before the end.
-        if lost or (gross and fit is None):
+        if lost or (phase_lost and fit is None):
             fit = _better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
         if fit is not None and believable(base, fit, lead.effect):
             fits.append((lead, fit))
@@ -93,7 +93,7 @@ def _names_first(rivals: list[Rival]) -> list[Rival]:
     return sorted(rivals, key=order)
 
 
-def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -> list[Lead]:
+def _worth_refitting(detection: Detection, phase_lost: bool, most: int, wide: bool) -> list[Lead]:
     """Return the leads that may win, or be in the winner's class.
 
     There are more (`wide`) where the base has a value at its bound: the score keeps it there,
@@ -103,21 +103,21 @@ def _worth_refitting(detection: Detection, gross: bool, most: int, wide: bool) -
     if not leads:
         return []
     best = _rank(leads[0])
-    part = 0.9 if gross else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
+    part = 0.9 if phase_lost else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
     near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
-    if gross:
+    if phase_lost:
         near = near[: most + 2]
     else:
         # Curves lead in many misfits; they don't count in the number of named effects.
         names = [lead for lead in near if lead.effect.kind != "unnamed"]
         names = names[: most + _MORE_AT_BOUND if wide else most]
         near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
-    # Always refitted: parameters that the user holds (few), and in a gross misfit bearing friction
-    # and drag, which every pendulum has.
+    # Always refitted: parameters that the user holds (few), and where the phase is lost bearing
+    # friction and drag, which every pendulum has.
     asked = [
         lead
         for lead in leads
-        if isinstance(lead.effect, ReleasedParameter) or (gross and lead.effect.expected)
+        if isinstance(lead.effect, ReleasedParameter) or (phase_lost and lead.effect.expected)
     ]
     return [*near, *(lead for lead in asked if lead not in near)]
 
@@ -159,17 +159,17 @@ def side_by_side(
     leads: Sequence[Lead],
     held: Sequence[int],
     *,
-    gross: bool,
+    phase_lost: bool,
 ) -> list[tuple[Lead, Fit | None]]:
     """Refit each lead; None where that fails.
 
-    In a gross misfit all refits run to their end: an effect that explains a quarter may come
-    first, and gains still grow while a scale is far off.
+    Where the phase is lost all refits run to their end: an effect that explains a quarter may
+    come first, and gains still grow while a scale is far off.
     """
     # The winner is refined again when the noise is estimated from its residual.
-    little = SETTLED if gross or data.time_noise else _STALLED_GAIN
+    little = SETTLED if phase_lost or data.time_noise else _STALLED_GAIN
     refits = [_started(base, data, noise, lead, held, little) for lead in leads]
-    useful = math.inf if gross else _limit(base, data, noise, leads, refits)
+    useful = math.inf if phase_lost else _limit(base, data, noise, leads, refits)
     return [
         (lead, _finished(refit, useful) if refit else None)
         for lead, refit in zip(leads, refits, strict=True)

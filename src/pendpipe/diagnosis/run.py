@@ -22,6 +22,7 @@ from pendpipe.diagnosis.forensics.time_stamps import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import released_parameters
+from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
@@ -324,9 +325,9 @@ def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, .
 
 def _small_swings(found: Search) -> SmallSwings | None:
     """Compare the frequency at small amplitudes with the named effects' model, without curves."""
-    if not found.named.remainder.systematic:
+    if not remainder_of(found.named, found.data, found.noise).systematic:
         return None
-    swings = small_swings(found.named.fit, found.data, found.noise)
+    swings = small_swings(found.named, found.data, found.noise)
     return swings if swings is not None and swings.significant else None
 
 

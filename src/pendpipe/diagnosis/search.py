@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -42,13 +42,6 @@ _LESS_FRICTION: Final = (0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
 
-class Reviewed(NamedTuple):
-    """A model, and its remaining misfit."""
-
-    fit: Fit
-    remainder: Remainder
-
-
 @dataclass(frozen=True)
 class Search:
     """The result of a search.
@@ -76,7 +69,7 @@ class Search:
     remainder
         Misfit of the extended model beyond the noise.
     named
-        The model with the named effects only, without the curve for the rest: probabilities of
+        The fit with the named effects only, without the curve for the rest: probabilities of
         names refer to it.
     clock_notes
         What the tests of the time stamps found, a clause each.
@@ -93,7 +86,7 @@ class Search:
     detection: Detection
     held: tuple[int, ...]
     remainder: Remainder
-    named: Reviewed
+    named: Fit
     clock_notes: tuple[str, ...] = ()
 
 
@@ -139,15 +132,17 @@ def search(
     task = Task(catalogue, released, baseline, level, seed, forensics, progress)
     known_law_first(beginning, state, task)
     _grow(state, task)
-    named, remainder = _described(state, task)
+    named = _described(state, task)
+    remainder = remainder_of(state.fit, state.data, state.noise)
     forensics.after(state, progress)
+    improved = replace(state.fit, error_scale=remainder.error_scale)
     assert state.first is not None
     assert state.now is not None
     return Search(
         state.data,
         state.noise,
         _baseline_alone(state, beginning),
-        replace(state.fit, error_scale=remainder.error_scale),
+        improved,
         tuple(state.steps),
         tuple(state.faults),
         min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
@@ -155,7 +150,7 @@ def search(
         state.first,
         tuple(state.held),
         remainder,
-        named or Reviewed(state.fit, remainder),
+        named or improved,
         tuple(forensics.clock_notes),
     )
 
@@ -171,25 +166,18 @@ def _grow(state: State, task: Task) -> None:
         improve(state, task.progress)
 
 
-def _described(state: State, task: Task) -> tuple[Reviewed | None, Remainder]:
-    """Describe what the names leave by a curve.
-
-    Returns
-    -------
-    Reviewed or None
-        The model of the named effects alone, if a curve was added to it.
-    Remainder
-        Misfit of the final model.
-    """
+def _described(state: State, task: Task) -> Fit | None:
+    """Describe what the names leave by a curve; return the fit without it, if one was added."""
     remainder = remainder_of(state.fit, state.data, state.noise)
     task.scanned(state)
     if not remainder.systematic or _ends_with_curve(state):
-        return None, remainder
+        return None
     assert state.now is not None
-    named = Reviewed(replace(state.fit, error_scale=remainder.error_scale), remainder)
-    if describe(state, state.now.p_value / CATALOGUE_SHARE):
-        task.scanned(state)
-    return named, remainder_of(state.fit, state.data, state.noise)
+    named = replace(state.fit, error_scale=remainder.error_scale)
+    if not describe(state, state.now.p_value / CATALOGUE_SHARE):
+        return None
+    task.scanned(state)
+    return named
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
@@ -244,7 +232,7 @@ def _add_one(state: State, task: Task) -> bool:
         state.noise,
         found,
         held=state.held,
-        gross=loses_phase(state.fit),
+        phase_lost=loses_phase(state.fit),
         origin=state.origin,
     )
     if rivals:

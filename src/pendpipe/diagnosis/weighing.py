@@ -92,7 +92,8 @@ def beside(found: Search, effect: Effect) -> Search:
     if effect.kind == "unnamed":
         return found
     # A curve added to the named effects could imitate any of them.
-    return replace(found, improved=found.named.fit, remainder=found.named.remainder)
+    left = remainder_of(found.named, found.data, found.noise)
+    return replace(found, improved=found.named, remainder=left)
 
 
 def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
@@ -284,7 +285,7 @@ def swap_in_likelier(
         weighed = tuple(weigh(found, beginning, step) for step in found.steps)
         tried.append({effect.key for effect in found.improved.model.effects})
         # Names under a curve stay: their probabilities show how little they explain.
-        if found.named.fit.model is not found.improved.model:
+        if found.named.model is not found.improved.model:
             return found, weighed
         likelier = _with_a_likelier(found, weighed, tried)
         if likelier is None:
@@ -343,7 +344,7 @@ def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search 
         steps=_reordered(found.steps, number, effect),
         remainder=remainder,
         held=tuple(sorted(held)),
-        named=found.named._replace(fit=fit, remainder=remainder),
+        named=fit,
     )
 
 

@@ -1,0 +1,61 @@
+"""sin x is fitted first where the half swings ask for it, beside what imitates it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import silent
+from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
+from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.known_first import known_law_first
+from pendpipe.diagnosis.refine import misfit, refine
+from pendpipe.diagnosis.state import State, first_noise
+from pendpipe.diagnosis.task import Task
+from pendpipe.effects.baseline import OMEGA, START
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.model import Model
+
+from .records import INTERVAL_S, TIME_S, TRUTH, beginning_of, recording
+
+LARGE = np.array(TRUTH)
+LARGE[START] = 1.2 * np.sign(TRUTH[START])
+
+
+def swinging(*names: str) -> FloatArray:
+    effects = tuple(by_identifier(name) for name in names)
+    values = [1.0] * len(names)
+    return Model(TIME_S, INTERVAL_S, effects, order=20).reading(np.append(LARGE, values))
+
+
+def searched(readings: FloatArray) -> tuple[Beginning, State]:
+    record = recording(readings, 3)
+    begun = beginning_of(record)
+    noise = first_noise(begun)
+    fit = refine(begun.model, begun.data, noise, begun.value, held=begun.held)
+    state = State(fit, begun.data, noise, list(begun.held), begun.value, fit.value)
+    forensics = Forensics(prepare(record, "the test"), 0.01)
+    known_law_first(begun, state, Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent))
+    return begun, state
+
+
+def test_sin_x_leads_and_its_imitators_are_fitted_to_the_same_noise() -> None:
+    begun, state = searched(swinging("circular-error"))
+    (step,) = state.steps
+    assert step.winner.identifier == "circular-error"
+    assert "cubic-stiffness" in {rival.identifier for rival in step.rivals}
+    noise = first_noise(begun)
+    for rival in step.rivals:
+        left = misfit(rival.fit.model, begun.data, noise, rival.fit.value)
+        assert rival.gain == pytest.approx(step.before.chi2 - left)
+    assert state.fit.chi2 / state.data.used == pytest.approx(1.0, abs=0.1)
+    assert state.fit.value[OMEGA] == pytest.approx(LARGE[OMEGA], rel=1e-5)
+    assert step.before.max_phase_error_rad > LARGE_PHASE_ERROR
+
+
+def test_a_linear_torque_is_not_taken_for_a_pendulum() -> None:
+    begun, state = searched(swinging())
+    assert begun.sine is None
+    assert not state.steps
