@@ -42,4 +42,5 @@ rule all:
         # Whatever else is missing: Snakemake makes a lost file again only where a job that is
         # to run declares it.
         f"{RESULTS}/separation.json",
+        campaign_diagnosis(),
         of_every_record(),

@@ -44,6 +44,7 @@ COMMANDS: Final = {
 STAGES: Final = {
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
+    "diagnose-campaign": "what all records of a campaign together say is missing",
 }
 """Stages of a campaign that are commands themselves."""
 

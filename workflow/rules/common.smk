@@ -88,6 +88,13 @@ def diagnoses():
     return of_all_records("diagnosis/diagnosis.json") if asked else []
 
 
+def campaign_diagnosis():
+    """The diagnosis of all records together, where the campaign asks for one and has theory."""
+    asked = CAMPAIGN.configuration.diagnose.enabled
+    compared = CAMPAIGN.configuration.apparatus is not None
+    return [f"{RESULTS}/campaign_diagnosis.json"] if asked and compared else []
+
+
 def of_every_record():
     """All results of all records."""
     names = ["recording.csv", "calibration.json", "turning_points.csv", "fit.json"]

@@ -23,6 +23,7 @@ from pendpipe.physics.drag import (
     stokes_drag,
     viscous_quality_factor,
 )
+from pendpipe.physics.free_decay import cylinder_drag, free_decay_root, rotation_of_sphere
 from pendpipe.physics.friction import (
     DecayRates,
     QualityFactors,
@@ -100,12 +101,14 @@ __all__ = [
     "amplitude_rate",
     "bearing_friction_rate",
     "concentric_sphere",
+    "cylinder_drag",
     "damping_coefficient",
     "decay_rates",
     "displaced_moment",
     "driven_pendulum_acceleration",
     "energy_power_friction",
     "energy_power_quality_factor",
+    "free_decay_root",
     "harmonic_drag",
     "hysteretic_decrement_quality",
     "hysteretic_frequency_ratio",
@@ -125,6 +128,7 @@ __all__ = [
     "quality_factors",
     "rates_from_energy_constants",
     "restoring_torque",
+    "rotation_of_sphere",
     "sloshing_frequency",
     "sphere_between_planes",
     "sphere_in_tank",

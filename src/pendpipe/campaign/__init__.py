@@ -1,0 +1,1 @@
+"""A campaign as one measurement: all records' frequencies and losses from shared parameters."""

@@ -1,0 +1,377 @@
+"""What a campaign's model may lack: each an effect of its own, declared once by its function.
+
+A function takes the equation of motion of every record (`Terms`), or the inputs it is made of,
+and a size of shape (..., 1), and returns them with the effect in it; it may ask for the `design`,
+and for the `shape` where the effect has a discrete property (a branch, a mode's frequency).
+Patterns, fits and the statement follow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from inspect import signature
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.campaign.design import Design, Inputs
+from pendpipe.campaign.prediction import Terms
+from pendpipe.effects.effect import Parameter
+
+Acts = Callable[..., Any]
+Shapes = Sequence[Any] | Callable[[Design], Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class CampaignEffect:
+    """One thing that a campaign's model may lack.
+
+    Parameters
+    ----------
+    identifier, name, equation, text
+        As in the contract, in words, in LaTeX, and what it is.
+    parameter
+        Its size, with bounds.
+    expected
+        The standard deviation that its size has beforehand: it weighs the rivals of one class.
+    on
+        Whether it changes the inputs or the terms.
+    acts
+        The function.
+    shapes
+        The discrete shapes that are tried, or how they follow from a design.
+    """
+
+    identifier: str
+    name: str
+    equation: str
+    text: str
+    parameter: Parameter
+    expected: float
+    on: Literal["inputs", "terms"]
+    acts: Acts
+    shapes: Shapes = (None,)
+
+    def shapes_in(self, design: Design) -> Sequence[Any]:
+        """Return the shapes that are tried in a design."""
+        return self.shapes(design) if callable(self.shapes) else self.shapes
+
+    def put(self, what: Any, size: FloatArray, design: Design, shape: Any) -> Any:
+        """Return inputs or terms with the effect in them."""
+        given = {"design": design, "shape": shape}
+        asked = {name: given[name] for name in given if name in signature(self.acts).parameters}
+        return self.acts(what, size, **asked)
+
+
+CATALOGUE: Final[dict[str, CampaignEffect]] = {}
+"""All campaign effects by identifier, in the order of their declaration."""
+
+
+def campaign_effect(
+    on: Literal["inputs", "terms"],
+    identifier: str,
+    name: str,
+    equation: str,
+    parameter: Parameter,
+    expected: float,
+    shapes: Shapes = (None,),
+) -> Callable[[Acts], CampaignEffect]:
+    """Declare a campaign effect by the function through which it enters."""
+
+    def declare(function: Acts) -> CampaignEffect:
+        text = " ".join((function.__doc__ or "").split())
+        effect = CampaignEffect(
+            identifier, name, equation, text, parameter, expected, on, function, shapes
+        )
+        CATALOGUE[identifier] = effect
+        return effect
+
+    return declare
+
+
+@campaign_effect(
+    "terms",
+    "uniform-drag-excess",
+    "drag larger by one factor",
+    r"D \to (1 + \epsilon) D",
+    Parameter("excess", "", -0.5, 1.0),
+    0.1,
+)
+def uniform(terms: Terms, size: FloatArray) -> Terms:
+    """More wetted area than the sphere's.
+
+    Roughness thinner than the boundary layer, swollen wood, bubbles. Area, radius and lever
+    beyond their errors look the same.
+    """
+    factor = 1.0 + size
+    return replace(terms, steady=terms.steady * factor, history=terms.history * factor)
+
+
+@campaign_effect(
+    "terms",
+    "history-term",
+    "another history coefficient",
+    r"a/\delta \to C_H\, a/\delta",
+    Parameter("C_H - 1", "", -0.5, 1.0),
+    0.1,
+)
+def history(terms: Terms, size: FloatArray) -> Terms:
+    """The part of Eq. 2 that grows as the square root of the frequency, by itself."""
+    return replace(terms, history=terms.history * (1.0 + size))
+
+
+@campaign_effect(
+    "inputs",
+    "viscosity-temperature",
+    "a more viscous fluid than its temperature says",
+    r"\eta \to (1 + \epsilon)\, \eta(T)",
+    Parameter("viscosity_excess", "", -0.5, 1.0),
+    0.05,
+)
+def viscosity(inputs: Inputs, size: FloatArray) -> Inputs:
+    """A viscosity beyond the thermometer's error: what is dissolved, or a wrong temperature.
+
+    One kelvin is 2.4 % of water's viscosity at 20 C.
+    """
+    return replace(inputs, thicker=inputs.thicker + size)
+
+
+@campaign_effect(
+    "inputs",
+    "temperature-trend",
+    "a temperature that changes over the day",
+    r"T \to T + \dot T\, (t - \bar t)",
+    Parameter("change_over_the_day", "K", -15.0, 15.0),
+    1.0,
+)
+def trend(inputs: Inputs, size: FloatArray, design: Design) -> Inputs:
+    """A steady change of temperature in the order of the records."""
+    order = np.array([run.order for run in design.runs])
+    wet = design.wet > 0.0
+    order = order - order[wet].mean() if wet.any() else order
+    return replace(inputs, warmer_k=inputs.warmer_k + size * order)
+
+
+@campaign_effect(
+    "inputs",
+    "stem-drag",
+    "more of the screw under water",
+    r"D \mathrel{+}= 4 \pi \eta\, \ell\, z^2 (r/\delta + 1/2)",
+    Parameter("length", "m", 0.0, 0.1),
+    0.006,
+)
+def stem(inputs: Inputs, size: FloatArray) -> Inputs:
+    """The drag of a longer immersed part of the screw, a cylinder."""
+    return replace(inputs, screw_m=inputs.screw_m + size)
+
+
+def thin_layer_walls(closeness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Drag and added mass of a sphere in a concentric shell, over those without it.
+
+    ``K = (1 + s^4)/(1 - s^3)^2`` and ``C_m/(1/2) = (1 + 2 s^3)/(1 - s^3)`` for a boundary layer
+    that is thin beside the gap; s is the ratio of the radii and `closeness` is s^3.
+    """
+    drag = (1.0 + np.abs(closeness) ** (4.0 / 3.0)) / (1.0 - closeness) ** 2
+    return drag, (1.0 + 2.0 * closeness) / (1.0 - closeness)
+
+
+@campaign_effect(
+    "terms",
+    "wall-confinement",
+    "walls near the sphere",
+    r"a/\delta \to K a/\delta, \quad \tfrac12 \to C_m; \quad"
+    r" K = \frac{1 + s^4}{(1 - s^3)^2}, \quad C_m = \frac{1 + 2 s^3}{2 (1 - s^3)}",
+    Parameter("closeness", "", 0.0, 0.4),
+    0.05,
+)
+def walls(terms: Terms, size: FloatArray, design: Design) -> Terms:
+    """Walls and floor, as a shell about the sphere.
+
+    The fluid goes faster past it, so that drag and added mass grow together. The closeness is the
+    cube of radius over distance.
+    """
+    near = np.where([run.tank for run in design.runs], size, 0.0)
+    drag, mass = thin_layer_walls(near)
+    return replace(
+        terms,
+        history=terms.history * drag,
+        inertia=terms.inertia + 0.5 * (mass - 1.0) * terms.displaced,
+    )
+
+
+_ADDED_PER_DRAG = 0.6
+"""Added mass, in units of the displaced fluid, for each unit of drag that a wall adds."""
+
+
+@campaign_effect(
+    "terms",
+    "free-surface",
+    "a free surface that sloshes",
+    r"a/\delta \to (1 + \epsilon g)\, a/\delta, \quad g = \omega^2/(\omega_s^2 - \omega^2)",
+    Parameter("excess", "", -1.0, 2.0),
+    0.3,
+    (1.15, 1.28, 1.42),
+)
+def free_surface(terms: Terms, size: FloatArray, design: Design, shape: float) -> Terms:
+    """The response of the tank's first sloshing mode, which lies above the records.
+
+    Drag and added mass rise towards it.
+    """
+    open_surface = np.array([float(run.tank and run.open_surface) for run in design.runs])
+    omega2 = terms.angular_frequency**2
+    own = (2.0 * np.pi * shape) ** 2
+    more = size * open_surface * omega2 / np.maximum(own - omega2, 0.05 * own)
+    return replace(
+        terms,
+        history=terms.history * (1.0 + more),
+        inertia=terms.inertia + _ADDED_PER_DRAG * more * terms.displaced,
+    )
+
+
+@campaign_effect(
+    "terms",
+    "drag-law-transition",
+    "a drag between linear and quadratic",
+    r"b \mathrel{+}= \phi\, a\, y_0",
+    Parameter("share", "", -1.0, 1.0),
+    0.2,
+)
+def transition(terms: Terms, size: FloatArray, design: Design) -> Terms:
+    """A share of the quadratic drag at the release that a y^2 + b y puts into b.
+
+    It grows as the velocity, and falls with the amplitude of the release.
+    """
+    started = np.array([run.release_rad for run in design.runs])
+    started = np.where(np.isfinite(started), started, 0.068) * design.wet * design.spheres
+    omega = terms.angular_frequency
+    density, _ = design.fluids(terms.inputs.warmer_k)
+    radius, lever = terms.inputs.radius_m, terms.inputs.lever_m
+    # Eq. 13's a for C_d = 1/2: (4/(3 pi)) omega rho C_d pi R^2 L^3/(2 I), as a drag 2 I a y.
+    quadratic = 2.0 / 3.0 * omega * density * radius**2 * lever**3 * started
+    return replace(terms, steady=terms.steady + size * quadratic)
+
+
+@campaign_effect(
+    "terms",
+    "added-mass",
+    "another added mass",
+    r"\tfrac12 \to \tfrac12 + \Delta C_m",
+    Parameter("added_mass", "", -0.5, 20.0),
+    0.1,
+)
+def added_mass(terms: Terms, size: FloatArray) -> Terms:
+    """More fluid that swings along than the potential flow about a free sphere has."""
+    return replace(terms, inertia=terms.inertia + size * terms.displaced)
+
+
+@campaign_effect(
+    "terms",
+    "buoyancy",
+    "another buoyancy",
+    r"K \to K - \epsilon \rho g V L",
+    Parameter("excess", "", -0.5, 1.0),
+    0.02,
+)
+def buoyancy(terms: Terms, size: FloatArray, design: Design) -> Terms:
+    """A density of the fluid, or a displaced volume, beyond its error."""
+    lift = design.apparatus.gravity_m_per_s2 * terms.displaced / terms.inputs.lever_m
+    return replace(terms, torque=terms.torque - size * lift)
+
+
+@campaign_effect(
+    "inputs",
+    "hysteresis-inertia-scaling",
+    "a loss torque with another dependence on the inertia",
+    r"Q_h = k f^2 (I/I_0)^{1 - p}",
+    Parameter("exponent_excess", "", -3.0, 3.0),
+    1.0,
+)
+def inertia_scaling(inputs: Inputs, size: FloatArray) -> Inputs:
+    """Internal friction has Q_h = I omega^2/kappa''.
+
+    K f^2 only where the moment of inertia stays the same, or kappa'' grows with it.
+    """
+    return replace(inputs, inertia_exponent=inputs.inertia_exponent + size)
+
+
+@campaign_effect(
+    "inputs",
+    "hysteretic-damping",
+    "another loss torque in the fluid's assembly",
+    r"k \to k\, e^{-\epsilon} \text{ in the fluid}",
+    Parameter("log_ratio", "", -3.0, 3.0),
+    0.2,
+)
+def other_hysteresis(inputs: Inputs, size: FloatArray, design: Design) -> Inputs:
+    """The pendulum in the fluid is another assembly than the benchmark's, and loses otherwise."""
+    return replace(inputs, log_coefficient=inputs.log_coefficient - size * design.wet)
+
+
+@campaign_effect(
+    "inputs",
+    "air-drag-in-benchmark",
+    "the drag of the air",
+    r"D \mathrel{+}= \epsilon D_\mathrm{air}",
+    Parameter("share", "", -1.0, 30.0),
+    1.0,
+)
+def air_drag(inputs: Inputs, size: FloatArray) -> Inputs:
+    """Eq. 2 for weights and rod in the air, in the benchmark and above the water alike."""
+    return replace(inputs, air_drag=inputs.air_drag + size)
+
+
+@campaign_effect(
+    "terms",
+    "grease-drag",
+    "viscous friction in the bearing",
+    r"\tau = -\gamma \dot x",
+    Parameter("gamma", "N m s", 0.0, 1.0),
+    1e-4,
+)
+def grease(terms: Terms, size: FloatArray) -> Terms:
+    """A torque in proportion to the angular velocity, the same in every record."""
+    return replace(terms, steady=terms.steady + size)
+
+
+@campaign_effect(
+    "terms",
+    "support-loss",
+    "a support that takes energy along",
+    r"b \mathrel{+}= \beta f^3",
+    Parameter("beta", "s^2", 0.0, 1.0),
+    1e-3,
+)
+def support(terms: Terms, size: FloatArray) -> Terms:
+    """A stand that yields and rubs: its loss has 1/Q in proportion to f^2."""
+    frequency = terms.angular_frequency / (2.0 * np.pi)
+    return replace(terms, rate=terms.rate + size * frequency**3)
+
+
+def _branches_and_weights(design: Design) -> Sequence[Any]:
+    branches = [("branch", name) for name in dict.fromkeys(run.branch for run in design.runs)]
+    return [*branches, *(("weight", name) for name in design.weights)]
+
+
+@campaign_effect(
+    "terms",
+    "moment-of-inertia",
+    "a moment of inertia that was not counted",
+    r"I \to I + \Delta I",
+    Parameter("inertia", "kg m^2", -0.1, 0.1),
+    1e-3,
+    _branches_and_weights,
+)
+def moment_of_inertia(
+    terms: Terms, size: FloatArray, design: Design, shape: tuple[str, str]
+) -> Terms:
+    """The same in all records of one branch, or with one weight.
+
+    A clamp, the weight's own size.
+    """
+    what, name = shape
+    there = [
+        run.branch == name if what == "branch" else name in run.weights_m for run in design.runs
+    ]
+    return replace(terms, inertia=terms.inertia + size * np.array(there, dtype=np.float64))

@@ -1,0 +1,71 @@
+"""Diagnose a campaign as one measurement: what is missing from all its records together.
+
+Frequency and b of every record are fitted at once, with every uncertain input of the
+configuration as a nuisance. What Eq. 16 lacks is searched for in the catalogue of campaign
+effects. DIR is the campaign's folder of results; it gets campaign_diagnosis.json, and the answer
+goes to standard output as one paragraph.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from pendpipe.arguments import add, load, print_json
+from pendpipe.configuration.load import Campaign
+from pendpipe.files import write_json
+from pendpipe.manifest import job
+from pendpipe.provenance import code_version
+from pendpipe.stages.results import read_results, record_files
+from pendpipe.version import __version__
+
+FILE_NAME = "campaign_diagnosis.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``pendpipe diagnose-campaign``."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="the campaign's results")
+    add(parser, "--campaign", default=Path("config/config.yaml"))
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help=f"the answer; DIR/{FILE_NAME} by default"
+    )
+    add(parser, "--json")
+    parser.add_argument(
+        "--fail-on", choices=("missing-physics",), help="end with status 3 on that verdict"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose the campaign, write the result, and print the answer."""
+    campaign = load(arguments.campaign)
+    there = campaign.configuration.model_copy(update={"results": str(arguments.folder)})
+    campaign = Campaign(there, campaign.records)
+    out = arguments.out or arguments.folder / FILE_NAME
+    inputs = record_files(campaign, "fit.json", "calibration.json")
+    with job(campaign.folder, "diagnose-campaign", inputs=inputs, out=out) as running:
+        answer = diagnose_campaign(campaign)
+        write_json(out, answer)
+        running.outputs.append(out)
+    if arguments.json:
+        print_json(answer)
+    else:
+        print(answer["statement"])
+    return 3 if arguments.fail_on and answer["verdict"] == arguments.fail_on else 0
+
+
+def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
+    """Return the content of campaign_diagnosis.json."""
+    from pendpipe.campaign.answer import BASELINE, campaign_diagnosis
+    from pendpipe.campaign.diagnose import search
+    from pendpipe.stages.joint import campaign_data
+
+    provenance = {"version": __version__, "code": code_version(__name__)}
+    found = campaign_data(campaign, read_results(campaign))
+    if found is None:
+        from pendpipe.diagnosis.result import not_analysable
+
+        reason = "no record with a geometry swings with a sphere in a fluid"
+        return not_analysable(BASELINE, reason, provenance)
+    level = campaign.configuration.diagnose.level
+    return campaign_diagnosis(search(*found, level=level), provenance)

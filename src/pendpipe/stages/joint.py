@@ -1,0 +1,39 @@
+"""The records' fits as the data of one joint fit, and its numbers in the form of campaign.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pendpipe.campaign.design import Design, design_of
+from pendpipe.campaign.fit import Measured, measured
+from pendpipe.configuration.load import Campaign
+from pendpipe.stages.results import RecordResult
+
+
+def campaign_data(
+    campaign: Campaign, results: Sequence[RecordResult]
+) -> tuple[Design, Measured] | None:
+    """Design and data of the usable records with a geometry; None where the sphere never swings.
+
+    The joint fit compares with Eq. 16: it needs an apparatus with a sphere in a fluid.
+    """
+    if campaign.configuration.apparatus is None:
+        return None
+    used = [
+        result
+        for result in results
+        if result.usable and result.record.fluid and campaign.geometry(result.record) is not None
+    ]
+    design = design_of(campaign, [result.record for result in used]) if used else None
+    if design is None or not design.wet.any():
+        return None
+    values, covariances = [], []
+    for result in used:
+        fit = result.fit
+        assert fit is not None
+        order = [fit.covariance_order.index(name) for name in ("frequency", "b")]
+        values.append([fit.parameters[name].value for name in ("frequency", "b")])
+        covariances.append(np.asarray(fit.covariance)[np.ix_(order, order)])
+    return design, measured(np.array(values), np.array(covariances))

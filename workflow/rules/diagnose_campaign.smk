@@ -1,0 +1,23 @@
+rule diagnose_campaign:
+    input:
+        of_all_records("fit.json"),
+        of_all_records("calibration.json"),
+    output:
+        f"{RESULTS}/campaign_diagnosis.json",
+    log:
+        f"{RESULTS}/logs/diagnose_campaign.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
+    params:
+        folder=subpath(output[0], parent=True),
+        depends=jobs.theory(CAMPAIGN),
+        level=CAMPAIGN.configuration.diagnose.level,
+        repaired=repaired("", "diagnose-campaign"),
+        code=code_version("pendpipe.stages.diagnose_campaign"),
+    message:
+        "what all records together say is missing"
+    shell:
+        "pendpipe diagnose-campaign {params.folder:q} --campaign {resources.configuration:q}"
+        " --out {output:q} > {log:q} 2>&1"
