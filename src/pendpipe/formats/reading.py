@@ -64,12 +64,10 @@ def readers() -> Iterator[tuple[str, Reader]]:
     from pendpipe.formats import xml_tables
 
     yield "XML", xml_tables.read_table
-    from pendpipe.formats import windaq_csv
+    from pendpipe.formats import dataq_text
 
-    yield "WinDaq CSV", windaq_csv.read_table
-    from pendpipe.formats import captures
-
-    yield "DI-149 capture", captures.read_table
+    yield "WinDaq CSV", dataq_text.read_export
+    yield "DI-149 capture", dataq_text.read_capture
     from pendpipe.formats import text
 
     yield "text table", text.read_table
