@@ -201,7 +201,7 @@ def turning_points(recording: Source) -> TurningPoints:
     >>> len(points), round(float(points.amplitude_rad[0]), 4)
     (105, 0.0863)
     """
-    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.analysis.free_decay import measure_recording
 
     return measure_recording(_motion(recording), _place(recording))[0]
 
@@ -274,7 +274,7 @@ def fit(
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording
-    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.analysis.free_decay import measure_recording
 
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     if points is None:

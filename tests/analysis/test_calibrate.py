@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pendpipe.analysis.calibrate import calibrate
-from pendpipe.analysis.calibration import Calibration
+from pendpipe.analysis.calibrate import Calibration, calibrate
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.files import finite

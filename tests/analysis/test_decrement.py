@@ -268,7 +268,7 @@ def test_what_stands_in_fit_json_comes_back() -> None:
 
 @pytest.mark.parametrize("noise", [1e-4, 2e-3])
 def test_fit_and_diagnosis_print_the_same_baseline(noise: float) -> None:
-    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.diagnosis import diagnose_recording
 
     time = np.arange(0.0, 60.0, 0.05)

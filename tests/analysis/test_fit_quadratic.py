@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.optimize import minimize
 
-from pendpipe.analysis.fit.intervals import intervals95
-from pendpipe.analysis.fit.quadratic import Bounds, bounded_step, covariance
+from pendpipe.analysis.fit.least_squares import Bounds, bounded_step, covariance, intervals95
 
 HALF_95 = 1.959963984540054
 ENTRY = st.floats(-2.0, 2.0)

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pendpipe.analysis._decay_runs import _running_median
-from pendpipe.analysis.free_decay import FreeDecay, find_free_decay
+from pendpipe.analysis.free_decay import FreeDecay, _running_median, find_free_decay
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 

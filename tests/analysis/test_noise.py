@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.analysis.fit.noise_model import _mean_square
+from pendpipe.analysis.fit.by_waveform import _mean_square
 from pendpipe.analysis.noise import find_step, noise_rms, quantisation_rms, white_rms
 
 SWING = np.cos(np.arange(20000) * 0.06)

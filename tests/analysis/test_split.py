@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.analysis.fit.split import split_quality_factors
+from pendpipe.analysis.fit.by_waveform import split_quality_factors
 from pendpipe.analysis.fit.waveform import OMEGA, SHARE, B
 
 OMEGA_PER_S = 2.0 * np.pi * 0.9

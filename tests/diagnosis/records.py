@@ -71,7 +71,7 @@ def recording(readings: FloatArray, seed: int) -> Recording:
 
 def beginning_of(record: Recording) -> Beginning:
     """What a diagnosis starts from, as in `diagnose_recording`."""
-    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.analysis.free_decay import measure_recording
 
     points, part = measure_recording(record, "the test")
     return begin(prepare(part, "the test"), points, baseline="eq8", fixed={})

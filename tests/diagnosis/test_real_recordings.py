@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.recorded import measure_recording
+from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording

@@ -4,27 +4,272 @@ A pendulum that swings by itself turns at alternate sides, each time nearer to t
 after half periods that change little. What does not go like that is cut, with its reason:
 rest before the release, the hand's pull, driven parts, rest after the stop, clamping and
 repositioning, and every decay but the most telling one.
+
+A decay is a run of half cycles that follow one another.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from pendpipe.analysis._decay_runs import Run, best_runs
-from pendpipe.analysis._stretches import stretches
 from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.analysis.turning_points.table import Cut
+from pendpipe.analysis.turning_points.find import find_turning_points
+from pendpipe.analysis.turning_points.table import Cut, TurningPoints
 from pendpipe.analysis.two_modes import BEAT, two_modes
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
+
+# Loose on purpose: an impulse or a beat is physics to be diagnosed, not to be cut.
+_RISE: Final = 1.3
+_FALL: Final = 0.3
+_TAIL: Final = 0.05
+_PERIOD: Final = 0.3
+_WAVER: Final = 0.12
+
+
+@dataclass(frozen=True)
+class Run:
+    """Half cycles `first` to `last` (inclusive) that belong together.
+
+    Parameters
+    ----------
+    path
+        How far the pendulum has gone in them.
+    bridged
+        Disturbed half cycles inside.
+    fades
+        Whether it ends in its own rest or with the record, rather than in something else.
+    driven
+        Whether the amplitude was held up before.
+    """
+
+    first: int
+    last: int
+    path: float
+    bridged: int = 0
+    fades: bool = False
+    driven: bool = False
+
+    @property
+    def worth(self) -> float:
+        """What it can tell: its path, less for a few half cycles (two tell no decay)."""
+        return self.path * (1.0 - 2.0 / self.legs)
+
+    @property
+    def legs(self) -> int:
+        """Number of half cycles."""
+        return self.last - self.first + 1
+
+
+def best_runs(cycles: HalfCycles) -> list[Run]:
+    """Find the runs, the most telling first."""
+    count = len(cycles)
+    if count < 3:
+        return []
+    follows, swings = _follows(cycles).tolist(), cycles.swing.tolist()
+    runs: list[tuple[int, int]] = []
+    first, floor = 0, swings[0]
+    for leg in range(1, count):
+        allowed = _RISE * floor + _TAIL * swings[first] + cycles.step
+        if not follows[leg - 1] or swings[leg] > allowed:
+            runs.append((first, leg - 1))
+            first, floor = leg, swings[leg]
+        floor = min(floor, swings[leg])
+    runs.append((first, count - 1))
+    trimmed = [_trimmed(cycles, *run) for run in runs]
+    kept = [run for run in _joined(cycles, trimmed) if run.legs >= 3 and _regular(cycles, run)]
+    return sorted((_undriven(cycles, run) for run in kept), key=lambda run: -run.worth)
+
+
+def _follows(cycles: HalfCycles) -> BoolArray:
+    """Say for each half cycle but the last whether the next one may follow it freely."""
+    swing, half = cycles.swing, np.diff(cycles.middle_s)
+    usual = _running_median(half)
+    # A step of the converter moves the passage of the middle by this share of a half period.
+    blur = 0.5 * cycles.step / np.minimum(swing[1:], swing[:-1])
+    steady = np.abs(np.log(half / usual)) < _PERIOD + np.minimum(blur, 0.3)
+    rises = swing[1:] > _RISE * swing[:-1] + cycles.step
+    loss = np.concatenate(([0.0], swing[:-2] - swing[1:-1]))
+    # Coulomb friction takes the same from each half cycle, so the last ones shrink fast.
+    drops = (swing[1:] < _FALL * swing[:-1]) & (swing[1:] < swing[:-1] - 1.6 * loss - cycles.step)
+    return np.asarray(steady & ~rises & ~drops)
+
+
+def _running_median(values: FloatArray) -> FloatArray:
+    """The median of each value and its two neighbours to each side, fewer at the ends."""
+    padded = np.pad(values, 2, constant_values=np.nan)
+    ascending = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    last = 4 - np.count_nonzero(np.isnan(ascending), axis=1)
+    row = np.arange(len(values))
+    return np.asarray(0.5 * (ascending[row, last // 2] + ascending[row, (last + 1) // 2]))
+
+
+def _trimmed(cycles: HalfCycles, first: int, last: int) -> Run:
+    """Drop half cycles at the front that are smaller than what follows: a pull."""
+    while last - first >= 2 and cycles.swing[first] < (
+        0.93 * cycles.swing[first + 1] - 0.5 * cycles.step
+    ):
+        first += 1
+    return Run(first, last, float(cycles.swing[first : last + 1].sum()))
+
+
+def _joined(cycles: HalfCycles, runs: list[Run]) -> list[Run]:
+    """Join runs that a few disturbed half cycles part (a tracking error, lost samples)."""
+    out: list[Run] = []
+    for run in (run for run in runs if run.legs >= 2):
+        if out and _continues(cycles, out[-1], run):
+            before = out.pop()
+            lost = run.first - before.last - 1
+            path = float(cycles.swing[before.first : run.last + 1].sum())
+            run = Run(before.first, run.last, path, before.bridged + run.bridged + lost)
+        out.append(run)
+    return [_fading(cycles, run) for run in out]
+
+
+def _regular(cycles: HalfCycles, run: Run) -> bool:
+    """Say whether periods and amplitudes go on as smoothly as a pendulum's do."""
+    swing = cycles.swing[run.first : run.last + 1]
+    half = np.diff(cycles.middle_s[run.first : run.last + 1])
+    blur = cycles.step / float(np.median(swing))
+    # Where the sides differ, half cycles two apart are alike; of a few that says too little.
+    apart = 2 if len(half) > 6 else 1
+    waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
+    kinks = float(np.median(np.abs(np.diff(swing, 2)))) / float(np.median(swing))
+    return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
+
+
+def _continues(cycles: HalfCycles, before: Run, after: Run) -> bool:
+    """Say whether `after` goes on where `before` was broken off."""
+    half = float(np.median(np.diff(cycles.middle_s[before.first : before.last + 1])))
+    pause = float(cycles.middle_s[after.first] - cycles.middle_s[before.last])
+    # Where a turning point is lost in a gap, the swings beside it are too small.
+    last = float(np.max(cycles.swing[max(before.first, before.last - 2) : before.last + 1]))
+    ratio = float(cycles.swing[after.first]) / last
+    strong = float(cycles.swing[after.first]) > 3.0 * cycles.step
+    if not (strong and before.legs >= 3 and pause < 4.5 * half and 0.5 < ratio < 1.15):
+        return False
+    other = np.diff(cycles.middle_s[after.first : after.last + 1])
+    return bool(len(other)) and abs(float(np.median(other)) / half - 1.0) < _PERIOD
+
+
+def _fading(cycles: HalfCycles, run: Run) -> Run:
+    """Note whether the run's own last swing follows it, and then rest or the record's end."""
+    if run.legs < 3:
+        return run
+    half = float(np.median(np.diff(cycles.middle_s[run.first : run.last + 1])))
+    swing = float(cycles.swing[run.last])
+    if run.last + 1 == len(cycles):
+        return replace(run, fades=cycles.ending < _RISE * swing + cycles.step)
+    pause = float(cycles.middle_s[run.last + 1] - cycles.middle_s[run.last])
+    return replace(run, fades=pause > 1.5 * half)
+
+
+def _undriven(cycles: HalfCycles, run: Run) -> Run:
+    """Cut a front part whose amplitude is held while the part after it falls.
+
+    The loss of a free half cycle grows with its amplitude; so the first k half cycles lose
+    at least k times what those after them lose. A tenth of that is no free decay. (The top
+    of a beat is flat too, but loses 0.3 of it.)
+    """
+    swing = cycles.swing[run.first : run.last + 1]
+    count = len(swing)
+    if count < 9:
+        return run
+    k = np.arange(4, count - 4)
+    ahead = np.minimum(np.maximum(4, k // 2), count - 1 - k)
+    # Medians of seven: a disturbed half cycle inside the run is no drive.
+    padded = np.pad(swing, 3, mode="reflect", reflect_type="odd")
+    smooth: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1)
+    falls = smooth[k] - smooth[k + ahead]
+    expected = k * falls / ahead
+    lost = smooth[0] - smooth[k]
+    held = (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * cycles.step))
+    # Near the end a small scatter of few half cycles would stand for the loss of hundreds, and
+    # the last fall of an amplitude that wavers all along for the end of its drive.
+    waver = np.maximum.accumulate(np.maximum.accumulate(smooth) - smooth)[k]
+    held &= falls > np.maximum(2.0 * waver, 3.0 * cycles.step)
+    gain = np.where(held, expected - lost, 0.0)
+    best = int(np.argmax(gain))
+    if gain[best] <= 0:
+        return run
+    first = run.first + int(k[best])
+    return replace(
+        run,
+        first=first,
+        path=float(cycles.swing[first : run.last + 1].sum()),
+        driven=True,
+    )
+
+
+_SHORT: Final = 8.0
+"""Half periods below which a rest between two motions is part of the handling."""
+_NO_DECAY: Final = "no free decay: handling, clamp, repositioning or drive"
+
+
+def stretches(
+    time: FloatArray,
+    values: FloatArray,
+    start_s: float,
+    stop_s: float,
+    *,
+    quiet: float,
+    window_s: float,
+    before: str,
+) -> list[Cut]:
+    """Tell what is left out of ``[start_s, stop_s]``.
+
+    Parameters
+    ----------
+    time, values
+        The recording.
+    quiet
+        A stretch of `window_s` that moves by less than this is at rest.
+    before
+        The reason why motion before the start is no free decay.
+    """
+    sides = (
+        (float(time[0]), start_s, "rest before release", before),
+        (stop_s, float(time[-1]), "at rest after the decay", _NO_DECAY),
+    )
+    return [
+        Cut(low, high, rest if still else motion)
+        for begin, end, rest, motion in sides
+        if end > begin
+        for low, high, still in _parts(time, values, begin, end, quiet, window_s)
+    ]
+
+
+def _parts(
+    time: FloatArray, values: FloatArray, begin: float, end: float, quiet: float, window_s: float
+) -> list[tuple[float, float, bool]]:
+    """Go through windows of half a period; say of each whether it is rest (gaps are)."""
+    count = max(1, min(2000, round((end - begin) / window_s)))
+    edges = np.linspace(begin, end, count + 1)
+    places = np.searchsorted(time, edges)
+    # One sample more at each side: what moves between two windows is motion too.
+    windows = [values[max(first - 1, 0) : last + 1] for first, last in pairwise(places.tolist())]
+    still = [len(part) < 2 or float(np.ptp(part)) < quiet for part in windows]
+    for first, last in _runs_of_flags(still)[1:-1]:
+        # A short rest between two motions is part of the handling.
+        if edges[last] - edges[first] < _SHORT * window_s:
+            still[first:last] = [False] * (last - first)
+    return [(float(edges[a]), float(edges[b]), still[a]) for a, b in _runs_of_flags(still)]
+
+
+def _runs_of_flags(flags: list[bool]) -> list[tuple[int, int]]:
+    """First and last+1 of each run of the same."""
+    ends = [0, *(i for i in range(1, len(flags)) if flags[i] != flags[i - 1]), len(flags)]
+    return list(pairwise(ends))
+
 
 __all__ = ["Cut", "FreeDecay", "find_free_decay"]
 
@@ -391,3 +636,31 @@ def _free_from_the_first_sample(
     centre, amplitude = 0.5 * float(top + bottom), 0.5 * float(top - bottom)
     expected = centre + amplitude * np.cos(np.pi * (begin - turn) / half_period)
     return bool(abs(reading - expected) < 0.15 * abs(amplitude))
+
+
+def measure_recording(
+    recording: Recording, place: str | Path, provenance: Mapping[str, Any] | None = None
+) -> tuple[TurningPoints, Recording]:
+    """Find the free decay of a recording and measure its turning points.
+
+    Parameters
+    ----------
+    recording
+        In rad or m.
+    place
+        Named in messages.
+    provenance
+        Goes into the table's head.
+
+    Returns
+    -------
+    points, part
+        The turning points, with the cuts; and the part of the recording they are from.
+    """
+    decay = find_free_decay(recording, place)
+    part = decay.of(recording)
+    points = find_turning_points(part, place)
+    notes = (*decay.notes, *points.notes)
+    metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}
+    metadata = {**points.metadata, **metadata}
+    return replace(points, cuts=tuple(decay.cuts), metadata=metadata, notes=notes), part

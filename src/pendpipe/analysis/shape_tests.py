@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import fit_points
-from pendpipe.analysis.fit.envelope import fit_envelope
+from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import BoolArray
 from pendpipe.errors import InputError

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from pendpipe.arguments import add, print_json
 
 if TYPE_CHECKING:
-    from pendpipe.analysis.calibration import Calibration
+    from pendpipe.analysis.calibrate import Calibration
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -36,8 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _measure(arguments: argparse.Namespace) -> None:
+    from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import write_turning_points
-    from pendpipe.analysis.turning_points.recorded import measure_recording
 
     recording, provenance = read_motion(arguments)
     points, _ = measure_recording(recording, arguments.file, provenance)

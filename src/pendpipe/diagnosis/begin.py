@@ -11,8 +11,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.by_points import held_values
 from pendpipe.analysis.fit.result import Baseline
-from pendpipe.analysis.fit.start import start_values, usable_span
-from pendpipe.analysis.fit.swings import start_of
+from pendpipe.analysis.fit.start import start_of, start_values, usable_span
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray

@@ -174,7 +174,7 @@ def diagnose_recording(
     InputError
         If a parameter can't be held, or the recording can't be analysed.
     """
-    from pendpipe.analysis.turning_points.recorded import measure_recording
+    from pendpipe.analysis.free_decay import measure_recording
 
     check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")

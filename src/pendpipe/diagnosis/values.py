@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.intervals import intervals95
-from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.analysis.fit.least_squares import Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit

@@ -11,6 +11,15 @@ from the table (`table.py`):
                 x/y, dx/dy, (dx/dp)/y at fixed time since the start of the half cycle.
 
 An amplitude y is one of s (see `panel.py`), x is the angle.
+
+Its derivatives are plain quadratures. Differentiating the phase clock's equation for s = ln r by
+any parameter p gives a linear equation for sigma = ds/dp at fixed phase, solved by its integrating
+factor,
+
+    dsigma/dpsi = F_s sigma + F_p,        F = -nu sin(psi)/(1 - nu cos(psi)),
+
+and then dtau/dp by one more integral (both taken over w, see `panel.py`). Turning points stay at
+psi = 0 and pi whatever p is, so there is no jump in the friction to differentiate through.
 """
 
 from __future__ import annotations
@@ -18,18 +27,37 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.emission import emit
+from pendpipe.dynamics.chebyshev import INTEGRATION_T
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS
 from pendpipe.dynamics.panel import (
+    BEND,
+    BY_CENTRE,
+    BY_H,
+    BY_Q,
+    BY_RADIUS,
+    COLUMN,
     COS,
     CURVATURE,
     EXCESS,
+    FORCING,
+    GROWTH,
+    LAG,
+    LEAN,
     LOSS,
+    PULL,
+    SCRATCH,
+    SIN,
+    SLIP,
+    TILT,
+    VISCOUS,
+    WEIGHT,
     angle_of,
     complement_for,
     curve,
+    horner,
     log_amplitude,
+    multiply,
     panel_width,
     place,
     polynomial,
@@ -37,11 +65,262 @@ from pendpipe.dynamics.panel import (
     time_nodes,
     unresolved,
 )
-from pendpipe.dynamics.sensitivities import sensitivities
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
     from pendpipe.dynamics.layout import Work
+
+
+@kernel
+def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
+    """Write the derivatives of nu by ln r, m, h and q (by g it is 2 sin(psi)/C), and their weights.
+
+    PULL is the weight of nu in dln r/dw and LAG in dtau/dw, TILT that of s in dtau/dw.
+    """
+    m, h, q = shape[0], shape[1], shape[2]
+    for j in range(NODE_COUNT):
+        cos = node[COS + j]
+        r = radius * (1.0 + node[LOSS + j])
+        distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
+        inverse = 1.0 / (distance + m)
+        # Where s and u vanish together R has no derivative; its direction is then of no weight.
+        direction = 1.0 / distance if distance > 0.0 else 0.0
+        lever = r + 2.0 * m * cos
+        stiffness = h * inverse + q
+        drop = lever * h * inverse * inverse
+        bend, weight = node[BEND + j], node[WEIGHT + j] * node[SLIP + j] ** 2
+        node[BY_RADIUS + j] = r * (stiffness - drop * (r + m * cos) * direction) * bend
+        node[BY_CENTRE + j] = 2.0 * cos * stiffness - drop * (1.0 + (m + r * cos) * direction)
+        node[BY_CENTRE + j] *= bend
+        node[BY_H + j] = lever * inverse * bend
+        node[BY_Q + j] = lever * bend
+        node[PULL + j] = -weight * node[SIN + j]
+        node[LAG + j] = weight * node[COS + j] * bend
+        node[TILT + j] = 0.0
+    if shape[CURVATURE] > 0.0:
+        _differentiate_sine(node, shape, radius)
+
+
+@kernel
+def _differentiate_sine(node: FloatArray, shape: FloatArray, radius: float) -> None:
+    """Add what comes of 1/C and of what the sine adds to C nu."""
+    m, h, q, g = shape[0], shape[1], shape[2], shape[VISCOUS]
+    centre = curve(shape, m)
+    for j in range(NODE_COUNT):
+        cos, bend = node[COS + j], node[BEND + j]
+        r = radius * (1.0 + node[LOSS + j])
+        s = m + r * cos
+        distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
+        stiffness = (r + 2.0 * m * cos) * (h / (distance + m) + q)
+        nu = (stiffness + 2.0 * g * node[SIN + j] + node[LEAN + j]) * bend
+        # d ln(1/C)/ds, and the same of the sum C + C(m) in the denominator of LEAN
+        steeper = 0.25 * s * bend * bend
+        whole = 1.0 / (1.0 / bend + centre)
+        by_s = 0.25 * s * bend * whole
+        by_m = 0.25 * m / centre * whole
+        scale = 0.25 * cos * whole * bend
+        node[BY_RADIUS + j] += r * cos * (scale * m * (1.0 + (s + m) * by_s) + nu * steeper)
+        node[BY_CENTRE + j] += scale * (s + m + m * (2.0 + (s + m) * (by_s + by_m))) + nu * steeper
+        node[TILT + j] = node[WEIGHT + j] * node[SLIP + j] * bend * steeper
+
+
+@kernel
+def _grow(node: FloatArray, half_width: float) -> None:
+    """Write the integrating factor exp(integral of F_s)."""
+    for j in range(NODE_COUNT):
+        node[SCRATCH + j] = node[PULL + j] * node[BY_RADIUS + j]
+    multiply(INTEGRATION_T, node, SCRATCH, node, GROWTH)
+    for j in range(NODE_COUNT):
+        node[GROWTH + j] = math.exp(half_width * node[GROWTH + j])
+
+
+@kernel
+def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float) -> None:
+    """Differentiate a solved panel, at fixed time, by the amplitude and along the directions.
+
+    `work.sigma` and `work.shift` hold d ln r/dp and dtau/dp at fixed phase at the start of the
+    panel, and on return at its end; entry 0 is by the amplitude at the start of the half cycle,
+    then come the directions. `work.columns` receives dx/dp at fixed time at the nodes, a row each.
+
+    Parameters
+    ----------
+    work
+        The engine's arrays.
+    node, radius, half_width
+        As in `panel.solve`, after it.
+    """
+    shape, directions = work.shape, work.directions
+    sigma, shift, columns = work.sigma, work.shift, work.columns
+    _differentiate(node, shape, radius)
+    _grow(node, half_width)
+    for c in range(sigma.size):
+        dm, dh, dq, dg = 0.0, 0.0, 0.0, 0.0
+        if c > 0:
+            dm, dh = directions[c - 1, 0], directions[c - 1, 1]
+            dq, dg = directions[c - 1, 2], directions[c - 1, 3]
+        column = columns[c]
+        for j in range(NODE_COUNT):
+            node[FORCING + j] = (
+                dm * node[BY_CENTRE + j]
+                + dh * node[BY_H + j]
+                + dq * node[BY_Q + j]
+                + 2.0 * dg * node[SIN + j] * node[BEND + j]
+            )
+            node[SCRATCH + j] = node[PULL + j] * node[FORCING + j] / node[GROWTH + j]
+        multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
+        for j in range(NODE_COUNT):
+            column[j] = node[GROWTH + j] * (sigma[c] + half_width * node[COLUMN + j])
+            r = radius * (1.0 + node[LOSS + j])
+            moved = dm + r * node[COS + j] * column[j]  # ds/dp at fixed phase
+            node[SCRATCH + j] = (
+                node[LAG + j] * (node[BY_RADIUS + j] * column[j] + node[FORCING + j])
+                + node[TILT + j] * moved
+            )
+        multiply(INTEGRATION_T, node, SCRATCH, node, COLUMN)
+        sigma_end = column[DEGREE]
+        for j in range(NODE_COUNT):
+            r = radius * (1.0 + node[LOSS + j])
+            delay = shift[c] + half_width * node[COLUMN + j]
+            moved = dm + r * node[COS + j] * column[j]
+            column[j] = moved * node[BEND + j] + r * node[SIN + j] * delay
+        sigma[c] = sigma_end
+        shift[c] += half_width * node[COLUMN + DEGREE]
+
+
+_BLOCK = 16
+
+
+@kernel(inline=True)
+def samples_before(time_s: FloatArray, first: int, end_s: float, guess: int) -> int:
+    """Return the index of the first sample from `first` on that is not before `end_s`."""
+    i = min(first + guess, time_s.size)
+    while i > first and not time_s[i - 1] < end_s:
+        i -= 1
+    while i < time_s.size and time_s[i] < end_s:
+        i += 1
+    return i
+
+
+@kernel(inline=True)
+def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> None:
+    """Turn a half cycle's own derivatives into those by the parameters of the whole motion.
+
+    Row 0 of `work.total` is the angle, row 1 its velocity dx/dtau, row 2 the derivative by the
+    release's angle, then the directions: dx/dp = x_p + x_y dy/dp - (dx/dtau) dtau/dp, with
+    dy/dp = `work.amplitude` and dtau/dp = `work.clock` at the turning point where the half cycle
+    starts.
+    """
+    total, amplitude, clock = work.total, work.amplitude, work.clock
+    sign, first_sign = work.signs[0], work.signs[1]
+    columns = work.sensitivities
+    waveform = polynomials[:NODE_COUNT]
+    for j in range(waveform.size):
+        total[0, j] = sign * y * waveform[j]
+    if columns == 0:
+        return
+    for j in range(NODE_COUNT - 1):
+        total[1, j] = 2.0 / duration * (j + 1) * total[0, j + 1]
+    total[1, NODE_COUNT - 1] = 0.0
+    for c in range(columns):
+        own = polynomials[(c + 1) * NODE_COUNT : (c + 2) * NODE_COUNT]
+        by_start = polynomials[NODE_COUNT : 2 * NODE_COUNT]
+        weight = 0.0 if c == 0 else sign * y
+        outer = first_sign if c == 0 else 1.0
+        moved, late = outer * sign * amplitude[c], outer * clock[c]
+        # Its size unknown to the compiler, or it would write the loop out instead of vectorising.
+        for j in range(own.size):
+            total[2 + c, j] = outer * weight * own[j] + moved * by_start[j] - late * total[1, j]
+
+
+@kernel
+def emit(
+    work: Work,
+    polynomials: FloatArray,
+    start: float,
+    duration: float,
+    y: float,
+    first: int,
+    guess: int,
+) -> int:
+    """Write the samples of one panel; return the index of the first sample after it.
+
+    Parameters
+    ----------
+    polynomials
+        Of the panel, as in a row of `half_cycle.py`.
+    start, duration
+        Of the panel, in radians since the release.
+    first, guess
+        The index of the first sample, and about how many lie in the panel.
+    """
+    omega, release_s = work.motion[0], work.motion[1]
+    time_s, angle_rad = work.time_s, work.angle_rad
+    end = samples_before(time_s, first, release_s + (start + duration) / omega, guess)
+    if end == first:
+        return end
+    combine(work, polynomials, duration, y)
+    work.total[0, 0] += work.motion[2]
+    # Whole blocks keep the loops free of remainders; what is written past the panel's end is
+    # written again by the next panel (or as rest).
+    last = min(first + math.ceil((end - first) / _BLOCK) * _BLOCK, time_s.size)
+    at = first
+    while at < last:
+        stop = min(last, at + work.theta.size)
+        z, t = work.theta[: stop - at], time_s[at:stop]
+        for i in range(z.size):
+            z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
+        horner(work.total[0], z, angle_rad[at:stop])
+        if work.sensitivities > 0:
+            _emit_derivatives(work, z, t, at)
+        at = stop
+    return end
+
+
+@kernel
+def _emit_derivatives(work: Work, theta: FloatArray, time_s: FloatArray, at: int) -> None:
+    """Write the columns of the Jacobian for a block of samples."""
+    omega, release_s, directions = work.motion[0], work.motion[1], work.rates
+    stop, jacobian = at + theta.size, work.jacobian
+    by_omega, by_time = jacobian[directions, at:stop], jacobian[directions + 2, at:stop]
+    horner(work.total[1], theta, by_time)
+    horner(work.total[2], theta, jacobian[directions + 1, at:stop])
+    # By omega at fixed rates: time runs faster, and delta, h, q, g fall as 1/omega.
+    for i in range(theta.size):
+        by_omega[i] = (time_s[i] - release_s) * by_time[i]
+        by_time[i] *= -omega
+    for c in range(directions):
+        column, rate = jacobian[c, at:stop], work.rate[c] / omega
+        horner(work.total[3 + c], theta, column)
+        for i in range(theta.size):
+            by_omega[i] -= rate * column[i]
+
+
+@kernel
+def rest(work: Work, y: float, first: int) -> None:
+    """Write the samples after the stop: the last turning point, exactly."""
+    angle_rad, signs = work.angle_rad, work.signs
+    level = signs[0] * angle_of(work.shape, y) + work.motion[2]
+    for i in range(first, angle_rad.size):
+        angle_rad[i] = level
+    if work.sensitivities == 0:
+        return
+    directions, side = work.rates, signs[0] / curve(work.shape, y)
+    by_omega = 0.0
+    for c in range(directions):
+        by_rate = side * work.amplitude[c + 1]
+        by_omega -= work.rate[c] / work.motion[0] * by_rate
+        _fill(work.jacobian[c, first:], by_rate)
+    _fill(work.jacobian[directions, first:], by_omega)
+    _fill(work.jacobian[directions + 1, first:], side * signs[1] * work.amplitude[0])
+    _fill(work.jacobian[directions + 2, first:], 0.0)
+
+
+@kernel
+def _fill(column: FloatArray, value: float) -> None:
+    """Write one value to a part of a column."""
+    for i in range(column.size):
+        column[i] = value
+
 
 LOSS_TOLERANCE = 5e-9
 """Bound of `solve`'s estimate, a thousand times the error: that is 5e-12 of a half cycle's loss."""

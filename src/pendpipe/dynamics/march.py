@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendpipe.dynamics.emission import emit, rest
-from pendpipe.dynamics.half_cycle import direct_half_cycle
+from pendpipe.dynamics.half_cycle import direct_half_cycle, emit, rest
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import (
     ENDINGS,

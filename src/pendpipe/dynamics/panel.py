@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 # known to the compiler, so that it sees that they do not overlap and can vectorise.
 COS, SIN, WEIGHT, BEND, LEAN, LOSS, BEFORE, EARLIER = range(0, 160, 20)
 SLIP, LATE, EXCESS, SLOPE, COLUMN, ZETA, VALUE, SCRATCH = range(160, 320, 20)
-BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(320, 440, 20)  # sensitivities.py
+BY_RADIUS, BY_CENTRE, BY_H, BY_Q, GROWTH, FORCING = range(320, 440, 20)  # half_cycle.py
 PULL, LAG, TILT = range(440, 500, 20)
 PLACED = 500  # start, half width and complementary modulus of the panel that it holds
 

@@ -12,8 +12,7 @@ from pendpipe.physics.confinement import (
     sphere_in_tank,
     thin_layer_concentric,
 )
-from pendpipe.physics.decay import amplitude, stopping_time, time_at
-from pendpipe.physics.decay_gradient import amplitude_and_gradient
+from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
 from pendpipe.physics.drag import (
     POTENTIAL_FLOW_ADDED_MASS,
     added_mass_coefficient,
@@ -50,33 +49,32 @@ from pendpipe.physics.oscillator import (
 from pendpipe.physics.pendulum import (
     STANDARD_GRAVITY_M_PER_S2,
     Fluid,
+    Lengthening,
     Part,
     PointMass,
     Rod,
     Sphere,
+    Swing,
     added_inertia,
+    bearing_friction_rate,
     displaced_moment,
+    inertia_from_frequency,
     moment_of_inertia,
+    period_lengthening,
     restoring_torque,
     sphere_volume,
     static_moment,
+    swing,
 )
 from pendpipe.physics.quality import (
     amplitude_of_largest_quality_factor,
     amplitude_rate,
+    hysteretic_quality_factor,
     largest_quality_factor,
     quality_factor,
     quality_factor_limit,
     rates_from_energy_constants,
-)
-from pendpipe.physics.separation import hysteretic_quality_factor, without_hysteresis
-from pendpipe.physics.swing import (
-    Lengthening,
-    Swing,
-    bearing_friction_rate,
-    inertia_from_frequency,
-    period_lengthening,
-    swing,
+    without_hysteresis,
 )
 from pendpipe.physics.water import water_density, water_viscosity
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
-from pendpipe.physics.separation import inverse
+from pendpipe.physics.quality import inverse
 
 
 class QualityFactors(NamedTuple):

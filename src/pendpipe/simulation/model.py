@@ -17,8 +17,7 @@ from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
-from pendpipe.simulation.effects import Given, read_effects
-from pendpipe.simulation.instrument import Instrument
+from pendpipe.simulation.instrument import Given, Instrument, read_effects
 
 
 class PendulumModel(Section):

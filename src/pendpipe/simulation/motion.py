@@ -16,7 +16,7 @@ from pendpipe.dynamics.sampling import sample_pieces
 from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
-from pendpipe.simulation.effects import Given
+from pendpipe.simulation.instrument import Given
 
 _ORDER: Final = 64
 """Nodes of a half cycle: with sin x from 2.6 rad the readings are then good to 2e-7 rad."""

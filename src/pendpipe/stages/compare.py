@@ -13,9 +13,8 @@ import numpy as np
 from pendpipe.analysis.compare import Comparison, compare
 from pendpipe.analysis.losses import SeparatedRecord
 from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
-from pendpipe.analysis.shared_fit import SharedEstimate
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.analysis.viscous import SharedErrors, Surroundings
+from pendpipe.analysis.viscous import SharedErrors, SharedEstimate, Surroundings
 from pendpipe.arguments import add, load
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest

@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from pendpipe.analysis.fit.intervals import CHI2_95, intervals95
-from pendpipe.analysis.fit.quadratic import Bounds
+from pendpipe.analysis.fit.least_squares import CHI2_95, Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, FitResult, units
 from pendpipe.analysis.losses import quality_of_rate
 from pendpipe.arrays import FloatArray

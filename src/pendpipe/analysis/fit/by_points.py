@@ -1,11 +1,11 @@
-"""The paper's way: Eq. 14 on turning points."""
+"""The paper's way: Eq. 14 on the amplitudes of turning points, and a line through their times."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,18 +19,329 @@ from pendpipe.analysis.fit.assemble import (
 )
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.decrement import check_decrement, light_of
-from pendpipe.analysis.fit.envelope import BOUNDS, EnvelopeFit, fit_energies, fit_envelope
 from pendpipe.analysis.fit.fixed import loss_rates_of
-from pendpipe.analysis.fit.period import Period, fit_period
-from pendpipe.analysis.fit.quadratic import covariance
+from pendpipe.analysis.fit.least_squares import (
+    Bounds,
+    Quadratic,
+    bounded_step,
+    covariance,
+    minimise,
+)
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
-from pendpipe.analysis.fit.swings import clear
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.shape import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
+from pendpipe.physics.decay import amplitude_and_gradient
+
+_LOUD: Final = 2.0
+TOP: Final = 3.13
+"""Amplitude in rad beyond which a half swing says nothing of the frequency."""
+
+
+class Period(NamedTuple):
+    """Eq. 8's angular frequency and the time of the first turning point."""
+
+    angular_frequency: float
+    time_s: float
+    covariance: FloatArray
+    """Of the two, shape (2, 2); it holds what the unknown share adds."""
+    chi2_per_dof: float
+    late_rad: FloatArray
+    """Phase by which each turning point is later than the law's, shape (k,)."""
+
+
+def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
+    a, b = np.ones_like(m), np.sqrt(1.0 - m)
+    total = 0.5 * m
+    # Each step doubles the digits.
+    for step in range(8):
+        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
+        total = total + 2.0**step * difference**2
+    k = 0.5 * math.pi / a
+    return k, k * (1.0 - total)
+
+
+def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
+    """Phase omega t of the half swings between neighbours, without losses: K + K', or pi."""
+    if restoring == "linear":
+        return np.full(len(amplitude) - 1, math.pi)
+    quarter = elliptic(np.sin(0.5 * np.clip(amplitude, 0.0, TOP)) ** 2)[0]
+    return np.asarray(quarter[1:] + quarter[:-1])
+
+
+def period_excess(
+    amplitude: FloatArray | float, angular_frequency: float, a: float, b: float, c: float,
+    share: float,
+) -> FloatArray:  # fmt: skip
+    """Relative lengthening of a half period by the losses of Eq. 8, to second order.
+
+    ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2
+    + (pi^2/8) (2 a y + b_h)(a y^2 + b_h y + c)/(y w^2)``,
+    which is Eq. 6 (1/(8 Q_v^2)) for viscous damping, pi^2/(32 Q_h^2) for hysteretic
+    damping, and nothing for Coulomb friction alone.
+
+    Parameters
+    ----------
+    amplitude
+        y at the turning points, rad.
+    angular_frequency, a, b, c
+        omega and the rates of Eq. 13.
+    share
+        b_h/b, the hysteretic part.
+    """
+    y = np.maximum(amplitude, 1e-300)
+    hysteretic, viscous = share * b, (1.0 - share) * b
+    slope = 2.0 * a * y + hysteretic
+    friction = a * y + hysteretic + c / y
+    excess = 0.5 * viscous**2 + 4.0 / 3.0 * viscous * slope + math.pi**2 / 8.0 * slope * friction
+    return np.asarray(np.minimum(excess / angular_frequency**2, 0.5))
+
+
+def phases(
+    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
+    angular_frequency: float, restoring: Restoring,
+) -> FloatArray:  # fmt: skip
+    """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
+    excess = period_excess(amplitude, angular_frequency, *losses)
+    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
+    return np.concatenate([[0.0], np.cumsum(lasts * np.diff(points.half_cycle))])
+
+
+def fit_period(
+    points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float,
+    *, share: float | None = None, held: float | None = None, restoring: Restoring = "linear",
+) -> Period:  # fmt: skip
+    """Fit a straight line to the times, in half cycles lengthened by the losses (and by sin x).
+
+    Turning points cannot tell how b divides into hysteretic and viscous: the middle is
+    taken, and what the ends would change is added to the standard deviations.
+
+    Parameters
+    ----------
+    points
+        The turning points.
+    amplitude, a, b, c
+        What Eq. 14 made of them.
+    share
+        The hysteretic share of b, where it is known.
+    held
+        An angular frequency that is not to be fitted.
+    restoring
+        The restoring torque.
+    """
+    omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
+    middle = _line(
+        points, amplitude, (a, b, c, 0.5 if share is None else share), omega, held, restoring
+    )
+    residual = middle[2] / points.time_sd_s
+    chi2 = float(residual @ residual) / max(len(points) - 2, 1)
+    matrix = middle[1] * (chi2 if chi2 > _LOUD else 1.0)
+    if share is None:
+        ends = [
+            _line(points, amplitude, (a, b, c, end), omega, held, restoring)[0]
+            for end in (0.0, 1.0)
+        ]
+        off = max((end - middle[0] for end in ends), key=lambda change: abs(change[0]))
+        matrix += np.outer(off, off) / 3.0
+        # All times share what the unknown division of b does to the half cycles' shape.
+        matrix[1, 1] += (b / (4.0 * float(middle[0][0]) ** 2)) ** 2 / 3.0
+    found, first = (float(number) for number in middle[0])
+    return Period(found, first, matrix, chi2, found * middle[2])
+
+
+def _line(
+    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
+    omega: float, held: float | None, restoring: Restoring,
+) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    """Angular frequency and first time for one share; their covariance; residuals in s."""
+    weight = 1.0 / points.time_sd_s**2
+    reference = float(points.time_s[0])
+    time = points.time_s - reference
+    stretched = phases(points, amplitude, losses, omega, restoring) / math.pi
+    columns = np.stack([stretched, np.ones_like(stretched)], axis=1)
+    if held is not None:
+        first = float(np.average(time - stretched * math.pi / held, weights=weight))
+        residual = time - stretched * math.pi / held - first
+        inverse = np.diag([0.0, 1.0 / weight.sum()])
+        slope = math.pi / held
+    else:
+        normal = (columns * weight[:, None]).T @ columns
+        inverse = np.linalg.inv(normal)
+        slope, first = inverse @ ((columns * weight[:, None]).T @ time)
+        residual = time - columns @ np.array([slope, first])
+    jacobian = np.diag([-math.pi / slope**2, 1.0])
+    return np.array([math.pi / slope, reference + first]), jacobian @ inverse @ jacobian, residual
+
+
+ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
+BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
+
+
+@dataclass(frozen=True)
+class EnvelopeFit:
+    """a, b, c, y0 and the error of the level, shape (5,), in the order of `ENVELOPE`."""
+
+    value: FloatArray
+    quadratic: Quadratic
+    held: tuple[int, ...]
+    amplitude: FloatArray
+    """Eq. 14 at the turning points, shape (k,)."""
+    residual: FloatArray
+    converged: bool
+
+    @property
+    def chi2_per_dof(self) -> float:
+        """chi^2 over points less parameters (the level brings its own datum)."""
+        freedom = len(self.residual) - (4 - len([j for j in self.held if j < 4]))
+        return self.quadratic.chi2 / max(freedom, 1)
+
+
+def fit_envelope(
+    points: TurningPoints, fixed: Mapping[str, float] | None = None, *, tolerance: float = 1e-5
+) -> EnvelopeFit:
+    """Fit a, b, c >= 0 and y0 of Eq. 14 to turning points.
+
+    The shared error of the level is a parameter with a prior: it has the alternating
+    sign of the half cycles, and so leaves a, b, c nearly alone.
+
+    Parameters
+    ----------
+    points
+        Turning points with their errors.
+    fixed
+        Values of a, b, c, amplitude or offset that are held.
+    tolerance
+        Of chi^2, see `minimise`.
+    """
+    time = points.time_s - points.time_s[0]
+    side, weight = points.side, 1.0 / points.angle_sd_rad**2
+    measured = points.amplitude_rad
+    shared = -points.level_coupling * side
+    prior = 1.0 / max(points.level_sd_rad, 1e-12 * float(np.max(np.abs(measured)))) ** 2
+
+    def parts(value: FloatArray) -> tuple[FloatArray, FloatArray]:
+        a, b, c, y0, level = value
+        model, gradient = amplitude_and_gradient(time, y0, a, b, c)
+        jacobian = np.concatenate([gradient[:, 1:], gradient[:, :1], shared[:, None]], axis=1)
+        return measured - model - shared * level, jacobian
+
+    def evaluate(value: FloatArray) -> Quadratic:
+        residual, jacobian = parts(value)
+        if not np.all(np.isfinite(jacobian)):
+            return Quadratic(np.inf, np.zeros(5), np.eye(5))
+        weighted = jacobian * weight[:, None]
+        normal = weighted.T @ jacobian
+        gradient = weighted.T @ residual
+        normal[4, 4] += prior
+        gradient[4] -= prior * value[4]
+        return Quadratic(
+            float(residual @ (weight * residual)) + prior * value[4] ** 2, gradient, normal
+        )
+
+    start, held = _start(points, fixed or {})
+    found = minimise(evaluate, start, BOUNDS, held=held, tolerance=tolerance)
+    residual, _ = parts(found.value)
+    model = measured - residual - shared * found.value[4]
+    return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
+
+
+def fit_energies(
+    points: TurningPoints,
+    fixed: Mapping[str, float] | None = None,
+    *,
+    restoring: Restoring = "sine",
+    share: float = 0.5,
+) -> EnvelopeFit:
+    """Fit a, b, c >= 0 and y0 to the energies of turning points.
+
+    From a turning point at A to the next at A' the energy over the moment of inertia,
+    omega^2 (1 - cos A), falls by omega (A + A') [pi c/2 + pi b_h k + 2 pi a k^2]
+    + 16 omega b_v [E - (1 - k^2) K], with k the mean of sin(A/2) and of sin(A'/2) and the complete
+    elliptic integrals of modulus k; with the linear torque it is omega^2 A^2/2, and k is small. The
+    losses up to a turning point are linear in a, b, c.
+
+    Parameters
+    ----------
+    points
+        Turning points with their errors.
+    fixed
+        Values of a, b, c, amplitude or offset that are held.
+    restoring
+        The restoring torque.
+    share
+        The hysteretic share of b.
+    """
+    measured, side = points.amplitude_rad, points.side
+    base = np.array([0.0, 0.0, 0.0, measured[0], 0.0])
+    start, held = _with_held(points, fixed or {}, base)
+    free = fit_period(points, measured, 0.0, 0.0, 0.0, share=share, restoring=restoring)
+    swings = np.diff(points.half_cycle) / free.angular_frequency
+    sine = restoring == "sine"
+    most = TOP if sine else None
+    y = np.clip(measured, 0.0, most)
+    energy, slope = (-np.cos(y), np.sin(y)) if sine else (0.5 * y**2, y)
+    slope = np.maximum(slope, 1e-3 * np.max(slope))
+    shared = -points.level_coupling * side
+    weight = 1.0 / points.angle_sd_rad**2
+    for _ in range(2):
+        both = y[1:] + y[:-1]
+        k = np.sin(0.5 * y) if sine else 0.5 * y
+        # The energy falls evenly along the path: means of k^2 and k of a half swing.
+        high, low = k[:-1], k[1:]
+        square = 0.5 * (high**2 + low**2)
+        mean = (2.0 * square + high * low) / (1.5 * np.maximum(high + low, 1e-300))
+        viscous = 4.0 * math.pi * square
+        if sine:
+            first, second = elliptic(square)
+            viscous = 16.0 * (second - (1.0 - square) * first)
+        linear = share * math.pi * both * mean + (1.0 - share) * viscous
+        losses = np.stack([2.0 * math.pi * both * square, linear, 0.5 * math.pi * both]) * swings
+        lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
+        jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
+        residual = (energy - energy[0]) / slope - jacobian @ (start - base)
+        normal = jacobian.T @ (weight[:, None] * jacobian)
+        gradient = jacobian.T @ (weight * residual)
+        prior = 1.0 / max(points.level_sd_rad, 1e-12 * float(np.max(np.abs(measured)))) ** 2
+        normal[4, 4] += prior
+        gradient[4] -= prior * start[4]
+        step = bounded_step(normal, gradient, BOUNDS.about(start), held)
+        value = BOUNDS.clip(start + step)
+        residual = residual - jacobian @ step
+        model = measured - residual - shared * value[4]
+        y = np.clip(model, 0.0, most)
+    chi2 = float(residual @ (weight * residual)) + prior * float(value[4]) ** 2
+    quadratic = Quadratic(chi2, gradient - normal @ step, normal)
+    return EnvelopeFit(value, quadratic, held, model, residual, converged=True)
+
+
+def _start(points: TurningPoints, fixed: Mapping[str, float]) -> tuple[FloatArray, tuple[int, ...]]:
+    """Where the search begins, and what is held."""
+    amplitude, sd = points.amplitude_rad, points.angle_sd_rad
+    seen = amplitude > 3.0 * sd
+    if seen.sum() < 3:
+        seen = amplitude > 0.0
+    rates = loss_rates(points.time_s[seen], amplitude[seen], sd[seen])
+    return _with_held(points, fixed, np.array([*rates, float(amplitude[np.argmax(seen)]), 0.0]))
+
+
+def _with_held(
+    points: TurningPoints, fixed: Mapping[str, float], start: FloatArray
+) -> tuple[FloatArray, tuple[int, ...]]:
+    """The start with what is held in its place, and the places."""
+    start, level = start.copy(), float(np.mean(points.level_rad))
+    known = {index: fixed[name] for index, name in enumerate(ENVELOPE[:4]) if name in fixed}
+    if "offset" in fixed:
+        known[4] = level - fixed["offset"]
+    start[list(known)] = list(known.values())
+    return start, tuple(known)
+
 
 _LATE: Final = 3.0
+_CLEAR: Final = 3.0
+"""Standard deviations by which an amplitude stands out of the noise."""
 HELD: Final = ("a", "b", "c", "amplitude", "offset")
 
 
@@ -81,6 +392,13 @@ def envelope_and_period(
     return envelope, fit_period(
         points, envelope.amplitude, a, b, c, share=share, held=omega, restoring=restoring
     )
+
+
+def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
+    """Take those below the top that stand out of the noise, and above a part of the largest."""
+    amplitude = points.amplitude_rad
+    seen = (amplitude > _CLEAR * points.angle_sd_rad) & (amplitude < TOP)
+    return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
 
 def fit_points(

@@ -1,4 +1,7 @@
-"""The refinement and the check: Eq. 8 on all the readings of a free decay."""
+"""Eq. 8 on all the readings of a free decay: the search, the noise that it leaves, the result.
+
+The two parts of b are told apart only as far as Eq. 8's form is believed.
+"""
 
 from __future__ import annotations
 
@@ -21,18 +24,18 @@ from pendpipe.analysis.fit.assemble import (
 from pendpipe.analysis.fit.assemble import warn as warnings_of
 from pendpipe.analysis.fit.by_points import held_values
 from pendpipe.analysis.fit.decrement import check_decrement, light_of
-from pendpipe.analysis.fit.minimise import Minimum, minimise
-from pendpipe.analysis.fit.noise_model import Noise, judge_noise
-from pendpipe.analysis.fit.quadratic import covariance
+from pendpipe.analysis.fit.least_squares import Minimum, covariance, minimise
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
-from pendpipe.analysis.fit.rounding import best_noise
-from pendpipe.analysis.fit.split import split_quality_factors
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
-from pendpipe.analysis.fit.waveform import NAMES, SHARE, Waveform
+from pendpipe.analysis.fit.waveform import NAMES, OMEGA, SHARE, B, Waveform, best_noise
+from pendpipe.analysis.losses import quality_of_rate
+from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import turning_points_with_jacobian
+from pendpipe.dynamics.kernel import kernel
+from pendpipe.estimate import Estimate
 
 _GROWTH: Final = 1.6
 _DITHERED: Final = 0.4
@@ -300,3 +303,110 @@ def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, 
 
 
 __all__ = ["Noise", "fit_waveform"]
+
+
+_CHANCE: Final = 5.0
+_COARSE: Final = 12.0
+"""Readings in a half cycle below which differences would see the motion's own misfit."""
+
+
+class Noise(NamedTuple):
+    """Noise of one reading, and how much more there is at the motion's frequency."""
+
+    rms: float
+    slow: float
+    """Variance of the half cycles' amplitudes over what white noise makes of it; 1 where
+    chance explains the difference."""
+
+
+def judge_noise(
+    samples: Samples, points: TurningPoints, residual: FloatArray, problem: Waveform
+) -> Noise:
+    """Estimate the noise from what the fit leaves.
+
+    The white part comes from fourth differences, which a slow misfit cannot touch, and is
+    never taken below step/sqrt(12). What a, b, c suffer from is the noise at the motion's
+    own frequency: drifts and misfits show there as scatter of the half cycles' residual
+    amplitudes.
+    """
+    floor = quantisation_rms(samples.step)
+    per_half_cycle = len(residual) / max(len(points), 1)
+    if samples.counts or per_half_cycle < _COARSE:
+        rms = points.noise_rms_rad
+    else:
+        rms = white_rms(residual)
+    largest = max(float(problem.values.max()), -float(problem.values.min()))
+    rms = max(rms, floor, 1e-15 * largest)
+    return Noise(rms, _slow_noise(points, residual, problem.time_s, rms))
+
+
+def _slow_noise(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
+    """Scatter of the residual's amplitude in each half cycle against white noise's.
+
+    Each is the residual's product with a parabola that vanishes at the middles between
+    turning points (a half wave, near enough), over the root of the parabola's square.
+    """
+    middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
+    edges = np.searchsorted(time, middles)
+    readings = np.diff(edges)
+    if len(middles) < 10 or readings.min() < 3:
+        return 1.0
+    ratio = _mean_square(middles, edges, time, residual) / rms**2
+    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(readings)) else 1.0
+
+
+@kernel(any_order=True)
+def _mean_square(
+    middles: FloatArray, edges: IntArray, time_s: FloatArray, residual: FloatArray
+) -> float:
+    """Return the mean square of the half cycles' residual amplitudes; see `_slow_noise`."""
+    total = 0.0
+    for k in range(middles.size - 1):
+        inverse, product, square = 1.0 / (middles[k + 1] - middles[k]), 0.0, 0.0
+        for i in range(edges[k], edges[k + 1]):
+            share = (time_s[i] - middles[k]) * inverse
+            parabola = share * (1.0 - share)
+            product += residual[i] * parabola
+            square += parabola * parabola
+        total += product * product / square
+    return total / (middles.size - 1)
+
+
+_KNOWN: Final = 0.1
+"""Standard deviation of the share (0 to 1) below which the waveform has told it."""
+_CAVEAT: Final = (
+    "quality_factor_hysteretic and quality_factor_viscous hold given Eq. 8's form: they rest on"
+    " a third harmonic that another form of drag, or the sensor, would swamp"
+)
+
+
+def split_quality_factors(
+    value: FloatArray, covariance: FloatArray, fixed: Mapping[str, float]
+) -> tuple[Estimate | None, Estimate | None, list[str]]:
+    """Quality factors of the two parts of b, where they are held or well known.
+
+    Returns
+    -------
+    hysteretic, viscous
+        None where the record does not tell them.
+    warnings
+        A clause each.
+    """
+    names = ("quality_factor_hysteretic", "quality_factor_viscous")
+    held = {name: Estimate(fixed[name], 0.0, "") for name in names if name in fixed}
+    if held:
+        return held.get(names[0]), held.get(names[1]), []
+    sd = math.sqrt(max(float(covariance[SHARE, SHARE]), 0.0))
+    if not 0.0 < sd < _KNOWN or value[B] <= 0.0:
+        return None, None, []
+    b, share = float(value[B]), float(value[SHARE])
+    variance_b, variance_share = float(covariance[B, B]), float(covariance[SHARE, SHARE])
+    mixed = 2.0 * b * float(covariance[B, SHARE])
+    parts = []
+    for part, sign in ((share, 1.0), (1.0 - share, -1.0)):
+        # Of the product b x part.
+        variance = part**2 * variance_b + sign * part * mixed + b**2 * variance_share
+        rate = Estimate(part * b, math.sqrt(max(variance, 0.0)), "1/s")
+        known = rate.bounds95[0] > 0.0
+        parts.append(quality_of_rate(0.5 * float(value[OMEGA]) / math.pi, rate) if known else None)
+    return parts[0], parts[1], [_CAVEAT]

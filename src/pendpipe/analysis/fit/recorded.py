@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
-from pendpipe.analysis.fit.swings import may_be_sine, restoring_of
+from pendpipe.analysis.fit.start import may_be_sine, restoring_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import InputError, NotAnalysableError
@@ -48,7 +48,7 @@ def fit_recording(
         waveform, and the turning points where the waveform's law contradicts the decay.
     restoring
         The restoring torque, ``"linear"`` or ``"sine"``. By default sin x where the turning
-        points of a recording in radians favour it (`swings.restoring_of`).
+        points of a recording in radians favour it (`start.restoring_of`).
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed

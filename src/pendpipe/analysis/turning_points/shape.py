@@ -37,7 +37,7 @@ class LossRates(NamedTuple):
 def half_cycle_shape(
     amplitude: FloatArray, angular_frequency: FloatArray, rates: LossRates
 ) -> FloatArray:
-    """Coefficients of the half cycles' shapes, for `sums.half_cycle_sums`.
+    """Coefficients of the half cycles' shapes, for `measure.half_cycle_sums`.
 
     Parameters
     ----------

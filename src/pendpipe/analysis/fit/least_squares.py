@@ -1,0 +1,321 @@
+"""Bounded Gauss-Newton for a handful of parameters: steps, the search, covariance and intervals.
+
+scipy's optimisers cost more to import (0.7 s) than a thousand of these fits, and none of them
+combines bounds, a prior and normal equations summed piece by piece.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+
+_BEYOND: Final = 1e-9
+"""Standard deviations by which rounding may put a step beyond its bound."""
+_SINGULAR: Final = 1e12
+"""Of the scaled inverse: beyond, it is mostly rounding."""
+
+
+class Bounds(NamedTuple):
+    """Least and greatest value of each entry, infinite where there is none; shape (n,) each."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def about(self, value: FloatArray) -> Bounds:
+        """The bounds of a step from `value`."""
+        return Bounds(self.lower - value, self.upper - value)
+
+    def clip(self, value: FloatArray) -> FloatArray:
+        """Put each entry within its bounds."""
+        return np.clip(value, self.lower, self.upper)
+
+
+def bounded_step(
+    normal: FloatArray,
+    gradient: FloatArray,
+    bounds: Bounds,
+    held: Sequence[int] = (),
+) -> FloatArray:
+    """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
+
+    The step is found as if nothing were bounded; what then lies beyond its bound is put there, and
+    what its bound holds back no more is let go, until the step stays.
+
+    Parameters
+    ----------
+    normal, gradient
+        H, shape (n, n), positive definite in what is free, and g, shape (n,).
+    bounds
+        Of d.
+    held
+        Entries that stay zero.
+    """
+    if len(held) == 0:
+        step = solved(normal, gradient)
+        if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
+            return step
+    step, on = np.zeros(len(gradient)), dict[int, float]()
+    for _ in range(4 * len(step)):
+        free = [j for j in range(len(step)) if j not in held and j not in on]
+        step = np.zeros(len(step))
+        step[list(on)] = list(on.values())
+        pulled = gradient - normal @ step
+        step[free] = solved(normal[np.ix_(free, free)], pulled[free])
+        if not exchanged(on, free, step, normal, gradient, bounds):
+            break
+    return bounds.clip(step)
+
+
+def exchanged(
+    on: dict[int, float], free: Sequence[int], step: FloatArray, normal: FloatArray,
+    gradient: FloatArray, bounds: Bounds,
+) -> bool:  # fmt: skip
+    """Let go what leaves its bound by itself, or put at its bound what is farthest beyond it.
+
+    Parameters
+    ----------
+    on
+        What is at a bound, and where that is: changed.
+    free
+        What may be put at one.
+    step, normal, gradient, bounds
+        Of the problem; bounds of the step.
+
+    Returns
+    -------
+    bool
+        False where the step is the best.
+    """
+    slope = normal @ step - gradient
+    idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == bounds.lower[j])]
+    beyond = np.maximum(bounds.lower - step, step - bounds.upper) * np.sqrt(normal.diagonal())
+    worst = max(free, key=lambda j: float(beyond[j]), default=None)
+    if idle:
+        del on[idle[0]]
+    elif worst is not None and beyond[worst] > _BEYOND:
+        below = step[worst] < bounds.lower[worst]
+        on[worst] = float((bounds.lower if below else bounds.upper)[worst])
+    else:
+        return False
+    return True
+
+
+def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a positive definite system whose parameters differ by many orders of size."""
+    scale = 1.0 / np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
+    scaled = matrix * scale[:, None] * scale
+    try:
+        return np.asarray(np.linalg.solve(scaled, right * scale) * scale)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(scaled, right * scale, rcond=1e-14)[0] * scale)
+
+
+def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
+    """Invert the normal matrix; rows and columns of what is held are zero.
+
+    A bound is not used: what it would take off the standard deviations depends on where
+    the truth lies, so they are those of the free estimate.
+    """
+    free = [j for j in range(len(normal)) if j not in held]
+    part = normal if len(free) == len(normal) else normal[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    scales = scale[:, None] * scale
+    scaled = part * scales
+    try:
+        inverse = np.linalg.inv(scaled)
+        sound = bool(np.abs(inverse).max(initial=0.0) < _SINGULAR)
+    except np.linalg.LinAlgError:
+        sound = False
+    if not sound:
+        inverse = np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    inverse *= scales
+    if len(free) == len(normal):
+        return np.asarray(inverse)
+    result = np.zeros_like(normal)
+    result[np.ix_(free, free)] = inverse
+    return result
+
+
+_DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
+_PREDICTED: Final = 1e-2
+"""Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
+
+
+class Quadratic(NamedTuple):
+    """chi^2 at a point, with minus half its gradient and its normal matrix."""
+
+    chi2: float
+    gradient: FloatArray
+    normal: FloatArray
+
+
+class Minimum(NamedTuple):
+    """Where the search ended."""
+
+    value: FloatArray
+    quadratic: Quadratic
+    converged: bool
+    at: FloatArray
+    """Where chi^2 was evaluated: `value`, or where the last, unverified step began."""
+    gained: float = 0.0
+    """By what that step lowers chi^2."""
+
+
+def minimise(
+    evaluate: Callable[[FloatArray], Quadratic],
+    start: FloatArray,
+    bounds: Bounds,
+    *,
+    held: Sequence[int] = (),
+    tolerance: float = 1e-5,
+    predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
+    most: int = 60,
+) -> Minimum:
+    """Minimise chi^2 by damped Gauss-Newton steps that respect bounds.
+
+    Parameters
+    ----------
+    evaluate
+        chi^2, gradient and normal matrix at a point; an infinite chi^2 refuses it.
+    start, bounds
+        Where to begin, shape (n,), and within what.
+    held
+        Entries that are not fitted.
+    tolerance
+        The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
+        standard deviations. That step is still accepted, unverified.
+    predict_remaining
+        What a step leaves to be gained, from its two ends, the quadratic at the first and
+        what that promises. Below 1e-2 the step is accepted unverified.
+    most
+        Greatest number of evaluations.
+    """
+    value = bounds.clip(start)
+    now = evaluate(value)
+    level = 0
+    for _ in range(most - 1):
+        damped = now.normal
+        if level > 0:
+            damped = damped + _DAMPING[level] * np.diag(np.diag(damped))
+        step = bounded_step(damped, now.gradient, bounds.about(value), held)
+        promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
+        if promised < tolerance and level < 3:
+            return Minimum(bounds.clip(value + step), _moved(now, step), True, value, promised)
+        trial = bounds.clip(value + step)
+        if (
+            predict_remaining is not None
+            and level == 0
+            and predict_remaining(value, trial, now, promised) < _PREDICTED
+        ):
+            return Minimum(trial, _moved(now, step), True, value, promised)
+        then = evaluate(trial)
+        if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:
+            if now.chi2 - then.chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2:
+                return Minimum(trial, then, True, trial)
+            value, now = trial, then
+            level = max(level - 2, 0)
+        elif level == len(_DAMPING) - 1:
+            return Minimum(value, now, False, value)
+        else:
+            level += 1
+    return Minimum(value, now, False, value)
+
+
+def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
+    """The quadratic about a point a step further."""
+    chi2 = quadratic.chi2 - 2.0 * quadratic.gradient @ step + step @ quadratic.normal @ step
+    return Quadratic(float(chi2), quadratic.gradient - quadratic.normal @ step, quadratic.normal)
+
+
+CHI2_95: Final = 3.841458820694124
+"""95 % point of chi^2 with one degree of freedom."""
+_FAR: Final = 8.0
+"""Standard deviations from which a bound is out of sight."""
+
+
+def intervals95(
+    value: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    bounds: Bounds,
+    indices: Sequence[int],
+    held: Sequence[int] = (),
+    matrix: FloatArray | None = None,
+) -> list[tuple[float, float]]:
+    """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
+
+    Parameters
+    ----------
+    value
+        The bounded optimum, shape (n,).
+    normal, gradient
+        Of chi^2/2 there; the gradient (-d chi^2/2) is not zero at a bound that is met.
+    bounds
+        Of the parameters.
+    indices
+        The parameters whose intervals are wanted.
+    held
+        Parameters that are not fitted.
+    matrix
+        The covariance, where it is known.
+
+    Notes
+    -----
+    chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
+    least 95 % of the cases (97.5 % with one bound), never less.
+    """
+    matrix = covariance(normal, held) if matrix is None else matrix
+    deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    pull = np.abs(gradient * deviations)
+    fitted = [j for j in range(len(value)) if j not in held]
+    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < 1e-2)
+    half = math.sqrt(CHI2_95) * deviations
+    room = bounds.about(value)
+    if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
+        # None can come to a bound, since following another moves it by 1.96 of its own at most.
+        return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
+    return [
+        (
+            _profiled_end(value, normal, gradient, bounds, j, held, -_FAR * float(deviations[j])),
+            _profiled_end(value, normal, gradient, bounds, j, held, _FAR * float(deviations[j])),
+        )
+        if deviations[j] > 0.0
+        else (float(value[j]), float(value[j]))
+        for j in indices
+    ]
+
+
+def _profiled_end(
+    value: FloatArray, normal: FloatArray, gradient: FloatArray, bounds: Bounds, index: int,
+    held: Sequence[int], reach: float,
+) -> float:  # fmt: skip
+    """One end of an interval that a bound takes part in, at most `reach` away.
+
+    The end is found as if nothing were bounded; what then lies beyond its bound is put there, and
+    what its bound holds back no more is let go, until the end stays.
+    """
+    room, on = bounds.about(value), dict[int, float]()
+    low, high = sorted((0.0, reach))
+    low, high = max(low, float(room.lower[index])), min(high, float(room.upper[index]))
+    others = [j for j in range(len(value)) if j not in held and j != index]
+    for _ in range(3 * len(value)):
+        free = [j for j in others if j not in on] + [index]
+        step = np.zeros(len(value))
+        step[list(on)] = list(on.values())
+        pulled = gradient - normal @ step
+        risen = float(step @ normal @ step - 2.0 * gradient @ step)
+        block = normal[np.ix_(free, free)]
+        best = solved(block, pulled[free])
+        follow = solved(block, (np.array(free) == index).astype(np.float64))
+        left = CHI2_95 - risen + float(pulled[free] @ best)
+        end = float(best[-1]) + math.copysign(math.sqrt(max(left * follow[-1], 0.0)), reach)
+        end = min(max(end, low), high)
+        step[free] = best + follow / follow[-1] * (end - best[-1])
+        if not exchanged(on, free[:-1], step, normal, gradient, room):
+            break
+    return float(value[index]) + end
