@@ -9,6 +9,7 @@ from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import Candidate, candidates, joint_fit, named, predict
 from pendpipe.campaign.joint import coefficient, inertia_errors, joint_values, loss_torques, only
 from pendpipe.campaign.next_measurement import next_measurements
+from pendpipe.campaign.walls import Surface, confined
 
 from .campaigns import data, default
 
@@ -92,7 +93,7 @@ def test_nothing_missing_is_found_where_nothing_is() -> None:
     ("hidden", "size"),
     [
         ("uniform-drag-excess", 0.12),
-        ("wall-confinement", 0.05),
+        ("wall-confinement", 0.16),
         ("drag-law-transition", 0.05),
         ("air-drag-in-benchmark", 1.0),
         ("hysteresis-inertia-scaling", -1.0),
@@ -102,7 +103,8 @@ def test_nothing_missing_is_found_where_nothing_is() -> None:
 )
 def test_a_hidden_cause_is_in_the_class(hidden: str, size: float) -> None:
     design = default()
-    answer = search(design, data(design, named(hidden), (size,), seed=7))
+    cause = tuple(Candidate(one.effect, one.effect.shapes_in(design)[0]) for one in named(hidden))
+    answer = search(design, data(design, cause, (size,), seed=7))
     assert answer.missing
     members = [answer.found[0].leader, *(rival for rival, _ in answer.found[0].rivals)]
     inside = {rival.candidate.effect.identifier: rival for rival in members}
@@ -203,3 +205,31 @@ def test_a_branch_is_a_shape() -> None:
     moved = predict(design, (high,), np.append(np.zeros(len(design.nuisances)), 1.0))
     changed = np.any(moved != plain, axis=-1)
     assert changed.tolist() == [run.branch == "high" for run in design.runs]
+
+
+@pytest.mark.parametrize("surface", ["slip", "film"])
+def test_walls_between_the_computed_ones_are_those_of_the_tank(surface: Surface) -> None:
+    tank = default().apparatus.tank
+    assert tank is not None
+    for close, depth in ((0.05, 0.04), (0.2, 0.1), (0.35, 0.03)):
+        deep = 2.0 * close ** (-1.0 / 3.0)
+        exact = physics.sphere_in_tank(
+            1.0,
+            deep / 2.0,
+            depth,
+            surface_m=deep / 2.0,
+            length_m=deep * tank.length_m / tank.depth_m,
+            width_m=deep * tank.width_m / tank.depth_m,
+            surface=surface,
+        )
+        drag, mass = confined(tank, surface, np.array(close), np.array(depth))
+        assert drag == pytest.approx(exact.drag_factor, abs=0.004)
+        assert mass + 0.5 + 2.25 * depth == pytest.approx(exact.added_mass_coefficient, abs=0.004)
+
+
+def test_a_sphere_far_from_all_walls_is_free() -> None:
+    tank = default().apparatus.tank
+    assert tank is not None
+    drag, mass = confined(tank, "slip", np.zeros(3), np.array([0.02, 0.05, 0.1]))
+    assert drag.tolist() == [1.0, 1.0, 1.0]
+    assert mass.tolist() == [0.0, 0.0, 0.0]

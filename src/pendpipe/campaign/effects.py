@@ -15,9 +15,11 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design, Inputs
 from pendpipe.campaign.prediction import Terms
+from pendpipe.campaign.walls import DEPTHS, Surface, confined
 from pendpipe.effects.effect import Parameter
 
 Acts = Callable[..., Any]
@@ -167,37 +169,39 @@ def stem(inputs: Inputs, size: FloatArray) -> Inputs:
     return replace(inputs, screw_m=inputs.screw_m + size)
 
 
-def thin_layer_walls(closeness: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Drag and added mass of a sphere in a concentric shell, over those without it.
-
-    ``K = (1 + s^4)/(1 - s^3)^2`` and ``C_m/(1/2) = (1 + 2 s^3)/(1 - s^3)`` for a boundary layer
-    that is thin beside the gap; s is the ratio of the radii and `closeness` is s^3.
-    """
-    drag = (1.0 + np.abs(closeness) ** (4.0 / 3.0)) / (1.0 - closeness) ** 2
-    return drag, (1.0 + 2.0 * closeness) / (1.0 - closeness)
+def _surfaces(design: Design) -> Sequence[Any]:
+    return ("slip", "film") if design.apparatus.tank is not None else ()
 
 
 @campaign_effect(
     "terms",
     "wall-confinement",
     "walls near the sphere",
-    r"a/\delta \to K a/\delta, \quad \tfrac12 \to C_m; \quad"
-    r" K = \frac{1 + s^4}{(1 - s^3)^2}, \quad C_m = \frac{1 + 2 s^3}{2 (1 - s^3)}",
-    Parameter("closeness", "", 0.0, 0.4),
-    0.05,
+    r"D \to K(s, \delta/a)\, D, \quad C_m \to C_m(s, \delta/a), \quad s = 2 a/H",
+    Parameter("closeness", "", 0.0, 0.5),
+    0.1,
+    _surfaces,
 )
-def walls(terms: Terms, size: FloatArray, design: Design) -> Terms:
-    """Walls and floor, as a shell about the sphere.
+def walls(terms: Terms, size: FloatArray, design: Design, shape: Surface) -> Terms:
+    """Walls, floor and surface: the fluid goes faster past the sphere.
 
-    The fluid goes faster past it, so that drag and added mass grow together. The closeness is the
-    cube of radius over distance.
+    Drag and added mass grow together. The closeness is s^3 with H the depth of a tank of the
+    given one's proportions; its surface is clean ("slip") or a film.
     """
+    assert design.apparatus.tank is not None
     near = np.where([run.tank for run in design.runs], size, 0.0)
-    drag, mass = thin_layer_walls(near)
+    density, viscosity = design.fluids(terms.inputs.warmer_k)
+    around = viscosity * (1.0 + terms.inputs.thicker), np.where(density > 0.0, density, 1.0)
+    radius = terms.inputs.radius_m
+    depth = physics.penetration_depth(terms.angular_frequency, *around) / radius
+    drag, mass = confined(design.apparatus.tank, shape, near, np.minimum(depth, DEPTHS[-1]))
+    # The memory's own inertia grows with its drag; the rest is the potential flow's.
+    other = mass - 2.25 * depth * (drag - 1.0)
     return replace(
         terms,
+        steady=terms.steady * drag,
         history=terms.history * drag,
-        inertia=terms.inertia + 0.5 * (mass - 1.0) * terms.displaced,
+        inertia=terms.inertia + other * terms.displaced,
     )
 
 
