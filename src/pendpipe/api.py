@@ -6,10 +6,11 @@ packages are imported by the function that needs them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis import Outcome
+    from pendpipe.diagnosis.several import JointOutcome
     from pendpipe.formats import Inspection
 
 Source = Recording | str | Path
@@ -295,7 +297,7 @@ def fit(
 
 
 def diagnose(
-    recording: Source,
+    recording: Source | Sequence[Source] | Mapping[str, Source],
     *,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
@@ -303,7 +305,9 @@ def diagnose(
     seed: int = 0,
     volts_per_radian: float | None = None,
     name: str | None = None,
-) -> Outcome:
+    own: Sequence[str] = (),
+    same_sensor: bool = False,
+) -> Outcome | JointOutcome:
     """Find what physics a fit of Eq. 8 leaves out of a recording.
 
     Eq. 8 is fitted to the free decay; its residual is searched for every effect of the catalogue
@@ -312,7 +316,9 @@ def diagnose(
     Parameters
     ----------
     recording
-        A recording, or the path of its file.
+        A recording, or the path of its file; or several of one pendulum (a list, or a mapping
+        of their names), which are then one measurement: physics shared, start and noise each
+        its own (docs/several.md).
     baseline
         The null model: ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
@@ -325,10 +331,15 @@ def diagnose(
         The sensor's constant, where the readings are volts and do not carry it.
     name
         What to call the recording in messages; by default its path.
+    own
+        Of several recordings: what each has of its own (``"a"``, ``"b"``, ``"c"``,
+        ``"frequency"``).
+    same_sensor
+        Of several recordings: whether they share the sensor's errors as well.
 
     Returns
     -------
-    Outcome
+    Outcome, or JointOutcome of several recordings
         Prints as one paragraph; ``.verdict``, ``.effects``, ``.plot()``, ``.to_dict()``,
         ``.save(folder)``.
 
@@ -343,6 +354,26 @@ def diagnose(
     >>> answer.verdict, answer.effects[0].identifier
     ('missing-physics', 'circular-error')
     """
+    if not isinstance(recording, Recording | str | Path):
+        from pendpipe.diagnosis.several import diagnose_several
+
+        if fixed:
+            raise InputError("fixed", "nothing is held in several recordings", "leave it out")
+        if not isinstance(recording, Mapping):
+            names = [
+                f"recording {number}" if isinstance(each, Recording) else str(each)
+                for number, each in enumerate(recording, 1)
+            ]
+            recording = dict(zip(names, recording, strict=True))
+        return diagnose_several(
+            [_motion(each, volts_per_radian) for each in recording.values()],
+            list(recording),
+            baseline=baseline,
+            level=level,
+            seed=seed,
+            own=own,
+            same_sensor=same_sensor,
+        )
     from pendpipe.diagnosis import diagnose_recording
 
     return diagnose_recording(

@@ -4,6 +4,9 @@ Eq. 8 (or Eq. 3) is fitted to a free decay. Its residual is searched for every e
 catalogue, of the pendulum and of the measurement alike; those that chance does not explain are
 added to the model. The answer goes to standard output as one paragraph, and DIR gets
 diagnosis.json and the figures.
+
+Several FILEs are recordings of one pendulum: physics shared, start and noise each its own
+(docs/several.md).
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe diagnose``."""
-    add_file(parser)
+    add_file(parser, several=True)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write diagnosis.json and the figures there"
     )
@@ -57,6 +60,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-figures", dest="figures", action="store_const", const="none", help="as --figures none"
     )
+    parser.add_argument(
+        "--own",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="of several recordings: what each has of its own (a, b, c, frequency); repeatable",
+    )
+    parser.add_argument(
+        "--same-sensor",
+        action="store_true",
+        help="of several recordings: the sensor's errors are shared as well",
+    )
     add(parser, "--json", "--baseline", "--fix")
     add(parser, "--turning-points", "--calibration", "--record", "--refused")
 
@@ -67,6 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
 
+    arguments.file = arguments.files[0]
+    if len(arguments.files) > 1:
+        keep_memory()
+        return _diagnose_several(arguments)
     if arguments.record is not None and arguments.out is None:
         raise InputError("--record", "a campaign's record needs a folder", "add --out DIR")
     keep_memory()
@@ -118,6 +137,37 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
     _print_answer(arguments, content)
     return FOUND if arguments.fail_on == content["verdict"] else 0
+
+
+def _diagnose_several(arguments: argparse.Namespace) -> int:
+    """Diagnose recordings of one pendulum together."""
+    from pendpipe.diagnosis.several import diagnose_several
+
+    for name in ("fix", "turning_points", "record"):
+        if getattr(arguments, name):
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(option, "it is for one recording", "give one FILE, or leave it out")
+    recordings, made = [], []
+    for file in arguments.files:
+        arguments.file = file
+        recording, provenance = read_motion(arguments)
+        recordings.append(recording)
+        made.append({"name": file, **provenance})
+    joint = diagnose_several(
+        recordings,
+        arguments.files,
+        baseline=arguments.baseline,
+        level=arguments.level,
+        seed=arguments.seed,
+        same_sensor=arguments.same_sensor,
+        own=arguments.own,
+        provenance={"inputs": made, "seed": arguments.seed, "level": arguments.level},
+        progress=_print_progress,
+    )
+    if arguments.out is not None:
+        joint.save(arguments.out)
+    _print_answer(arguments, joint.to_dict())
+    return FOUND if arguments.fail_on == joint.verdict else 0
 
 
 def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -> Outcome:

@@ -1,0 +1,124 @@
+"""Recordings of one pendulum together: what one alone leaves open, and who contradicts whom."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pendpipe as pp
+from pendpipe.cli import main
+from pendpipe.diagnosis.several import JointOutcome
+from pendpipe.recording import Recording
+
+AMPLITUDES = (0.05, 0.15, 0.4)
+B, C = np.pi * 0.9 * (1.0 / 600.0 + 1.0 / 900.0), 7e-4
+
+
+def swing(amplitude: float, seed: int, *effects: dict[str, Any], **pendulum: float) -> Recording:
+    return pp.simulate(
+        {
+            "pendulum": {
+                "frequency_hz": 0.9,
+                "quality_factor_viscous": 600.0,
+                "quality_factor_hysteretic": 900.0,
+                "c": C,
+                "release_angle_rad": amplitude,
+                **pendulum,
+            },
+            "sensor": {"volts_per_radian": 1.0, "noise_volts": 1e-4},
+            "sampling": {"sample_rate_hz": 15.0, "duration_s": 100.0},
+            "effects": list(effects),
+            "seed": seed,
+        }
+    )
+
+
+@cache
+def together(kind: str) -> JointOutcome:
+    effects = {
+        "nothing": [],
+        "cubic": [{"id": "cubic-damping", "d": 0.1, "position_form": 0.0}],
+    }
+    releases = {}
+    for number, amplitude in enumerate(AMPLITUDES):
+        odd = {"quality_factor_viscous": 500.0} if kind == "odd" and number == 1 else {}
+        name = f"{1e3 * amplitude:.0f} mrad"
+        releases[name] = swing(amplitude, 40 + number, *effects.get(kind, []), **odd)
+    found = pp.diagnose(releases, volts_per_radian=1.0)
+    assert isinstance(found, JointOutcome)
+    return found
+
+
+def test_three_releases_share_their_values_and_lack_nothing() -> None:
+    found = together("nothing").to_dict()
+    assert found["verdict"] == "consistent"
+    values = found["improved"]["parameters"]
+    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
+        assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]
+
+
+def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
+    found = together("nothing")
+    best = min(each.diagnosis.improved.parameters["c"].sd for each in found.outcomes)
+    assert found.to_dict()["improved"]["parameters"]["c"]["sd"] < best
+
+
+def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
+    for each in together("nothing").to_dict()["recordings"]:
+        # 1000 readings: a fraction of 0.95 has a standard deviation of 0.007.
+        assert each["prediction"]["within_95"] == pytest.approx(0.95, abs=0.03)
+        assert each["agreement"]["p_value"] > 1e-3
+
+
+def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_damping() -> None:
+    found = together("cubic")
+    largest = found.outcomes[-1].effects[0]
+    alone = {largest.identifier, *(name for name, _ in largest.indistinguishable)}
+    assert {"cubic-damping", "damping-drift"} <= alone
+    effect = found.effects[0]
+    assert effect.identifier == "cubic-damping"
+    assert "damping-drift" not in {name for name, _ in effect.indistinguishable}
+    size = effect.parameters["d"]
+    assert abs(size.value - 0.1) < 4.0 * size.sd
+
+
+def test_recording_with_another_damping_is_named_with_its_value() -> None:
+    found = together("odd")
+    effect = found.effects[0]
+    assert effect.identifier == "parameter-b"
+    assert effect.location.summary == "in 150 mrad"
+    odd, usual = effect.parameters["150 mrad"], effect.parameters["50 mrad"]
+    assert abs(odd.value - np.pi * 0.9 * (1.0 / 500.0 + 1.0 / 900.0)) < 4.0 * odd.sd
+    assert abs(usual.value - B) < 4.0 * usual.sd
+    assert "150 mrad contradicts the others in b" in str(found)
+
+
+def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Path) -> None:
+    files = []
+    for number, amplitude in enumerate((0.1, 0.3)):
+        files.append(str(tmp_path / f"{number}.csv"))
+        recording = swing(amplitude, 50 + number).as_motion(1.0, "x")
+        lines = [
+            f"{t!r},{x!r}"
+            for t, x in zip(recording.time_s.tolist(), recording.values.tolist(), strict=True)
+        ]
+        Path(files[-1]).write_text("\n".join(["time_s,angle_rad", *lines]))
+    assert main(["diagnose", *files, "--out", str(tmp_path / "out"), "--own", "frequency"]) == 0
+    found = json.loads((tmp_path / "out/diagnosis.json").read_text())
+    one = pp.diagnose(files[0]).to_dict()
+    assert one.keys() - found.keys() <= {"remainder", "small_amplitudes", "prediction"}
+    assert [each["name"] for each in found["recordings"]] == files
+    assert "frequency" not in found["improved"]["parameters"]
+    assert "frequency" in found["recordings"][0]["parameters"]
+
+
+def test_what_is_for_one_recording_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diagnose", "a.csv", "b.csv", "--fix", "c=0"]) == 2
+    assert "--fix" in capsys.readouterr().err
+    with pytest.raises(pp.InputError, match="at least two"):
+        pp.diagnose([swing(0.1, 1)], volts_per_radian=1.0)
