@@ -16,8 +16,13 @@ from pathlib import Path
 from typing import Any, Final, Literal, Self
 
 from pendpipe.acquisition.devices import DEVICES
-from pendpipe.acquisition.devices.links import Link, LoopbackSocket, PseudoTerminal
-from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
+from pendpipe.acquisition.devices.simulated import (
+    Link,
+    LoopbackSocket,
+    PseudoTerminal,
+    Signal,
+    SimulatedDevice,
+)
 from pendpipe.acquisition.simulated import record_from
 from pendpipe.recording import Recording
 

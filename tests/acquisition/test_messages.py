@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from serial import SerialException
 
+from pendpipe.acquisition.drivers import no_ports, without_port
 from pendpipe.acquisition.line import Line, cannot_open
-from pendpipe.acquisition.ports import no_ports, without_port
 from pendpipe.errors import InputError
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pyserial's POSIX part")

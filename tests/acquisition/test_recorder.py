@@ -17,9 +17,8 @@ import pytest
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers.base import Setup
 from pendpipe.acquisition.drivers.text import DI2108
-from pendpipe.acquisition.noise import NoiseWatch
-from pendpipe.acquisition.progress import ProgressLine
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
+from pendpipe.acquisition.recorder import NoiseWatch, ProgressLine
 from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.acquisition.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray

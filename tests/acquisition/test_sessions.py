@@ -13,10 +13,10 @@ import pytest
 from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices.simulated import SimulatedDevice
+from pendpipe.acquisition.drivers import identify
 from pendpipe.acquisition.drivers.letters import DI154RS, DI245
 from pendpipe.acquisition.drivers.text import DI2108
 from pendpipe.acquisition.line import Line
-from pendpipe.acquisition.ports import identify
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import record
 from pendpipe.acquisition.simulated import acquire_simulated

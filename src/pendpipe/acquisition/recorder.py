@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Final, cast
+from typing import IO, Final, TextIO, cast
+
+import numpy as np
 
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
-from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.drivers import find_driver, identify
 from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
 from pendpipe.acquisition.drivers.decoders import Decoder
 from pendpipe.acquisition.line import Line, LineLostError
-from pendpipe.acquisition.noise import NoiseWatch
-from pendpipe.acquisition.ports import identify
-from pendpipe.acquisition.progress import ProgressLine
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
+from pendpipe.arrays import AnyArray
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 
@@ -378,3 +379,136 @@ def _header(
         "clock_scale": clock.scale,
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+_REFRESH_S = 0.2
+_MEMORY_S = 5.0
+"""The amplitude shown is that of the last seconds, of the recorder's clock."""
+
+
+class ProgressLine:
+    """Elapsed time, scans, rate, amplitude now and losses, rewritten in place.
+
+    Parameters
+    ----------
+    stream
+        Where to write, usually standard error; nothing is written if it is no terminal.
+    duration_s
+        What was asked for.
+    """
+
+    def __init__(self, stream: TextIO, duration_s: float) -> None:
+        self._stream = stream
+        self._duration_s = duration_s
+        self._shown = 0.0
+        self._scans = self._lost = self._breaks = 0
+        self._recent: deque[tuple[float, AnyArray]] = deque()
+        self._decoder: Decoder | None = None
+        self._step = 0.0
+
+    def begin(self, driver: type[Driver], setup: Setup) -> None:
+        """Show what is recorded; again after a break."""
+        self._breaks += self._decoder is not None
+        self._recent.clear()
+        self._decoder = driver.decoder(len(setup.channels))
+        self._step = setup.range_volts / 2 ** (driver.bits - 1)
+
+    def update(self, elapsed_s: float, data: bytes) -> None:
+        """Show further bytes, by `elapsed_s` of the recorder's clock."""
+        if self._decoder is None or not self._stream.isatty():
+            return
+        scans = self._decoder.feed(data)
+        self._scans += len(scans)
+        self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
+        if len(scans):
+            self._recent.append((elapsed_s, scans.counts[:, 0]))
+        while len(self._recent) > 1 and self._recent[0][0] < elapsed_s - _MEMORY_S:
+            self._recent.popleft()
+        if time.monotonic() - self._shown > _REFRESH_S:
+            self._shown = time.monotonic()
+            self._write(f"\r{self.text(elapsed_s)}\x1b[K")
+
+    def text(self, elapsed_s: float) -> str:
+        """The line without its control characters."""
+        amplitude = 0.0
+        if self._recent:
+            recent = np.concatenate([counts for _, counts in self._recent])
+            amplitude = 0.5 * self._step * float(int(recent.max()) - int(recent.min()))
+        rate = self._scans / elapsed_s if elapsed_s > 0 else 0.0
+        return (
+            f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
+            f"amplitude {amplitude:.3f} V, {self._lost} lost"
+            + (f", {self._breaks} break(s)" if self._breaks else "")
+        )
+
+    def end(self) -> None:
+        """Close the display."""
+        if self._shown:
+            self._write("\n")
+
+    def _write(self, text: str) -> None:
+        """Show it, unless the terminal has gone: that must not end a recording."""
+        with suppress(OSError):
+            self._stream.write(text)
+            self._stream.flush()
+
+
+_WINDOW_S: Final = 20.0
+"""Seconds that are judged at a time: a few swings of the slowest pendulum on a bench."""
+_LARGE: Final = 10.0
+"""So many times the noise must the motion have been before its end can be seen."""
+_REACHED: Final = 2.0
+_WINDOWS: Final = 2
+"""In so many windows, one after the other, must it be small."""
+_FEWEST: Final = 32
+
+
+class NoiseWatch:
+    """Tell from a stream of readings that the amplitude has reached the noise.
+
+    Parameters
+    ----------
+    rate_hz
+        Readings a second.
+
+    Notes
+    -----
+    In a window of 20 s the noise is the root mean square of the third differences over
+    sqrt(20) (a motion slow against the readings has next to none; white noise of standard
+    deviation s has sqrt(20) s), or what rounding leaves, 1/sqrt(12) of a count, if that is
+    more. The amplitude is sqrt(2) times the standard deviation about a straight line, the
+    noise taken off in squares. The end is reached when it was below twice the noise in two
+    windows, after it had been above ten times: a pendulum not yet released has not decayed.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._size = max(_FEWEST, round(_WINDOW_S * rate_hz))
+        self._kept: list[AnyArray] = []
+        self._count = self._small = 0
+        self._large = False
+        self.amplitude = math.nan
+        """In counts, of the last window."""
+
+    def feed(self, counts: AnyArray) -> bool:
+        """Take further readings, shape (n,); return whether the end is reached."""
+        self._kept.append(counts)
+        self._count += len(counts)
+        if self._count < self._size:
+            return False
+        joined = np.concatenate(self._kept).astype(np.float64)
+        while len(joined) >= self._size:
+            self._judge(joined[: self._size])
+            joined = joined[self._size :]
+        self._kept, self._count = [joined], len(joined)
+        return self._small >= _WINDOWS
+
+    def _judge(self, window: AnyArray) -> None:
+        differences = np.diff(window, 3)
+        noise = math.sqrt(max(float(np.mean(differences**2)) / 20.0, 1.0 / 12.0))
+        place = np.linspace(-1.0, 1.0, len(window))
+        slope = float(np.sum(place * window) / np.sum(place**2))
+        left = window - np.mean(window) - slope * place
+        self.amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
+        self._large = self._large or self.amplitude > _LARGE * noise
+        small = self._large and self.amplitude < _REACHED * noise
+        self._small = self._small + 1 if small else 0

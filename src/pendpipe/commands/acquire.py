@@ -223,7 +223,7 @@ def _stage(arguments: argparse.Namespace) -> int:
 
 def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
     """Record into a raw file."""
-    from pendpipe.acquisition.progress import ProgressLine
+    from pendpipe.acquisition.recorder import ProgressLine
 
     options = {
         "channels": (arguments.channel or 1,),
@@ -300,7 +300,7 @@ def _list(port: str | None) -> int:
     """Print the ports; ask the device on one of them who it is."""
     from serial.tools.list_ports import comports
 
-    from pendpipe.acquisition.ports import VENDOR, identify, no_ports, without_port
+    from pendpipe.acquisition.drivers import VENDOR, identify, no_ports, without_port
 
     if port:
         identity = identify(port)

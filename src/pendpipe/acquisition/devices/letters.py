@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from pendpipe.acquisition.devices.simulated import Dialect, marked
-from pendpipe.arrays import IntArray
+from pendpipe.acquisition.devices.simulated import Dialect
 
 
-class SimulatedDI154RS(Dialect):
+class SimulatedDI154RS(Dialect, model="DI-154RS", bits=12):
     """Four channels of 12 bits, +-10 V, behind a line of 4800 or 9600 baud.
 
     A command is NUL, letter, argument; letter and argument are echoed as they come. Bytes
@@ -17,8 +16,6 @@ class SimulatedDI154RS(Dialect):
     the rate counter adds that many bit times to a scan.
     """
 
-    model: ClassVar[str] = "DI-154RS"
-    bits: ClassVar[int] = 12
     range_volts = 10.0
     answer_to_identify: ClassVar[bytes] = b"0000000001"
 
@@ -75,31 +72,22 @@ class SimulatedDI154RS(Dialect):
             self.streaming = False
         return b""
 
-    def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, with a frame mark."""
-        return marked(codes, self.bits)
 
-
-class SimulatedDI194RS(SimulatedDI154RS):
+class SimulatedDI194RS(
+    SimulatedDI154RS, model="DI-194RS", bits=10, answer_to_identify=b"0000000000"
+):
     """The same box with 10 bits: three in the first byte, of which bit 4 means nothing."""
-
-    model: ClassVar[str] = "DI-194RS"
-    bits: ClassVar[int] = 10
-    answer_to_identify: ClassVar[bytes] = b"0000000000"
 
 
 _FULL_SCALES: Final = [0.5, 0.25, 0.1, 0.05, 0.025, 0.01, *[0.0] * 2, 50, 25, 10, 5, 2.5, 1]
 
 
-class SimulatedDI245(Dialect):
+class SimulatedDI245(Dialect, model="DI-245", bits=14):
     """Four channels of 14 bits, +-10 mV to +-50 V.
 
     NUL begins a short command, whose two characters are echoed one by one; everything else
     is text up to CR, echoed there. While data flow only the stop is obeyed.
     """
-
-    model: ClassVar[str] = "DI-245"
-    bits: ClassVar[int] = 14
 
     def __init__(self) -> None:
         super().__init__()
@@ -164,7 +152,3 @@ class SimulatedDI245(Dialect):
         else:
             self._rate_word = first
         return text.encode("latin-1") + b"\r"
-
-    def encode(self, codes: IntArray) -> bytes:
-        """Two bytes a sample, with a frame mark."""
-        return marked(codes, self.bits)

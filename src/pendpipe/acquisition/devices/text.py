@@ -32,15 +32,12 @@ class TextDialect(Dialect):
         """Execute one command and return its echo."""
 
 
-class SimulatedDI149(TextDialect):
+class SimulatedDI149(TextDialect, model="DI-149", bits=12):
     """Eight channels of 12 bits, +-10 V, text commands ended by CR.
 
     Every command is echoed with its CR, ``start`` too. While data flow only ``stop`` is
     obeyed. The scan list ends where ``xffff`` is written.
     """
-
-    model: ClassVar[str] = "DI-149"
-    bits: ClassVar[int] = 12
 
     def __init__(self) -> None:
         super().__init__()
@@ -90,23 +87,22 @@ class SimulatedDI149(TextDialect):
         return marked(np.asarray(codes) * 2 ** (14 - self.bits), 14)
 
 
-class SimulatedDI155(SimulatedDI149):
+class SimulatedDI155(
+    SimulatedDI149,
+    model="DI-155",
+    bits=14,
+    full_scales=tuple(50 / gain for gain in (1, 2, 4, 5, 8, 10, 16, 20)),
+):
     """Four channels of 14 bits, +-50 V over eight gains."""
 
-    model: ClassVar[str] = "DI-155"
-    bits: ClassVar[int] = 14
-    full_scales: ClassVar[tuple[float, ...]] = tuple(50 / g for g in (1, 2, 4, 5, 8, 10, 16, 20))
 
-
-class SimulatedDI2108(TextDialect):
+class SimulatedDI2108(TextDialect, model="DI-2108", bits=16):
     """Eight channels of 16 bits, +-10 V, text commands ended by CR.
 
     Commands are echoed with their CR; ``start`` is not, and ``info N`` is followed by the
     answer. While data flow only ``stop`` is obeyed. Data leave in packets (``ps``).
     """
 
-    model: ClassVar[str] = "DI-2108"
-    bits: ClassVar[int] = 16
     limits: ClassVar[dict[str, tuple[int, int]]] = {
         "srate": (375, 65535),
         "dec": (1, 512),
@@ -193,4 +189,4 @@ MODELS: Final[dict[str, dict[str, object]]] = {
 """The boxes that differ from the DI-2108 in figures only."""
 
 for _model, _figures in MODELS.items():
-    type(f"Simulated{_model}", (SimulatedDI2108,), {"model": _model, **_figures})
+    type(f"Simulated{_model}", (SimulatedDI2108,), {}, model=_model, **_figures)

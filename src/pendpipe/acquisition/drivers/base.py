@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.drivers.decoders import Decoder, SyncBitDecoder
@@ -85,8 +85,11 @@ class Driver(ABC):
     checks: ClassVar[str] = "cable, power"
     """What to check where the device does not answer."""
 
-    def __init_subclass__(cls) -> None:
-        if "model" in cls.__dict__:
+    def __init_subclass__(cls, **figures: Any) -> None:
+        """Enter a model by its figures: ``class DI149(TextDriver, model="DI-149", bits=12)``."""
+        for name, value in figures.items():
+            setattr(cls, name, value)
+        if "model" in figures:
             DRIVERS[plain_name(cls.model)] = cls
 
     def __init__(self, line: Line, clock: ScaledClock) -> None:

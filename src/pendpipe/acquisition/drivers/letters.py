@@ -7,7 +7,7 @@ commands as text, which ends in CR and is echoed there (A7).
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+from typing import Final
 
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.drivers.base import Driver, Identity
@@ -45,18 +45,13 @@ class LetterDriver(Driver):
         return self.line.read(1, self.patience_s)
 
 
-class DI154RS(LetterDriver):
+class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4):
     """The DI-154RS: 4 channels, 12 bits, +-10 V, powered by DTR and RTS.
 
     The device waits `count` bit times between scans, so that the rate is baud/(20 n + count) for n
     channels. The formula rests on two programs of others, not on the vendor's word: the rate is
     measured as well. 9600 baud is taken only when 4800 can't carry the rate.
     """
-
-    model: ClassVar[str] = "DI-154RS"
-    baudrate: ClassVar[int] = 4800
-    bits: ClassVar[int] = 12
-    channels: ClassVar[int] = 4
 
     def __init__(self, line: Line, clock: ScaledClock) -> None:
         super().__init__(line, clock)
@@ -127,11 +122,8 @@ class DI154RS(LetterDriver):
         return byte
 
 
-class DI194RS(DI154RS):
+class DI194RS(DI154RS, model="DI-194RS", bits=10):
     """The DI-194RS: the same line and commands, 10 bits."""
-
-    model: ClassVar[str] = "DI-194RS"
-    bits: ClassVar[int] = 10
 
 
 _RANGE_CODES: Final = dict(
@@ -142,17 +134,12 @@ _FILTERS: Final = range(1, 16)
 _DIVISORS: Final = range(256)
 
 
-class DI245(LetterDriver):
+class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RANGE_CODES)):
     """The DI-245: 4 channels, 14 bits, +-10 mV to +-50 V, 2 kHz in all.
 
     The burst rate is 8000/((SF + 1)(AF + 3)) Hz and is held to be shared by the channels; of
     several pairs as near, the shortest average AF is taken.
     """
-
-    model: ClassVar[str] = "DI-245"
-    bits: ClassVar[int] = 14
-    ranges: ClassVar[tuple[float, ...]] = tuple(_RANGE_CODES)
-    channels: ClassVar[int] = 4
 
     def hello(self) -> Identity:
         """End a stream of an earlier run and ask the device who it is."""

@@ -26,11 +26,8 @@ _PACKETS: Final = (16, 32, 64, 128, 256, 512, 1024, 2048)
 _PACKETS_PER_SECOND: Final = 20.0
 
 
-class TextDriver(Driver):
+class TextDriver(Driver, stop_command=(b"stop\r",), checks="cable, power, CDC mode"):
     """Commands of text ended by CR; the speed of the line does not matter."""
-
-    stop_command: ClassVar[tuple[bytes, ...]] = (b"stop\r",)
-    checks: ClassVar[str] = "cable, power, CDC mode"
 
     def hello(self) -> Identity:
         """End a stream of an earlier run and ask the device who it is."""
@@ -42,11 +39,8 @@ class TextDriver(Driver):
         return Identity(f"DI-{number}", self._send_line("info 2"), self._send_line("info 6"))
 
 
-class DI149(TextDriver):
+class DI149(TextDriver, model="DI-149", bits=12):
     """The DI-149: 8 channels, 12 bits, +-10 V, 10 kHz in all; scans at 750 kHz/srate."""
-
-    model: ClassVar[str] = "DI-149"
-    bits: ClassVar[int] = 12
 
     def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
         slowest, fastest = (
@@ -79,27 +73,26 @@ class DI149(TextDriver):
         raise InputError(self.line.port, "the device does not start", "check cable and power")
 
 
-class DI155(DI149):
+class DI155(
+    DI149,
+    model="DI-155",
+    bits=14,
+    ranges=(50.0, 25.0, 12.5, 10.0, 6.25, 5.0, 3.125, 2.5),
+    channels=4,
+):
     """The DI-155: 4 channels, frames of 14 bits, +-2.5 to +-50 V, 10 kHz in all.
 
     How many of the 14 bits carry a signal is not settled: 13 or 14.
     """
 
-    model: ClassVar[str] = "DI-155"
-    bits: ClassVar[int] = 14
-    ranges: ClassVar[tuple[float, ...]] = (50.0, 25.0, 12.5, 10.0, 6.25, 5.0, 3.125, 2.5)
-    channels: ClassVar[int] = 4
 
-
-class DI2108(TextDriver):
+class DI2108(TextDriver, model="DI-2108", bits=16):
     """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode.
 
     The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources disagree
     whether this is the rate of scans or of samples: it is measured as well.
     """
 
-    model: ClassVar[str] = "DI-2108"
-    bits: ClassVar[int] = 16
     divisors: ClassVar[tuple[int, int]] = (375, 65535)
     decimations: ClassVar[int] = 512
     further_decimations: ClassVar[int] = 40000
@@ -174,7 +167,7 @@ MODELS: Final[dict[str, dict[str, object]]] = {
 """The boxes that differ from the DI-2108 in figures only; 12 and 14 bits stand at the top."""
 
 for _model, _figures in MODELS.items():
-    type(_model.replace("-", ""), (DI2108,), {"model": _model, **_figures})
+    type(_model.replace("-", ""), (DI2108,), {}, model=_model, **_figures)
 
 
 def _packet_code(bytes_per_second: float) -> int:
