@@ -13,10 +13,10 @@ import stat
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 import serial
 
@@ -32,7 +32,7 @@ class LineLostError(InputError):
     """The line broke while it was in use: a cable pulled, a device switched off."""
 
 
-class Line:
+class Line(AbstractContextManager["Line"]):
     """An open serial line.
 
     Parameters
@@ -63,9 +63,6 @@ class Line:
             self._serial.open()
         except (OSError, ValueError) as fault:
             raise cannot_open(port, fault) from None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(
         self,
@@ -104,11 +101,9 @@ class Line:
 
     def read_until(self, end: bytes, limit_s: float) -> bytes:
         """Return everything up to and with `end`, or what came within `limit_s`."""
-        stop = time.monotonic() + limit_s
-        got = bytearray()
-        while not got.endswith(end) and (left := stop - time.monotonic()) > 0:
-            got += self.read(1, left)
-        return bytes(got)
+        with self._watched():
+            self._serial.timeout = limit_s
+            return bytes(self._serial.read_until(end))
 
     def discard(self, quiet_s: float, limit_s: float = 1.0) -> bytes:
         """Throw away what arrives until nothing has come for `quiet_s`; return its end."""

@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
@@ -43,6 +42,7 @@ from pendpipe.figures.style import (
     placeholder,
     plain_numbers,
     save,
+    second_scale,
     styled,
 )
 from pendpipe.quantities import axis_unit, prefixed, with_error
@@ -255,7 +255,10 @@ def draw_fig04(comparison: Mapping[str, Any]) -> Figure:
     )
     upper.set(ylabel="Quality factor $Q$", xlim=(0.0, edge), ylim=(0.0, None))
     upper.legend(loc="upper left")
-    _periods_on_top(upper, edge)
+    # The periods that people think in.
+    periods = [period for period in PERIODS_S if period**-2.0 <= edge]
+    at = [period**-2.0 for period in periods]
+    second_scale(upper, "top", at, [f"{period:g}" for period in periods], "Period (s)")
 
     line = coefficient * squared
     lower.errorbar(
@@ -276,16 +279,6 @@ def draw_fig04(comparison: Mapping[str, Any]) -> Figure:
         label = f"With a free exponent: $Q \\propto f^{{\\,n}}$, $n$ = {text}"
         lower.set_title(label, fontsize=8.5, pad=3)
     return figure
-
-
-def _periods_on_top(axes: Any, edge: float) -> None:
-    """Mark the periods that people think in along the upper edge."""
-    top = axes.secondary_xaxis("top")
-    periods = [period for period in PERIODS_S if period**-2.0 <= edge]
-    top.set_xticks([period**-2.0 for period in periods], [f"{period:g}" for period in periods])
-    top.set_xlabel("Period (s)", labelpad=3)
-    top.tick_params(length=3)
-    top.spines["top"].set_visible(True)
 
 
 CAUSES: Final = {
@@ -320,20 +313,14 @@ def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
     )
     plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
     axes.tick_params(which="minor", length=0)
-    _lowering_on_the_right(axes)
+    # The same as a lowering of the frequency: T up by x means f down by x/(1 + x).
+    low, high = axes.get_ylim()
+    lowered = [p for p in _SHIFTS_PERCENT if low <= 100.0 * p / (100.0 - p) <= high]
+    at = [100.0 * p / (100.0 - p) for p in lowered]
+    label = "Lowering of the frequency (%)"
+    second_scale(axes, "right", at, [str(p) for p in lowered], label)
     _keys(axes, names)
     return figure
-
-
-def _lowering_on_the_right(axes: Any) -> None:
-    """The same as a lowering of the frequency: T up by x means f down by x/(1 + x)."""
-    right = axes.secondary_yaxis("right")
-    low, high = axes.get_ylim()
-    shown = [p for p in _SHIFTS_PERCENT if low <= 100.0 * p / (100.0 - p) <= high]
-    right.set_yticks([100.0 * p / (100.0 - p) for p in shown], [str(p) for p in shown])
-    right.yaxis.set_minor_locator(NullLocator())
-    right.set_ylabel("Lowering of the frequency (%)")
-    right.spines["right"].set_visible(True)
 
 
 def _keys(axes: Any, names: list[str]) -> None:
@@ -602,7 +589,6 @@ def _amplitudes_on_top(panel: Any, tail: Sequence[Mapping[str, Any]], start: Flo
     marks = marks[(marks >= np.min(shown)) & (marks <= np.max(shown))]
     order = np.argsort(shown)
     moments = np.interp(np.log(marks), np.log(shown[order]), start[order])
-    top = panel.secondary_xaxis("top")
-    top.set_xticks(moments, [f"{mark:g}" for mark in marks])
-    top.set_xlabel(f"Amplitude there ({unit})", color=INK, labelpad=3)
-    top.spines["top"].set_visible(True)
+    second_scale(
+        panel, "top", moments, [f"{mark:g}" for mark in marks], f"Amplitude there ({unit})"
+    )

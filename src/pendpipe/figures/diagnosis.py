@@ -95,28 +95,25 @@ class Shown:
         return np.where(self.data.weight > 0.0, left, math.nan)
 
     @cached_property
-    def _measured(self) -> Cycles:
+    def _measured(self) -> tuple[Cycles, list[int]]:
+        """The cycles of the readings, and those between which they are compared."""
         found = cycles(self.data.values, self.data.weight, self.clock, self.noise.white_rms)
-        if len(found.time_s) < 3:
-            raise NothingToDrawError("there are too few whole cycles")
-        return found
-
-    @cached_property
-    def _ends(self) -> list[int]:
-        ends = span_ends(self._measured)
-        if len(ends) < 3:
-            raise NothingToDrawError("the amplitude is lost in the noise")
-        return ends
+        ends = span_ends(found) if len(found.time_s) else []
+        # Two points are no curve.
+        if len(ends) < 4:
+            raise NothingToDrawError("too few cycles are above the noise")
+        return found, ends
 
     @cached_property
     def measured(self) -> Spans:
         """Loss and frequency of the readings."""
-        return between(self._measured, self._ends)
+        return between(*self._measured)
 
     def of_model(self, fit: Fit) -> Spans:
         """The same of a model's readings, between the same times."""
+        found, ends = self._measured
         own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
-        return between(own.at(self._measured.time_s), self._ends)
+        return between(own.at(found.time_s), ends)
 
 
 def shown(outcome: Outcome) -> Shown:

@@ -10,13 +10,13 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final, NamedTuple, ParamSpec
+from typing import Any, Final, Literal, NamedTuple, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from pendpipe.arrays import FloatArray
 from pendpipe.files import replaced
@@ -170,6 +170,18 @@ def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0, **entries: Any
     """Put the legend above the axes, where it can't hide data."""
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, lift)}
     axes.legend(ncols=columns, borderaxespad=0.3, **place, **entries)
+
+
+def second_scale(
+    axes: Any, side: Literal["top", "right"], at: Sequence[float], marks: Sequence[str], label: str
+) -> None:
+    """Mark the same axis in other units along the upper or the right edge."""
+    letter = "x" if side == "top" else "y"
+    scale = getattr(axes, f"secondary_{letter}axis")(side)
+    getattr(scale, f"set_{letter}ticks")(at, marks)
+    getattr(scale, f"{letter}axis").set_minor_locator(NullLocator())
+    getattr(scale, f"set_{letter}label")(label, labelpad=3)
+    scale.spines[side].set_visible(True)
 
 
 def plain_text(text: str) -> str:
