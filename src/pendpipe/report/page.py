@@ -19,13 +19,13 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pendpipe.analysis.fit.result import read_fit
-from pendpipe.figures.data import number
+from pendpipe.figures.data import number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact
 from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
 from pendpipe.report.headline import headline
-from pendpipe.report.records import CHI2_RANGE, Column, Health, table_of_records
+from pendpipe.report.records import CHI2_RANGE, STATES, Column, Health, table_of_records
 from pendpipe.templates import render as fill_template
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -94,13 +94,16 @@ def render(
         records=lines,
         counts=Counter(line["health"][:3] for line in lines),
         chi2_range=CHI2_RANGE,
+        states=STATES,
+        comparison=comparison,
+        fitted=used(comparison),
         decays=decays,
         outside=outside,
         glossary=GLOSSARY,
         provenance=comparison.get("provenance") or {},
         downloads=_downloads(columns, lines, summary),
         **own_files(),
-        **remarks.of_campaign(comparison, list(drawn), folder),
+        **remarks.of_campaign(comparison),
     )
 
 
