@@ -341,17 +341,20 @@ def _as_fit_prints(
 ) -> FittedModel:
     """Take the numbers of a model from the fit, which has the same model and uses all readings.
 
-    Where the fit settles and does not contradict the decay, there is then one answer. Else the
-    search has lost the phase, as a least squares of all readings does in a gross misfit; the
+    With the torque that the fit takes by itself they are what ``pendpipe fit`` prints; with the
+    other, the waveform's. Where the fit does not settle, or contradicts the decay, it prints no
+    law. It has lost the phase, as a least squares of all readings does in a gross misfit; the
     diagnosis follows it along the motion, and its own numbers stand.
     """
     from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit.swings import restoring_of
 
+    taken = restoring_of(points, stated=part.unit_is_stated)
     try:
         fitted = fit_recording(
             part,
             points=points,
-            method="waveform",
+            method=None if restoring == taken else "waveform",
             restoring=restoring,
             baseline=baseline,
             place=place,
