@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -111,3 +111,28 @@ def inertia_errors(design: Design) -> tuple[FloatArray, FloatArray]:
         known * (inertias[0] - inertias[1]) / 0.02,
         known * (torques[0] - torques[1]) / 0.02,
     )
+
+
+class InertiaSds(NamedTuple):
+    """Relative standard deviations of one record's moment of inertia.
+
+    Parameters
+    ----------
+    own, common
+        From distances and masses: what its own clamps add, and what all records share.
+    from_frequency
+        As ``K/omega^2`` of an exact frequency.
+    """
+
+    own: float
+    common: float
+    from_frequency: float
+
+
+def inertia_sds(design: Design) -> dict[str, InertiaSds]:
+    """Return the errors of `inertia_errors` by record."""
+    distances, frequency = inertia_errors(design)
+    clamp = np.array([each.name.startswith("distance of") for each in design.nuisances])
+    columns = (distances[clamp], distances[~clamp], frequency)
+    sds = np.array([np.sqrt(np.sum(each**2, axis=0)) for each in columns]).T.tolist()
+    return {run.record: InertiaSds(*each) for run, each in zip(design.runs, sds, strict=True)}

@@ -16,6 +16,7 @@ from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, SharedEstimate, Surroundings
 from pendpipe.arguments import add, load
+from pendpipe.campaign.joint import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
@@ -24,6 +25,7 @@ from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
 from pendpipe.provenance import code_version
+from pendpipe.stages.joint import campaign_data
 from pendpipe.stages.results import RecordResult, read_results, record_files, sensor_file
 from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.stages.theory import branch_curves, record_theory
@@ -56,16 +58,19 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     """Compare the losses with Eq. 16 and write both files."""
     results = read_results(campaign)
     separated = read_separation(separation)
-    found = _comparison(campaign, separated)
+    together = campaign_data(campaign, results)
+    spread = {} if together is None else inertia_sds(together[0])
+    found = _comparison(campaign, separated, spread)
     content = {
         "schema_version": 1,
         "title": campaign.configuration.title,
         "typical_record": campaign.configuration.typical_record,
         "has_theory": found is not None,
-        "records": [_record(campaign, result, separated, found) for result in results],
+        "records": [_record(campaign, result, separated, found, spread) for result in results],
         "curves": _curves(campaign, separated),
         "hysteretic_coefficient": separated.benchmark,
         **_campaign_numbers(found),
+        "joint": None if together is None else joint_values(*together),
         "tail": _tail(campaign, results),
         "calibration": _calibration(campaign),
         "provenance": stamp(campaign),
@@ -74,18 +79,24 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     write_json(summary, campaign_summary(content))
 
 
-def _comparison(campaign: Campaign, separated: Separation) -> Comparison | None:
+def _comparison(
+    campaign: Campaign, separated: Separation, spread: dict[str, InertiaSds]
+) -> Comparison | None:
     """Eq. 16 beside what Eq. 17 has left; ``None`` where no record has a theory."""
     apparatus = campaign.configuration.apparatus
     if apparatus is None or apparatus.sphere is None or separated.benchmark is None:
         return None
-    around = {}
+    around, warm = {}, (0.0, 20.0)
     for split in separated.records:
         row = campaign.record(split.measured.record)
         geometry = campaign.geometry(row)
         if geometry is None or not geometry.sphere or not row.fluid:
             continue
         density, viscosity = pendulum(campaign, row).fluid
+        fluid = campaign.configuration.fluids[row.fluid]
+        if fluid.temperature_c is not None:
+            at = fluid.temperature_c if row.temperature_c is None else row.temperature_c
+            warm = max(warm, (fluid.temperature_sd_k, at))
         around[row.record] = Surroundings(
             apparatus.sphere.diameter_m / 2,
             apparatus.sphere.distance_m,
@@ -98,12 +109,19 @@ def _comparison(campaign: Campaign, separated: Separation) -> Comparison | None:
         inverse_k=float(separated.benchmark["inverse_sd"]),
         radius_m=apparatus.sphere.diameter_sd_m / 2,
         distance_m=apparatus.sphere.distance_sd_m,
+        relative_inertia=float(np.mean([spread[name].common for name in around if name in spread])),
+        temperature_k=warm[0],
+        temperature_c=warm[1],
     )
     return compare(separated.records, around, errors)
 
 
 def _record(
-    campaign: Campaign, result: RecordResult, separated: Separation, found: Comparison | None
+    campaign: Campaign,
+    result: RecordResult,
+    separated: Separation,
+    found: Comparison | None,
+    spread: dict[str, InertiaSds],
 ) -> dict[str, Any]:
     """Everything that is known of one record."""
     row = result.record
@@ -144,7 +162,7 @@ def _record(
     content["misfit"] = asdict(amplitude_misfit(points))
     if split is not None:
         content |= _separated(split)
-    return content | _theory(campaign, result, split, found)
+    return content | _theory(campaign, result, split, found, spread.get(row.record))
 
 
 def _separated(split: SeparatedRecord) -> dict[str, Any]:
@@ -163,6 +181,7 @@ def _theory(
     result: RecordResult,
     split: SeparatedRecord | None,
     found: Comparison | None,
+    spread: InertiaSds | None,
 ) -> dict[str, Any]:
     """Inertia in two ways, Eq. 16 and its neighbours."""
     theory = record_theory(campaign, result.record)
@@ -170,11 +189,16 @@ def _theory(
         return {}
     torque = theory["restoring_torque_n_m_per_rad"]
     frequency = result.parameter("frequency")
+    known = theory["moment_of_inertia_kg_m2"]
     inertia = float(inertia_from_frequency(frequency.value, torque))
+    spread = spread or InertiaSds(0.0, 0.0, 0.0)
+    relative = np.hypot(2.0 * frequency.sd / frequency.value, spread.from_frequency)
     content: dict[str, Any] = {
-        "moment_of_inertia": Estimate(theory["moment_of_inertia_kg_m2"], 0.0, "kg m^2").as_json(),
+        "moment_of_inertia": Estimate(
+            known, known * float(np.hypot(spread.own, spread.common)), "kg m^2"
+        ).as_json(),
         "moment_of_inertia_from_frequency": Estimate(
-            inertia, 2.0 * inertia * frequency.sd / frequency.value, "kg m^2"
+            inertia, inertia * float(relative), "kg m^2"
         ).as_json(),
         "frequency_theory_hz": theory["frequency_hz"],
     }
@@ -313,6 +337,7 @@ def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
         "theory_factor": _number(comparison["theory_factor"]),
         "history_coefficient": _number(comparison["history_coefficient"]),
         "volts_per_radian": _number(calibration and calibration["volts_per_radian"]),
+        "joint": comparison["joint"],
         "records": [
             {name: record[name] for name in ("record", "fluid", "branch")}
             | {name: _number(record.get(name)) for name in NUMBERS}

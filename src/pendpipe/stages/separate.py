@@ -10,11 +10,12 @@ from typing import Any
 from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord
 from pendpipe.analysis.separate import Benchmark, fit_benchmark, separate
 from pendpipe.arguments import add, load
+from pendpipe.campaign.joint import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign
-from pendpipe.configuration.records import Record
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
+from pendpipe.stages.joint import campaign_data
 from pendpipe.stages.results import RecordResult, read_results, record_files
 from pendpipe.stages.theory import record_theory
 
@@ -50,7 +51,9 @@ def separate_campaign(campaign: Campaign, out: Path) -> None:
     fitted law contradicts the decay (a red light) are left out; `compare` reports the reason.
     """
     results = [result for result in read_results(campaign) if result.usable]
-    measured = [_measured(campaign, result) for result in results]
+    together = campaign_data(campaign, results)
+    spread = {} if together is None else inertia_sds(together[0])
+    measured = [_measured(campaign, result, spread) for result in results]
     air = [record for record in measured if record.branch == "air"]
     if not air:
         write_json(out, {"schema_version": 1, "hysteretic_coefficient": None, "records": []})
@@ -85,16 +88,17 @@ def common_relative_sd(results: list[RecordResult]) -> float:
     return float(shared[0]["sd"]) / abs(float(shared[0]["value"])) if shared else 0.0
 
 
-def distance_inertia(campaign: Campaign, record: Record) -> Estimate | None:
-    """Moment of inertia from distances and masses; its own error is in the budget."""
-    theory = record_theory(campaign, record)
-    if theory is None:
-        return None
-    return Estimate(theory["moment_of_inertia_kg_m2"], 0.0, "kg m^2")
-
-
-def _measured(campaign: Campaign, result: RecordResult) -> MeasuredRecord:
+def _measured(
+    campaign: Campaign, result: RecordResult, spread: dict[str, InertiaSds]
+) -> MeasuredRecord:
     row = result.record
+    theory = record_theory(campaign, row)
+    inertia = None
+    if theory is not None:
+        value = theory["moment_of_inertia_kg_m2"]
+        # What the records share of it is in the comparison's budget.
+        own = spread[row.record].own if row.record in spread else 0.0
+        inertia = Estimate(value, value * own, "kg m^2")
     return MeasuredRecord(
         record=row.record,
         fluid=row.fluid,
@@ -103,7 +107,7 @@ def _measured(campaign: Campaign, result: RecordResult) -> MeasuredRecord:
         quadratic=result.parameter("a"),
         linear=result.parameter("b"),
         coulomb=result.parameter("c"),
-        moment_of_inertia=distance_inertia(campaign, row),
+        moment_of_inertia=inertia,
     )
 
 
