@@ -11,14 +11,14 @@ from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.detect import Lead, detect, prepare
-from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
 from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.moves import FURTHER, describe, improve, prefer_two_names, price
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.state import State, Step, first_noise
 from pendpipe.diagnosis.task import Task, applicable
-from pendpipe.diagnosis.weighing import stands_apart
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
@@ -43,7 +43,7 @@ from .records import (
 CHIRP = 1e-3 * np.sin(2.0 * np.pi * (1e-3 * TIME_S) * TIME_S)
 """What no entry explains: a line whose frequency rises from 0 to 0.2 Hz."""
 SCALES = st.builds(
-    Scale, st.floats(0.0, 1e6), st.just(np.inf) | st.floats(1.0, 1e8), st.floats(2.0, 1e3)
+    Scale, st.floats(0.0, 1e6), st.floats(1.0, 1e6), st.just(np.inf) | st.floats(2.0, 1e3)
 )
 
 
@@ -73,7 +73,7 @@ def test_what_a_model_loses_grows_with_chi2_and_never_exceeds_it(
 ) -> None:
     lost = scale.lost(scale.least + behind)
     assert scale.lost(scale.least) == 0.0
-    assert 0.0 <= lost <= max(behind * scale.numbers / min(scale.floor, 1e300), behind) + 1e-6
+    assert 0.0 <= lost <= behind / scale.unit + 1e-6
     assert scale.lost(scale.least + 2.0 * behind) >= lost
     assert scale.within(lost) == pytest.approx(scale.least + behind, rel=1e-6, abs=1e-6)
 
@@ -83,9 +83,8 @@ def test_a_small_loss_counts_against_what_is_left_for_each_number(
     numbers: float, part: float
 ) -> None:
     """M ln(1 + d/(e + m)) is d over the mean square of the m numbers, for small d."""
-    floor = 50.0 * numbers
-    assert Scale(0.0, floor, numbers).lost(part * floor) == pytest.approx(
-        part * floor / (floor / numbers), rel=1e-3
+    assert Scale(0.0, 50.0, numbers).lost(50.0 * part * numbers) == pytest.approx(
+        part * numbers, rel=1e-3
     )
 
 
@@ -158,7 +157,20 @@ def tone_at(frequency_hz: float) -> Fit:
 def test_a_line_between_the_harmonics_stands_apart(order: float, apart: bool) -> None:
     """At a harmonic it may be a part of the motion that the model lacks."""
     fit = tone_at(order * FREQUENCY_HZ)
-    assert stands_apart(by_identifier("tone-pickup"), fit) == apart
+    assert off_harmonics(fit, by_identifier("tone-pickup")) == apart
+
+
+@pytest.mark.parametrize(("order", "against_noise"), [(3.4, True), (3.0, False)])
+def test_a_line_off_the_harmonics_counts_against_the_noise(
+    order: float, against_noise: bool
+) -> None:
+    """Whatever else is left: here three numbers of a hundred standard deviations."""
+    fit = tone_at(order * FREQUENCY_HZ)
+    (tone,) = fit.model.effects
+    gain = lines(fit) if against_noise else 100.0
+    worth = Scale(fit.chi2 + lines(fit), 1e4, 3.0).worth(fit.chi2 + gain, fit, tone)
+    assert worth == pytest.approx(gain if against_noise else 0.01, rel=1e-2)
+    assert (gain > 1000.0) == against_noise
 
 
 def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:

@@ -14,6 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.chance import Chance, Trials
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import remainder_of
@@ -47,52 +48,76 @@ class Scale:
 
     Where the best model leaves only noise, chi^2 counts as it is. Where it leaves more, the rest
     is an unknown function of m numbers of unknown size, the likelihood of which is
-    (sum of squares)^(-m/2): then m ln(1 + (chi^2 - least)/floor) counts, with
-    floor = excess + m.
+    (sum of squares)^(-m/2): then m ln(1 + (chi^2 - least)/(m unit)) counts, with
+    m unit = excess + m.
 
     Parameters
     ----------
     least
         chi^2 of the best model.
-    floor
-        What it leaves, its noise included; inf where that is noise alone.
+    unit
+        The chi^2 that small differences are counted in.
     numbers
-        The independent numbers m of what it leaves.
+        The independent numbers m of what it leaves; inf where that is noise alone.
     """
 
     least: float
-    floor: float = math.inf
-    numbers: float = 1.0
+    unit: float = 1.0
+    numbers: float = math.inf
 
     @classmethod
     def of(cls, best: Fit, data: Data, noise: Noise) -> Scale:
         """Return the scale that a set's best model gives."""
-        rest = remainder_of(best, data, noise)
+        rest, least = remainder_of(best, data, noise), best.chi2 + lines(best)
         if not rest.systematic:
-            return cls(best.chi2)
-        return cls(best.chi2, rest.excess + rest.numbers, rest.numbers)
+            return cls(least)
+        return cls(least, 1.0 + rest.excess / rest.numbers, rest.numbers)
+
+    @property
+    def clean(self) -> bool:
+        """Whether the best model leaves noise alone."""
+        return math.isinf(self.numbers)
 
     def lost(self, chi2: float) -> float:
         """Return what a model is worse than the best."""
-        behind = chi2 - self.least
-        if math.isinf(self.floor) or behind <= 0.0:
-            return behind if math.isinf(self.floor) else behind * self.numbers / self.floor
-        return self.numbers * math.log1p(behind / self.floor)
+        behind = (chi2 - self.least) / self.unit
+        if self.clean or behind <= 0.0:
+            return behind
+        return self.numbers * math.log1p(behind / self.numbers)
+
+    def lost_by(self, fit: Fit, credit: float = 0.0) -> float:
+        """Return what a set of effects is worse than the best."""
+        apart = lines(fit)
+        return self.lost(fit.chi2 - credit + apart) - apart
 
     def within(self, lost: float) -> float:
         """Return the chi^2 of a model that is worse than the best by `lost`."""
-        if math.isinf(self.floor):
-            return self.least + lost
-        return self.least + self.floor * math.expm1(min(lost / self.numbers, 50.0))
+        if not self.clean:
+            lost = self.numbers * math.expm1(min(lost / self.numbers, 50.0))
+        return self.least + self.unit * lost
 
-    @property
-    def unit(self) -> float:
-        """Return the chi^2 that small differences are counted in."""
-        return 1.0 if math.isinf(self.floor) else self.floor / self.numbers
+    def worth(self, before: float, fit: Fit, effect: Effect) -> float:
+        """Return what the fall of chi^2 from `before` by an effect of a fit is worth."""
+        own, apart = line(fit, effect), lines(fit)
+        return self.lost(before + apart - own) - self.lost(fit.chi2 + apart) + own
 
-    def worth(self, before: float, after: float) -> float:
-        """Return what a fall of chi^2 is worth."""
-        return self.lost(before) - self.lost(after)
+
+def line(fit: Fit, effect: Effect) -> float:
+    """Return the chi^2 that a line off the harmonics takes; 0 of all else.
+
+    No misfit of the motion makes such a line, and it is orthogonal to what is left: its chi^2
+    counts against the noise.
+    """
+    if not off_harmonics(fit, effect):
+        return 0.0
+    first = next(place.start for other, place in fit.model.places() if other is effect)
+    sizes = slice(first, first + effect.sizes)
+    return float(np.sum((fit.jacobian[:, sizes] @ fit.value[sizes]) ** 2))
+
+
+def lines(fit: Fit) -> float:
+    """Return the chi^2 that all lines off the harmonics take."""
+    return sum(line(fit, effect) for effect in fit.model.effects)
 
 
 @dataclass(frozen=True)
@@ -123,7 +148,7 @@ class Rival:
     @classmethod
     def of(cls, lead: Lead, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
         """Return the rival whose fit lowers chi^2 from `before`."""
-        worth = scale.worth(before, fit.chi2)
+        worth = scale.worth(before, fit, lead.effect)
         found = evidence(lead, fit, worth, chance, scale.unit)
         return cls(lead, fit, before - fit.chi2, worth, found)
 
@@ -134,7 +159,7 @@ class Rival:
         """
         if self.drawn:
             return Rival.of(self.lead, fit, before, scale, NO_SCAN)
-        worth = scale.worth(before, fit.chi2)
+        worth = scale.worth(before, fit, self.lead.effect)
         return Rival(self.lead, fit, before - fit.chi2, worth, worth - self.charge)
 
     @property

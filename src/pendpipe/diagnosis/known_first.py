@@ -74,7 +74,7 @@ def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
     if left < right or max(fit.max_phase_error_rad, before.max_phase_error_rad) > LOST_PHASE_RAD:
         return bool(left < right)
     best = min((fit, before), key=lambda each: each.chi2)
-    worth = Scale.of(best, data, state.noise).worth(before.chi2, fit.chi2)
+    worth = Scale.of(best, data, state.noise).worth(before.chi2, fit, effect)
     return worth + effect.prior > 0.0
 
 

@@ -14,6 +14,7 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
 from pendpipe.effects import Effect
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.oscillations import PlaneCoupling
 from pendpipe.quantities import with_error
 
@@ -21,6 +22,8 @@ _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
 _LARGE_PHASE_RAD: Final = 0.3
 """Phase difference of two models in rad from which the difference of readings misleads."""
+_OFF_HARMONIC: Final = 0.1
+"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
 _HARMONICS: Final = 6
 _HARMONIC_SHARE: Final = 0.1
 
@@ -129,6 +132,15 @@ def tone_of(fit: Fit, effect: Effect) -> float | None:
     """Return the frequency of a tone, Hz."""
     interval = _interval_of(fit, effect, "Hz") if effect.spectral else None
     return None if interval is None else 0.5 * (interval[0] + interval[1])
+
+
+def off_harmonics(fit: Fit, effect: Effect) -> bool:
+    """Whether an effect is a line off the motion's harmonics: no misfit of the motion makes one."""
+    tone = tone_of(fit, effect)
+    if tone is None:
+        return False
+    order = tone / (0.5 * float(fit.value[OMEGA]) / math.pi)
+    return abs(order - round(order)) > _OFF_HARMONIC and order > _OFF_HARMONIC
 
 
 def beat_of(fit: Fit, effect: Effect) -> float | None:

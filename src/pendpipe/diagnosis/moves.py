@@ -11,7 +11,6 @@ effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.ch
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -21,7 +20,7 @@ import numpy as np
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Detection, Lead, detect, prepare
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
@@ -85,7 +84,7 @@ def _best(here: Proposed, there: Sequence[Proposed], state: State) -> Proposed:
     found = [here, *there]
     best = min(found, key=lambda each: each.fit.chi2)
     scale = Scale.of(best.fit, state.data, state.noise)
-    return min(found, key=lambda each: scale.lost(each.fit.chi2 - each.credit) + price(each.steps))
+    return min(found, key=lambda each: scale.lost_by(each.fit, each.credit) + price(each.steps))
 
 
 def _moves(state: State) -> Iterator[Proposed]:
@@ -99,7 +98,7 @@ def _drops(state: State) -> Iterator[Proposed]:
     The last one, which was significant, is not dropped where it leaves only noise, unless a fault
     of the measurement was found after it.
     """
-    clean = np.isinf(Scale.of(state.fit, state.data, state.noise).floor)
+    clean = Scale.of(state.fit, state.data, state.noise).clean
     joined = any(fault.after == len(state.steps) for fault in state.faults)
     if clean and len(state.steps) < 2 and not joined:
         return
@@ -119,7 +118,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
     Where more than noise is left, the name that gains most stays: a curve competes for the rest.
     """
     own = [step for step in state.steps if _is_further(step)]
-    if own and not math.isinf(Scale.of(state.fit, state.data, state.noise).floor):
+    if own and not Scale.of(state.fit, state.data, state.noise).clean:
         own.remove(max(own, key=lambda step: step.winner.gain))
     effects = [(step, step.winner.lead.effect) for step in own]
     steady = [step for step, effect in effects if not (effect.local or effect.spectral)]
@@ -138,7 +137,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         rivals = ranked([_rival(bare, fit, scale) for fit in fits])
         step = Step(tuple(rivals), replaced[0].p_value, bare)
         kept = [other for other in state.steps if other not in replaced]
-        left = max(state.fit.chi2 - state.data.used, 0.0) if math.isinf(scale.floor) else 0.0
+        left = max(state.fit.chi2 - state.data.used, 0.0) if scale.clean else 0.0
         best = rivals[0]
         yield Proposed(
             best.fit,
@@ -157,15 +156,7 @@ def _without(state: State, steps: Sequence[Step]) -> Fit | None:
     for step in steps:
         model, value = model.dropping(step.winner.lead.effect, value)
     bare = np.concatenate([state.bare, value[len(state.bare) :]])
-    found = []
-    for start in (value, bare):
-        try:
-            found.append(refine(model, state.data, state.noise, start, held=state.held))
-        except (NoMotionError, np.linalg.LinAlgError):
-            continue
-        if len(found) == 1 and found[0].converged:
-            break
-    return min(found, key=lambda fit: fit.chi2, default=None)
+    return best_fit(model, state.data, state.noise, [value, bare], held=state.held)
 
 
 def describe(state: State, p_value: float) -> bool:
@@ -233,7 +224,7 @@ def _better_than(curve: Rival, name: Rival, second: Rival, state: State) -> bool
         price([Step((rival,), 0.0, state.fit) for rival in some])
         for some in ((name, second), (curve,))
     )
-    return scale.lost(second.fit.chi2) + names < scale.lost(curve.fit.chi2) + drawn
+    return scale.lost_by(second.fit) + names < scale.lost_by(curve.fit) + drawn
 
 
 def _best_names(state: State) -> list[Rival]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.gauss_newton import SETTLED, Evaluation, GaussNewton
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import C
 from pendpipe.effects.model import Evaluated, Model
 
@@ -25,6 +27,8 @@ _SLOW_GAIN: Final = 0.25
 """Fall of chi^2: a fit ends after three rounds that gain less."""
 _LAST_STEPS: Final = 3
 """Last steps from which the gain of further ones is extrapolated."""
+_NUMBERS: Final = 100.0
+"""What a misfit beyond the noise is described by at most: chi^2 counts against each of them."""
 _FAR_BEYOND_SD: Final = 3.0
 """Standard deviations beyond a bound from which the value counts as known: the bound."""
 
@@ -140,6 +144,34 @@ def refine(
     return refining.fit
 
 
+def best_fit(
+    model: Model,
+    data: Data,
+    noise: Noise,
+    starts: Sequence[FloatArray],
+    *,
+    held: Iterable[int] = (),
+    useful: float = math.inf,
+) -> Fit | None:
+    """Refine from the best of several starts, and from the next best where that gets stuck.
+
+    None if the model has no motion from any. A start with values of another model is left out.
+    """
+    fixed, begun = tuple(held), []
+    for start in starts:
+        with suppress(NoMotionError, np.linalg.LinAlgError):
+            if len(start) == model.size:
+                begun.append(Refining(model, data, noise, start, held=fixed))
+    found = []
+    for refining in sorted(begun, key=lambda each: each.chi2):
+        with suppress(NoMotionError, np.linalg.LinAlgError):
+            refining.go(ROUNDS, useful)
+            found.append(refining.fit)
+            if found[-1].converged:
+                break
+    return min(found, key=lambda fit: fit.chi2, default=None)
+
+
 class Refining:
     """A fit that can be interrupted and resumed; parameters are those of `refine`.
 
@@ -176,8 +208,8 @@ class Refining:
 
     @property
     def _unit(self) -> float:
-        """chi^2 of a reading: gains that are small beside a misfit of all readings are none."""
-        return max(1.0, self._here.chi2 / len(self._here.residual))
+        """The chi^2 that counts as 1: of one of the numbers that a misfit is described by."""
+        return max(1.0, (self.chi2 - len(self._here.residual)) / _NUMBERS)
 
     def go(self, rounds: int, useful: float = math.inf) -> None:
         """Run some rounds, or fewer if the fit converges or becomes hopeless.

@@ -72,7 +72,7 @@ def refit_leads(
         return []
     scale = Scale.of(min((fit for _, fit in fits), key=lambda fit: fit.chi2), data, noise)
     rivals = ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
-    return rivals if math.isinf(scale.floor) else _names_first(rivals)
+    return rivals if scale.clean else _names_first(rivals)
 
 
 def _names_first(rivals: list[Rival]) -> list[Rival]:
@@ -221,7 +221,7 @@ def _limit(
         return math.inf
     best = min((refit for refit, _ in found), key=lambda refit: refit.chi2)
     scale = Scale.of(best.fit, data, noise)
-    if not math.isinf(scale.floor):
+    if not scale.clean:
         return scale.within(NEAR)
     return min(
         useful_chi2(refit.chi2, base.chi2 - refit.chi2, drawn=drawn) for refit, drawn in found

@@ -21,7 +21,7 @@ from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
 from pendpipe.diagnosis.moves import describe, improve, prefer_two_names, price
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import Remainder, remainder_of
@@ -31,7 +31,7 @@ from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.diagnosis.wrong_parameters import prefer_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA, TIME, C
+from pendpipe.effects.baseline import C
 from pendpipe.effects.curves import FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
 
@@ -195,21 +195,10 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())
         starts[-1][C] *= share
-    error = NoMotionError("it stops")
-    period_s = 2.0 * np.pi / beginning.value[OMEGA]
-    for start in starts:
-        try:
-            fit = refine(model, data, state.noise, start, held=beginning.held)
-        except NoMotionError as found:
-            error = found
-            continue
-        if abs(fit.value[TIME] - beginning.value[TIME]) < period_s:
-            return fit
-    try:
-        # The linear law has lost a pendulum of large swings: its start says most of it.
-        return refine(model, data, state.noise, beginning.value, held=beginning.held, rounds=0)
-    except NoMotionError:
-        raise error from None
+    fit = best_fit(model, data, state.noise, starts, held=beginning.held)
+    if fit is None:
+        raise NoMotionError("it stops")
+    return fit
 
 
 def _add_one(state: State, task: Task) -> bool:

@@ -14,8 +14,8 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Rival, Scale, of_one_class, probabilities
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import locate, tone_of
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.location import locate, off_harmonics
+from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
@@ -23,11 +23,9 @@ from pendpipe.diagnosis.result import FoundEffect
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Fault, Step, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
-from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import BASELINE, OMEGA
+from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curves import Curve
-from pendpipe.effects.model import Model
 
 _CLEAN_CHARGE: Final = 5.0
 """Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
@@ -36,8 +34,6 @@ _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
 _SEEN_IN_RESIDUAL: Final = ("jitter", "broadband-drive", "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
-_OFF_HARMONIC: Final = 0.1
-"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
 _LIKELIER: Final = 1.5
 """Ratio of probabilities from which another effect replaces the one that was added."""
 _LIKELIER_CURVE: Final = 20.0
@@ -82,7 +78,8 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     follows = isinstance(effect, Curve) and effect.of_anything
     none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _clean_charge(found))
     weights = probabilities([own, *mates], none)
-    if not stands_apart(effect, found.improved):
+    # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
+    if not (effect.expected or off_harmonics(found.improved, effect)):
         weights = weights * _explained(found, effect, gain)
     return Weighed(without, gain, tuple(mates), weights)
 
@@ -189,7 +186,8 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
     bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
-    without = _refined(model, found, held, value, bare, step.before.value) or step.before
+    starts = [value, bare, step.before.value]
+    without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
     gain = without.chi2 - found.improved.chi2
     if len(found.steps) == 1 and _same(gain, step) and not is_gross(without, found.data):
         return without, step.rivals
@@ -199,7 +197,10 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if found.remainder.systematic:
         useful = scale.within(NEAR)
     fits = []
+    others = {other.key for other in without.model.effects if not other.local}
     for rival in step.rivals:
+        if rival.lead.effect.key in others:
+            continue  # one that was added later
         own = rival.lead.effect.key == effect.key
         fit = found.improved if own else refitted(without, found, held, rival, useful)
         if fit is not None:
@@ -212,42 +213,6 @@ def _same(gain: float, step: Step) -> bool:
     return abs(gain - step.winner.gain) < _SAME_GAIN * gain
 
 
-def stands_apart(effect: Effect, fit: Fit) -> bool:
-    """Return whether the remaining misfit can't be mistaken for an effect.
-
-    This holds for a separate spectral line, off the motion's harmonics, and for effects that
-    every pendulum has.
-    """
-    if effect.expected:
-        return True
-    line = tone_of(fit, effect)
-    if line is None:
-        return False
-    order = line / (0.5 * float(fit.value[OMEGA]) / math.pi)
-    return abs(order - round(order)) > _OFF_HARMONIC and order > _OFF_HARMONIC
-
-
-def _refined(
-    model: Model,
-    found: Search,
-    held: Sequence[int],
-    *starts: FloatArray,
-    useful: float = math.inf,
-) -> Fit | None:
-    """Return the best fit of a model from several starts; None if it has no motion from any."""
-    fits = []
-    for start in starts:
-        if len(start) != model.size:
-            continue
-        try:
-            fits.append(refine(model, found.data, found.noise, start, held=held, useful=useful))
-        except (NoMotionError, np.linalg.LinAlgError):
-            continue
-        if fits[-1].converged and not is_gross(fits[-1], found.data):
-            break
-    return min(fits, key=lambda fit: fit.chi2, default=None)
-
-
 def refitted(
     without: Fit, found: Search, held: Sequence[int], rival: Rival, useful: float = math.inf
 ) -> Fit | None:
@@ -257,9 +222,8 @@ def refitted(
         held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
-    return _refined(
-        without.model.adding(effect), found, held, start, rival.fit.value, useful=useful
-    )
+    model, starts = without.model.adding(effect), [start, rival.fit.value]
+    return best_fit(model, found.data, found.noise, starts, held=held, useful=useful)
 
 
 def swap_in_likelier(
