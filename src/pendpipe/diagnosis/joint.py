@@ -175,8 +175,8 @@ class Joint:
             for step in found.steps:
                 for rival in reversed(step.rivals):
                     self._remember(rival.lead.effect, rival.fit)
-            for effect in found.named.fit.model.effects:
-                self._remember(effect, found.named.fit)
+            for effect in found.named.model.effects:
+                self._remember(effect, found.named)
 
     def _remember(self, effect: Effect, fit: Fit) -> None:
         place = next((place for other, place in fit.model.places() if other is effect), None)
@@ -198,7 +198,7 @@ class Joint:
         for number, member in enumerate(self.members):
             found = member.found
             model = found.baseline.model.bare().at_times(found.data.time_s)
-            base = near.alone[number] if near else found.named.fit
+            base = near.alone[number] if near else found.named
             start = [base.value[: len(BASELINE)]]
             for effect in (*member.extras, *effects):
                 model = model.adding(effect)
@@ -639,7 +639,7 @@ def _may_be_common(effect: Effect) -> bool:
 
 def _extras(found: Search) -> tuple[Effect, ...]:
     """Return what happened in one recording alone."""
-    effects = found.named.fit.model.effects
+    effects = found.named.model.effects
     return tuple(e for e in effects if e.kind != "unnamed" and not _may_be_common(e))
 
 
