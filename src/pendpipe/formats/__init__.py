@@ -1,7 +1,6 @@
 """Files of recordings: any supported layout to a `Recording`, with every guess that was made."""
 
-from pendpipe.formats.inspection import Inspection, inspect
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.reading import read
+from pendpipe.formats.reading import Inspection, inspect, read
+from pendpipe.formats.table import ReadOptions
 
 __all__ = ["Inspection", "ReadOptions", "inspect", "read"]

@@ -12,9 +12,8 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.swing import Swing, derivative_slope, swing_of
-from pendpipe.formats.table import Column, Table
+from pendpipe.formats.samples import Swing, derivative_slope, swing_of
+from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Role, role_of, unit_of
 
 _WORTH: Final[Mapping[Role, float]] = {

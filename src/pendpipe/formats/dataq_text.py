@@ -15,8 +15,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.formats.layout import Layout, column_of_clock_times
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
+from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
 from pendpipe.formats.text import decode, table_of_text
 
 _CLOCKS: Final = ("time stamp", "timestamp", "clock")

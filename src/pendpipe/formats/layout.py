@@ -13,8 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.table import NotThisFormatError
+from pendpipe.formats.table import NotThisFormatError, ReadOptions
 
 _NAMES: Final = {
     "tab": "\t",

@@ -5,24 +5,39 @@ from __future__ import annotations
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
-from pendpipe.formats.examine import resolution
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.plain import read_if_plain
 from pendpipe.formats.readings import Readings, readings
-from pendpipe.formats.swing import made_up
-from pendpipe.formats.table import Marker, NotThisFormatError, Table
+from pendpipe.formats.samples import (
+    Gap,
+    clipped_samples,
+    find_gaps,
+    is_uniform,
+    made_up,
+    resolution,
+    sample_rate,
+)
+from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
 from pendpipe.formats.timebase import TimeBase, time_base
-from pendpipe.recording import GOOD, MISSING, Recording, check
+from pendpipe.formats.words import role_of, split_header, unit_of
+from pendpipe.recording import (
+    GOOD,
+    MISSING,
+    QUANTITIES,
+    Recording,
+    check,
+    converter_step,
+    read_plain,
+)
 
 _ANYTHING: Final = ReadOptions()
 _LARGEST: Final = 1 << 30
@@ -58,12 +73,10 @@ def readers() -> Iterator[tuple[str, Reader]]:
     from pendpipe.formats import trees
 
     yield "file of arrays", trees.read_table
-    from pendpipe.formats import archives
+    from pendpipe.formats import containers
 
-    yield "zip archive", archives.read_table
-    from pendpipe.formats import xml_tables
-
-    yield "XML", xml_tables.read_table
+    yield "zip archive", containers.read_table
+    yield "XML", containers.read_project
     from pendpipe.formats import dataq_text
 
     yield "WinDaq CSV", dataq_text.read_export
@@ -290,3 +303,227 @@ def _check_scale(place: str | Path, recording: Recording) -> None:
             raise InputError(
                 place, f"the {name} span {span:.3g}, which no pendulum does", "check their unit"
             )
+
+
+_READINGS: Final = ("angle", "volts", "length", "velocity", "acceleration", "signal")
+
+
+def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording | None:
+    """Read the file if its header is the plain form's; ``None`` if it is not.
+
+    Options that would change the layout turn the plain form into one CSV among others.
+
+    Raises
+    ------
+    InputError
+        When the header has ``time_s`` and nothing that could be a reading, or a row
+        is damaged.
+    """
+    steered = (
+        options.channel,
+        options.column,
+        options.unit,
+        options.sample_rate,
+        options.decimal,
+        options.delimiter,
+    )
+    names = _header(data)
+    if "time_s" not in names or any(option is not None for option in steered):
+        return None
+    found = [name for name in QUANTITIES if name in names]
+    if len(found) != 1:
+        if any(role_of(split_header(name)[0]) in _READINGS for name in names):
+            return None
+        raise InputError(
+            place,
+            f"one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
+            "name the reading's column, or choose it with --column and --unit",
+        )
+    recording = read_plain(place, data)
+    return replace(recording, resolution=recording.resolution or resolution(recording.values))
+
+
+def _header(data: bytes) -> list[str]:
+    """Find the first line that is no remark, split at commas."""
+    at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
+    while at < len(data):
+        end = data.find(b"\n", at)
+        line = data[at : len(data) if end < 0 else end].strip()
+        if line and not line.startswith(b"#"):
+            text = line[:4096].decode("utf-8", errors="replace")
+            return [name.strip() for name in text.split(",")]
+        if end < 0:
+            break
+        at = end + 1
+    return []
+
+
+def table_of_plain(place: Path, recording: Recording) -> Table:
+    """Show a plain recording as the table that ``inspect`` goes through."""
+    limits = None
+    high, low = recording.number("range_volts"), recording.number("range_low_volts")
+    step = converter_step(recording)
+    if high is not None and step is not None:
+        limits = (-high if low is None else low, high - step)
+    column = Column(
+        name=recording.quantity,
+        unit=recording.unit,
+        values=recording.values,
+        number=2,
+        time_s=recording.time_s,
+        resolution=recording.resolution,
+        limits=limits,
+    )
+    return Table(
+        place=place,
+        format="plain",
+        columns=(column,),
+        markers=tuple(markers_of(recording)),
+        notes=recording.notes,
+    )
+
+
+def markers_of(recording: Recording) -> list[Marker]:
+    """Read back the markers that ``convert`` has kept as metadata."""
+    found = []
+    for key, value in recording.metadata.items():
+        if not key.startswith("marker_"):
+            continue
+        sample, time, comment = [*value.split(";", 2), "", ""][:3]
+        try:
+            found.append(
+                Marker(int(sample), float(time.strip().removesuffix("s")), comment.strip())
+            )
+        except ValueError:
+            continue
+    return found
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """A file at a glance; `samples`, `gaps`, `clipped_samples` are of the chosen channel.
+
+    Parameters
+    ----------
+    format
+        ``plain``, ``csv``, ``windaq``, ``windaq-hires``, ``windaq-circular``,
+        ``windaq-hires-circular``, ``windaq-csv``, ``di149-ascii``, ``matlab-v5``, ``excel``.
+    channels
+        Name and unit of each channel.
+    samples
+        Samples of one channel.
+    sample_rate_hz, duration_s
+        Rate (gaps left out) and time from the first to the last sample.
+    uniform
+        Whether the samples are evenly spaced, gaps apart.
+    resolution
+        The step between readings, in `unit`; ``None`` where there is none.
+    unit
+        Of the channel that would be analysed: ``rad``, ``V``, ``m``, or the file's own.
+    gaps, markers, clipped_samples
+        Missing times; events; samples at the converter's end.
+    warnings
+        What was guessed, repaired or looks odd.
+    chosen
+        The column or columns that the readings are taken from.
+    level
+        The median of the readings, in `unit`: where the pendulum hangs.
+    weak_guesses
+        What was guessed on slender grounds, with the option that overrides it.
+    """
+
+    format: str
+    channels: tuple[tuple[str, str], ...]
+    samples: int
+    sample_rate_hz: float
+    uniform: bool
+    duration_s: float
+    resolution: float | None
+    unit: str
+    gaps: tuple[Gap, ...]
+    markers: tuple[Marker, ...]
+    clipped_samples: int
+    warnings: tuple[str, ...]
+    chosen: str = ""
+    level: float = 0.0
+    weak_guesses: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object that ``inspect --json`` prints."""
+        return {
+            "schema_version": 1,
+            "format": self.format,
+            "channels": [{"name": name, "unit": unit} for name, unit in self.channels],
+            "samples": self.samples,
+            "sample_rate_hz": self.sample_rate_hz if isfinite(self.sample_rate_hz) else None,
+            "uniform": self.uniform,
+            "duration_s": self.duration_s,
+            "resolution": self.resolution,
+            "gaps": [
+                {"after_sample": gap.after_sample, "missing_s": gap.missing_s} for gap in self.gaps
+            ],
+            "markers": [
+                {"sample": mark.sample, "time_s": mark.time_s, "comment": mark.comment}
+                for mark in self.markers
+            ],
+            "clipped_samples": self.clipped_samples,
+            "warnings": list(self.warnings),
+            "chosen": self.chosen,
+            "unit": self.unit,
+            "level": self.level if isfinite(self.level) else None,
+            "weak_guesses": list(self.weak_guesses),
+        }
+
+
+def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
+    """Report what a file holds, even where none of its channels could be analysed.
+
+    Raises
+    ------
+    InputError
+        When no reader knows the file, or it holds no readings.
+    """
+    place = Path(path)
+    data = file_bytes(place)
+    plain = read_if_plain(place, data, options)
+    table = table_of_plain(place, plain) if plain is not None else table_of(place, data, options)
+    choice = choose(table, options, reading=False)
+    if not choice.readings:
+        if not choice.channels:
+            raise InputError(place, "there is no column but the time", "give readings beside it")
+        choice = replace(choice, readings=choice.channels[:1])
+    column = choice.readings[0]
+    weak: tuple[str, ...] = ()
+    try:
+        recording = recording_of(table, options) if plain is None else plain
+        unit, values, notes = recording.unit, recording.values, list(recording.notes)
+        time, step = recording.time_s[recording.usable], recording.resolution
+        values, weak = values[recording.usable], recording.weak_guesses
+    except InputError as fault:
+        base = time_base(table, choice, options)
+        time, values = base.time_s, column.values[base.rows]
+        unit, step = column.unit, column.resolution or resolution(values)
+        notes = [*table.notes, *choice.notes, f"the readings can't be analysed: {fault.problem}"]
+    scale = 1.0
+    known = unit_of(column.unit) if column.unit else None
+    if known is not None and unit in ("rad", "V", "m"):
+        scale = known.factor
+    limits = (column.limits[0] * scale, column.limits[1] * scale) if column.limits else None
+    finite = values[np.isfinite(values)]
+    return Inspection(
+        format=table.format,
+        channels=tuple((column.label, column.unit) for column in choice.channels),
+        samples=len(time),
+        sample_rate_hz=sample_rate(time),
+        uniform=is_uniform(time),
+        duration_s=float(time[-1] - time[0]) if len(time) else 0.0,
+        resolution=step,
+        unit=unit,
+        gaps=tuple(find_gaps(time)),
+        markers=table.markers,
+        clipped_samples=clipped_samples(values, step, limits),
+        warnings=tuple(notes),
+        chosen=", ".join(column.label for column in choice.readings),
+        level=float(np.median(finite)) if len(finite) else float("nan"),
+        weak_guesses=weak,
+    )

@@ -10,10 +10,8 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice
-from pendpipe.formats.examine import resolution
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.swing import derivative_slope, follows_sine, periods
-from pendpipe.formats.table import Column, Table
+from pendpipe.formats.samples import derivative_slope, follows_sine, periods, resolution
+from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Unit, unit_of
 from pendpipe.recording import Quantity
 

@@ -10,9 +10,8 @@ import numpy as np
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, one_way
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.swing import swing_of
-from pendpipe.formats.table import Column, Table
+from pendpipe.formats.samples import swing_of
+from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import plain, unit_of
 
 _EPOCH: Final = 3e8

@@ -14,9 +14,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.layout import column_of_clock_times
 from pendpipe.formats.matlab import is_matlab, tree_of, tree_of_version_4
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.swing import swing_of
-from pendpipe.formats.table import Column, NotThisFormatError, Table
+from pendpipe.formats.samples import swing_of
+from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
 from pendpipe.formats.words import role_of, split_header
 
 _SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12

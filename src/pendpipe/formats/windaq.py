@@ -21,8 +21,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.table import Column, Marker, NotThisFormatError, Table
+from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {

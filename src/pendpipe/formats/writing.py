@@ -15,7 +15,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
 from pendpipe.files import replaced
-from pendpipe.formats.plain import markers_of
+from pendpipe.formats.reading import markers_of
 from pendpipe.formats.windaq import MOST_SAMPLES, Channel, Event, gap_comment, pack
 from pendpipe.recording import SUSPECT, Recording, write_plain
 

@@ -1,26 +1,170 @@
-"""Projects kept as XML: CASSY Lab (.labx), Logger Pro (.cmbl), Tracker (.trk)."""
+"""Files of other programs: workbooks, zips (phyphox), XML (CASSY Lab, Logger Pro, Tracker)."""
 
 from __future__ import annotations
 
+import io
 import re
 import xml.etree.ElementTree as ET
+import zipfile
 from collections.abc import Iterator
+from contextlib import redirect_stdout
+from dataclasses import replace
 from math import cos, radians, sin
 from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.options import ReadOptions
-from pendpipe.formats.table import Column, NotThisFormatError, Table
+from pendpipe.formats.matlab import most_unpacked
+from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
+from pendpipe.formats.text import read_table as read_text
+from pendpipe.formats.text import table_of_text
+
+_MOST_ROWS: Final = 1 << 20
+"""What a sheet has, and no more."""
+_MOST_CELLS: Final = 1_000_000
+_OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+
+
+def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the workbook's sheet, or the archive's table, that holds most numbers.
+
+    Raises
+    ------
+    NotThisFormatError
+        When the file is no zip archive.
+    InputError
+        When it is one that can't be read, or holds no table.
+    """
+    if data.startswith(_OLD_EXCEL):
+        return _of_workbook(place, data, options)
+    if not data.startswith(b"PK"):
+        raise NotThisFormatError("the file is no zip archive")
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        parts = archive.infolist()
+        whole = sum(part.file_size for part in parts)
+        if whole > most_unpacked(len(data)):
+            raise ValueError(f"it unpacks to {whole >> 20} MB")
+        names = [part.filename for part in parts]
+        if not any(name.startswith("xl/") for name in names):
+            members = _tables(place, archive, names)
+    if any(name.startswith("xl/") for name in names):
+        return _of_workbook(place, data, options)
+    return _of_members(place, members, options)
+
+
+def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str, bytes]:
+    """Unpack the members that may hold samples; phyphox puts remarks into ``meta/``."""
+    if "content.xml" in names:
+        raise InputError(place, "this is an OpenDocument table", "save it as .xlsx or CSV")
+    if any(name.lower().endswith((".cap", "main.xml")) for name in names) or any(
+        re.match(r"data/.*\.tmp$", name) for name in names
+    ):
+        raise InputError(
+            place, "this is a project of PASCO Capstone", "export its data as CSV or text"
+        )
+    wanted = (".csv", ".tsv", ".txt", ".dat", ".trk")
+    return {
+        name: archive.read(name)
+        for name in names
+        if name.lower().endswith(wanted)
+        and not name.startswith(("meta/", "__MACOSX/"))
+        and "/meta/" not in name
+    }
+
+
+def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) -> Table:
+    """Read the table of an archive with most rows; name the others."""
+    tables: dict[str, Table] = {}
+    reason = "it holds no CSV"
+    for name, content in members.items():
+        try:
+            reader = read_project if name.lower().endswith(".trk") else read_text
+            tables[name] = reader(place, content, options)
+        except (NotThisFormatError, InputError) as fault:
+            reason = f"{name}: {getattr(fault, 'problem', fault)}"
+    if not tables:
+        raise InputError(place, f"the archive has no table ({reason})", "give the file in it")
+    best = max(tables, key=lambda name: len(tables[name].columns[0].values))
+    return _noted(tables[best], f"'{best}' of the archive", [n for n in tables if n != best])
+
+
+def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the sheet with most numbers as the text that it would export."""
+    import warnings
+
+    import pandas as pd
+
+    if not data.startswith(_OLD_EXCEL):
+        _refuse_too_many_cells(data)
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):  # xlrd prints
+        warnings.simplefilter("ignore")
+        sheets = pd.read_excel(
+            io.BytesIO(data), None, header=None, dtype=object, na_filter=False, nrows=_MOST_ROWS
+        )
+    numbers = {
+        title: sum(_is_number(cell) for row in sheet.to_numpy().tolist() for cell in row)
+        for title, sheet in sheets.items()
+    }
+    best = max(numbers, key=lambda title: numbers[title], default=None)
+    if best is None or not numbers[best]:
+        raise InputError(place, "no sheet holds numbers", "give the workbook with the samples")
+    rows = sheets[best].to_numpy().tolist()
+    text = "\n".join("\t".join(map(_written, row)) for row in rows) + "\n"
+    plain = replace(options, delimiter="\t")
+    try:
+        table = table_of_text(place, text, plain, "excel")
+    except NotThisFormatError as reason:
+        raise InputError(
+            place, f"sheet '{best}': {reason}", "give time and angle as columns"
+        ) from None
+    return _noted(table, f"sheet '{best}'", [t for t, n in numbers.items() if t != best and n], 1)
+
+
+def _noted(table: Table, note: str, others: list[str], without: int = 0) -> Table:
+    """Name the part that was read, and those that were not, before the table's other notes."""
+    left = f" (not {', '.join(others[:8])})" if others else ""
+    return replace(table, notes=(note + left, *table.notes[without:]))
+
+
+def _refuse_too_many_cells(data: bytes) -> None:
+    """Count the cells of all sheets before openpyxl makes objects of them."""
+    cells = 0
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for name in archive.namelist():
+            if not re.match(r"xl/(worksheets/.*|sharedStrings)\.xml$", name):
+                continue
+            with archive.open(name) as sheet:
+                while chunk := sheet.read(1 << 20):
+                    cells += chunk.count(b"<c ") + chunk.count(b"<c>") + chunk.count(b"<si>")
+                    if cells > _MOST_CELLS:
+                        raise ValueError(f"it has more than {_MOST_CELLS} cells")
+                    if re.search(rb'<c [^>]*r="[A-Z]{3}|<row [^>]*r="\d{8}', chunk):
+                        raise ValueError("a cell stands beyond column ZZ, or beyond the last row")
+
+
+def _is_number(cell: Any) -> bool:
+    """Say whether a cell holds a number, or a text that is one."""
+    if isinstance(cell, str):
+        return re.fullmatch(r"\s*[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?\s*", cell) is not None
+    return isinstance(cell, int | float)
+
+
+def _written(cell: Any) -> str:
+    """Write a cell as CSV would: numbers in full, dates and times as ISO text."""
+    if isinstance(cell, int | float):
+        return repr(int(cell) if isinstance(cell, bool) else cell)
+    return " ".join(str(cell.isoformat() if hasattr(cell, "isoformat") else cell).split())
+
 
 _LARGEST = 64 << 20
 """A tree of elements takes some ten times the file's memory."""
 _START = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*<(\?xml|cassylab|Document|object)\b")
 
 
-def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa: ARG001
+def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa: ARG001
     """Read the samples out of a project file.
 
     Entities are refused: none of these programs writes them, and they can be made to fill
