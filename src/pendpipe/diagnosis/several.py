@@ -19,7 +19,7 @@ from pendpipe.diagnosis.joint import Joint, Named, Released, Together
 from pendpipe.diagnosis.result import BASELINES, FILE_NAME, FoundEffect, Location
 from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import BASELINE
+from pendpipe.effects.baseline import BASELINE, OMEGA
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Estimate
@@ -293,7 +293,7 @@ class _Answer:
             "alone": {
                 "verdict": outcome.verdict,
                 "effects": [each.identifier for each in outcome.effects],
-                "class": sorted(_class(outcome)),
+                "classes": [sorted(each) for each in _classes(outcome)],
             },
             "amplitude_rad": float(fit.at.span.first_amplitude),
             "parameters": {
@@ -325,8 +325,11 @@ class _Answer:
         used = np.flatnonzero(found.data.weight > 0.0)
         head, tail = np.split(used, [int(_HEAD * len(used))])
         free, noise = list(fit.free), scale * found.noise.rms
-        columns = jacobian(fit.model, fit.value, fit.at)[:, free] / noise
-        residual = found.data.residual(fit.at.reading) / noise
+        # Coloured noise moves the motion by its density at the motion's frequency.
+        turns = float(fit.value[OMEGA]) / (2.0 * math.pi) * found.data.interval_s
+        dense = scale * max(found.noise.rms_at(turns), found.noise.rms)
+        columns = jacobian(fit.model, fit.value, fit.at)[:, free] / dense
+        residual = found.data.residual(fit.at.reading) / dense
         names = joint.names(fit, number, self.together)
         mine = [here for here, key in names if key in rest.layout.keys]
         theirs = [rest.layout.keys.index(key) for _, key in names if key in rest.layout.keys]
@@ -350,6 +353,7 @@ class _Answer:
             return None
         off = found.data.residual(reading)[tail] / noise
         band = np.einsum("ij,jk,ik->i", columns[tail], inverse, columns[tail])
+        band *= (dense / noise) ** 2
         return {
             "fitted_readings": len(head),
             "predicted_readings": len(tail),
@@ -424,8 +428,13 @@ class _Answer:
                 f" Even together they cannot distinguish it from {_listed(sorted(mates), 'or')}."
             )
             text += f" What to measure next: {effect.discriminating_test}."
-        alone = [_class(o) for o in self.outcomes if effect.identifier in _class(o)]
-        settled = sorted(set.union(*alone) - mates - {rival.identifier}) if alone else []
+        alone = [
+            each
+            for outcome in self.outcomes
+            for each in _classes(outcome)
+            if rival.identifier in each
+        ]
+        settled = sorted(set().union(*alone) - mates - {rival.identifier})
         if settled:
             text += f" Single recordings leave {_listed(settled)} too; together they exclude it."
         elif not alone:
@@ -433,12 +442,12 @@ class _Answer:
         return text
 
 
-def _class(outcome: Outcome) -> set[str]:
-    """Return the first effect of a diagnosis with its class; what was found beside it too."""
-    found = set()
-    for effect in outcome.effects:
-        found |= {effect.identifier, *(name for name, _ in effect.indistinguishable)}
-    return found
+def _classes(outcome: Outcome) -> list[set[str]]:
+    """Return the class of each effect of a diagnosis, itself included."""
+    return [
+        {effect.identifier, *(name for name, _ in effect.indistinguishable)}
+        for effect in outcome.effects
+    ]
 
 
 def _name(released: Released) -> str:
