@@ -17,11 +17,11 @@ from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joi
 CLASS_CHI2: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in the class (contract)."""
 MOST_EFFECTS: Final = 3
-_DRAWS: Final = 20_000
+_DRAWS: Final = 10_000
 _SEED: Final = 24
-_REACH: Final = 60.0
+_REACH: Final = 30.0
 """Candidates whose linear gain in chi^2 is this far behind the best are not refitted: the
-effects change the records by a fifth at most, where the linear gain is good to a tenth."""
+effects change the records by a fifth at most, where the linear gain is good to a fifth."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +128,11 @@ def global_p_value(
     values, vectors = np.linalg.eigh(correlations)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(scores))) @ root.T
-    size = np.where([one.effect.parameter.low >= 0.0 for one in tried], drawn, np.abs(drawn))
-    # Every score on the scale of a two-sided one, so that the largest has the smallest p-value.
     one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
-    least = np.ones(_DRAWS)
-    for number in range(len(tried)):
-        tail = normal_below(-size[:, number])
-        least = np.minimum(least, tail if one_sided[number] else 2.0 * tail)
+    least = np.minimum(
+        normal_below(-drawn[:, one_sided].max(axis=1, initial=0.0)),
+        2.0 * normal_below(-np.abs(drawn[:, ~one_sided]).max(axis=1, initial=0.0)),
+    )
     resolved = np.quantile(least, 0.01)
     if smallest >= resolved:
         return float(np.mean(least <= smallest))
@@ -200,7 +198,7 @@ def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list
     """Refit with each candidate whose linear gain is within reach of the best one's."""
     one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
     gains = np.where(one_sided, np.maximum(scores, 0.0), scores) ** 2
-    reach = max(_REACH, 0.4 * float(gains.max()))
+    reach = max(_REACH, 0.25 * float(gains.max()))
     near = [one for one, gain in zip(tried, gains, strict=True) if gain >= gains.max() - reach]
     position = len(fit.added)
     return [

@@ -1,0 +1,389 @@
+"""Campaigns with a hidden cause or none, drawn by other equations than the judge's.
+
+    python -m benchmarks.campaign_challenge [--campaigns 300] [--journal FILE]
+
+Geometry, masses, temperature, air drag and loss torques are drawn from the priors that the
+configuration states; half of the campaigns lack nothing, the others hide one cause. The
+generator solves each record's torque balance with full complex impedances (Stokes' sphere,
+Stokes' oscillating cylinder by Bessel functions, the rotating sphere), and shares no code with
+pendpipe: of the configuration it reads the numbers. Beside the judge stands an oracle: the
+generator's own linear least squares about the truth, with the same priors. Figures of this
+table are in docs/paper-case.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from scipy.special import kv
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+Array = NDArray[np.float64]
+RELATIVE_SD_B: Final = {"water": 1e-3, "air": 1.5e-4}
+RELATIVE_SD_F: Final = 3e-6
+CLASS: Final = 6.0
+COULD_SAY: Final = 25.0
+"""Delta chi^2 above which the oracle is sure that something is missing."""
+CAUSES: Final[dict[str, tuple[float, float]]] = {
+    "uniform-drag-excess": (0.05, 0.25),
+    "history-term": (0.05, 0.25),
+    "viscosity-temperature": (0.08, 0.3),
+    "temperature-trend": (1.0, 5.0),
+    "stem-drag": (0.008, 0.03),
+    "wall-confinement": (0.03, 0.12),
+    "free-surface": (0.02, 0.1),
+    "drag-law-transition": (0.02, 0.2),
+    "added-mass": (0.05, 0.3),
+    "hysteresis-inertia-scaling": (0.05, 1.0),
+    "hysteretic-damping": (0.3, 0.6),
+    "air-drag-in-benchmark": (0.5, 1.5),
+    "grease-drag": (3e-6, 3e-5),
+    "support-loss": (3e-5, 3e-4),
+    "moment-of-inertia": (2e-4, 1e-3),
+}
+"""Causes with the sizes that are drawn, evenly."""
+
+
+class Generator:
+    """The readings of a campaign for nuisances in standard deviations, then causes in own units."""
+
+    def __init__(self) -> None:
+        settings = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))
+        self.own, places = settings["apparatus"], settings["geometries"]
+        self.names = sorted(places)
+        self.wet = np.array([not name.startswith("air") for name in self.names])
+        self.high = np.array([name.startswith("high") for name in self.names])
+        rows = (ROOT / "config/records.tsv").read_text(encoding="utf-8").splitlines()[1:]
+        order = [row.split("\t")[4] for row in rows]
+        self.day = np.array([order.index(name) for name in self.names]) / (len(order) - 1.0) - 0.5
+        self.day -= self.day[self.wet].mean()
+        self.weights = sorted(self.own["weights"])
+        clamps = sorted({item for name in self.names for item in places[name]["weights_m"].items()})
+        self.places = np.array([place for _, place in clamps])
+        self.on = np.array([
+            [
+                clamps.index((each, places[name]["weights_m"][each]))
+                if each in places[name]["weights_m"] else -1
+                for each in self.weights
+            ]
+            for name in self.names
+        ])  # fmt: skip
+        self.nuisances = [
+            "coefficient", *(f"clamp {number}" for number in range(len(clamps))), "zero",
+            *(f"mass {each}" for each in self.weights), "rod", "rod length", "sphere", "radius",
+            "lever", "kelvin", "air", "ratio",
+        ]  # fmt: skip
+        self.at = {name: number for number, name in enumerate([*self.nuisances, *CAUSES])}
+        self.free = np.array([name == "coefficient" for name in self.nuisances])
+
+    def read(self, theta: Array) -> Array:
+        """Frequency and b, shape (n, records, 2), for theta of shape (n, unknowns)."""
+
+        def z(name: str) -> Array:
+            return theta[:, self.at[name], None]
+
+        own, ball, rod = self.own, self.own["sphere"], self.own["rod"]
+        first = self.at["clamp 0"]
+        clamps = self.places + 1e-4 * theta[:, first : first + len(self.places)]
+        there = np.where(self.on >= 0, (clamps + 3e-4 * z("zero"))[:, self.on], 0.0)
+        inertia, moment = 0.0, 0.0
+        for number, each in enumerate(self.weights):
+            weight = own["weights"][each]
+            mass = weight["mass_kg"] + weight["mass_sd_kg"] * z(f"mass {each}")
+            mass = mass * (self.on[:, number] >= 0)
+            own_size = 0.4 * weight.get("radius_m", 0.0) ** 2
+            inertia = inertia + mass * (there[..., number] ** 2 + own_size)
+            moment = moment + mass * there[..., number]
+        length = rod["length_m"] + rod["length_sd_m"] * z("rod length")
+        inertia = inertia + (rod["mass_kg"] + rod["mass_sd_kg"] * z("rod")) * length**2 / 12.0
+        radius = 0.5 * (ball["diameter_m"] + ball["diameter_sd_m"] * z("radius"))
+        lever = ball["distance_m"] + ball["distance_sd_m"] * z("lever")
+        heavy = (ball["mass_kg"] + ball["mass_sd_kg"] * z("sphere")) * self.wet
+        inertia = inertia + heavy * (lever**2 + 0.4 * radius**2)
+        moment = moment + heavy * lever
+        inertia = inertia + z("moment-of-inertia") * self.high
+        # Water: Vogel's law about 20 C, a quadratic for the density.
+        warm = 0.5 * z("kelvin") + z("temperature-trend") * self.day
+        vogel = np.exp(570.58 / (warm + 153.15) - 570.58 / 153.15)
+        eta = 1.0016e-3 * vogel * (1.0 + z("viscosity-temperature"))
+        rho = 1000.0 * (1.0 - 2.07e-4 * warm - 4.6e-6 * warm**2)
+        volume = 4.0 / 3.0 * np.pi * radius**3
+        stem, thick, at = z("stem-drag"), 0.0024, ball["screw_distance_m"]
+        lift = rho * self.wet * (volume * lever + np.pi * thick**2 * stem * at)
+        torque = own["gravity_m_per_s2"] * (moment - lift)
+        close = z("wall-confinement")
+        drag_near = (1.0 + np.abs(close) ** (4.0 / 3.0)) / (1.0 - close) ** 2
+        mass_near = 0.5 * ((1.0 + 2.0 * close) / (1.0 - close) - 1.0)
+        area = np.array([own["weights"][each]["frontal_area_m2"] for each in self.weights])
+        wide, gas = np.sqrt(area / np.pi), (1.825e-5, 1.204)
+        air = 1.0 + 0.1 * z("air") + z("air-drag-in-benchmark")
+
+        def impedance(s: Any) -> Any:
+            """Torque over angle at a complex rate: fluids and grease."""
+            slip = np.sqrt(s * rho / eta) * radius
+            omega2 = np.abs(s) ** 2
+            slosh = z("free-surface") * omega2 / ((2.0 * np.pi * 1.3) ** 2 - omega2)
+            more = (1.0 + z("uniform-drag-excess")) * drag_near * (1.0 + slosh)
+            layer = slip * (1.0 + z("history-term"))
+            whole = (
+                6.0 * np.pi * eta * radius * ((1.0 + layer) * more + slip**2 / 9.0) * lever**2 * s
+            )
+            turning = 8.0 * np.pi * eta * radius**3 * (3.0 + 3.0 * slip + slip**2)
+            whole = whole + turning / (3.0 * (1.0 + slip)) * s - 8.0 * np.pi * eta * radius**3 * s
+            extra = mass_near + z("added-mass") + 0.6 * slosh
+            whole = whole + extra * rho * volume * lever**2 * s**2
+            thin = np.sqrt(s * rho / eta) * thick
+            carried = 1.0 + 4.0 * kv(1, thin) / (thin * kv(0, thin))
+            whole = whole + np.pi * rho * thick**2 * stem * at**2 * carried * s**2
+            whole = whole * self.wet
+            speed = np.sqrt(s * gas[1] / gas[0])
+            light = 6.0 * np.pi * gas[0] * wide * (1.0 + speed[..., None] * wide)
+            whole = whole + air * (light * there**2).sum(axis=-1) * s
+            slim = speed * rod["radius_m"]
+            across = (
+                np.pi * gas[1] * rod["radius_m"] ** 2 * 4.0 * kv(1, slim) / (slim * kv(0, slim))
+            )
+            whole = whole + air * across * length**3 / 12.0 * s**2
+            return whole + z("grease-drag") * s
+
+        rate = 1j * np.sqrt(torque / (inertia + 0.6 * rho * volume * lever**2 * self.wet))
+        for _ in range(12):  # secant steps from a point beside
+            beside = rate * (1.0 + 1e-6j)
+            here = inertia * rate**2 + torque + impedance(rate)
+            there_ = inertia * beside**2 + torque + impedance(beside)
+            rate = rate - here * (beside - rate) / (there_ - here)
+        omega = np.abs(rate)
+        whole_inertia = torque / omega**2
+        solid = 4.0 * np.pi**2 * 0.1 / 3940.0 * np.exp(-z("coefficient"))
+        solid = solid * np.exp((0.05 * z("ratio") + z("hysteretic-damping")) * self.wet)
+        solid = solid * (whole_inertia / 0.1) ** z("hysteresis-inertia-scaling")
+        frequency = omega / (2.0 * np.pi)
+        quadratic = 2.0 / 3.0 * omega * rho * radius**2 * lever**3 * 0.068 * self.wet
+        b = -rate.real + solid / (2.0 * whole_inertia * omega)
+        b = b + z("drag-law-transition") * quadratic / (2.0 * whole_inertia)
+        b = b + z("support-loss") * frequency**3
+        return np.stack([frequency, b], axis=-1)
+
+    def derivatives(self, theta: Array) -> Array:
+        """Change of the readings with each unknown, shape (unknowns, records, 2)."""
+        steps = np.array(
+            [1e-3] * len(self.nuisances) + [1e-3 * high for _, high in CAUSES.values()]
+        )
+        both = theta + np.concatenate([np.diag(steps), -np.diag(steps)])
+        read = self.read(both)
+        half = len(steps)
+        return (read[:half] - read[half:]) / (2.0 * steps[:, None, None])
+
+
+def oracle(
+    maker: Generator, theta: Array, values: Array, sds: Array, cause: str | None
+) -> dict[str, Any]:
+    """What linear least squares about the truth says, with the same priors: class, sd, gain."""
+    count = len(maker.nuisances)
+    bare = theta.copy()
+    bare[count:] = 0.0
+    slopes = maker.derivatives(bare)
+    off = (values - maker.read(bare[None])[0]) / sds
+    white = (slopes / sds).reshape(len(slopes), -1).T
+    priors = np.diag(~maker.free * 1.0)[~maker.free]
+    nuisance = np.concatenate([white[:, :count], priors])
+    # The truth's own nuisances are drawn: about it their priors are off by as much.
+    residual = np.concatenate([off.ravel(), -bare[:count][~maker.free]])
+    basis, _ = np.linalg.qr(nuisance)
+    left = residual - basis @ (basis.T @ residual)
+    none = float(left @ left)
+    chi2, sd = {}, {}
+    for number, name in enumerate(CAUSES):
+        column = np.concatenate([white[:, count + number], np.zeros(len(priors))])
+        column = column - basis @ (basis.T @ column)
+        size = float(np.linalg.norm(column))
+        chi2[name], sd[name] = none - float(column @ left / size) ** 2, 1.0 / size
+    best = min(chi2.values())
+    return {
+        "class": [name for name in chi2 if chi2[name] <= best + CLASS],
+        "gain": none - chi2[cause] if cause else 0.0,
+        "sd": sd,
+    }
+
+
+def judge(
+    maker: Generator, values: Array, sds: Array, truth: dict[str, float], cause: str | None
+) -> dict[str, Any]:
+    """What the library answers on the readings."""
+    from pendpipe.campaign.design import design_of
+    from pendpipe.campaign.diagnose import search
+    from pendpipe.campaign.fit import joint_fit, measured, named
+    from pendpipe.campaign.joint import coefficient, loss_torques
+    from pendpipe.configuration.load import load_campaign, read_configuration
+
+    content = read_configuration(ROOT / "config/config.yaml")
+    content["records"] = str(ROOT / "config/records.tsv")
+    content["apparatus"]["hysteresis"] = {"inertia_exponent": 0.0}
+    content["fluids"]["air"]["boundary_layer"] = True
+    campaign = load_campaign(content, "config.yaml")
+    design = design_of(campaign, campaign.records)
+    index = [maker.names.index(record.geometry) for record in campaign.records]
+    data = measured(values[index], sds[index, :, None] ** 2 * np.eye(2))
+    began = time.process_time()
+    answer = search(design, data)
+    spent = time.process_time() - began
+    members = []
+    if answer.found:
+        first = answer.found[0]
+        members = [first.leader, *(rival for rival, _ in first.rivals)]
+    inside = {rival.candidate.effect.identifier: rival for rival in members}
+    fit = inside[cause].fit if cause in inside else answer.baseline
+    pulls = {}
+    if cause is None or cause in inside:
+        pulls["k"] = pull(coefficient(fit), truth["k"])
+        pulls["kappa"] = pull(loss_torques(fit)["water"], truth["kappa"])
+    result: dict[str, Any] = {
+        "missing": answer.missing,
+        "p": answer.p_value,
+        "class": list(inside),
+        "found": len(answer.found),
+        "seconds": spent,
+    }
+    if cause in inside and cause != "wall-confinement":  # whose size has another meaning here
+        size = inside[cause].fit.size(inside[cause].position)
+        pulls["size"], result["sd"] = pull(size, truth["size"]), size.sd
+    if cause is None:  # the drag factor and C_H of campaigns that lack nothing
+        for name in ("uniform-drag-excess", "history-term"):
+            pulls[name] = pull(joint_fit(design, data, named(name), fit.unknowns).size(0), 0.0)
+    return result | {"pulls": pulls}
+
+
+def pull(estimate: Any, truth: float) -> float:
+    """How many of its sds an estimate is off."""
+    return float((estimate.value - truth) / estimate.sd)
+
+
+def draw(maker: Generator, number: int) -> dict[str, Any]:
+    """One campaign: drawn, judged, and beside it the oracle."""
+    random = np.random.default_rng([24, number])
+    count = len(maker.nuisances)
+    theta = np.zeros(count + len(CAUSES))
+    while True:
+        theta[:count] = random.standard_normal(count)
+        theta[0] = random.normal(0.0, 0.2)
+        cause = None if number % 2 == 0 else list(CAUSES)[(number // 2) % len(CAUSES)]
+        if cause:
+            theta[maker.at[cause]] = random.uniform(*CAUSES[cause])
+        exact = maker.read(theta[None])[0]
+        if np.isfinite(exact).all() and (exact > 0.0).all():
+            break  # the lowest record's weights nearly balance: a few draws turn over
+    relative = np.where(maker.wet, RELATIVE_SD_B["water"], RELATIVE_SD_B["air"])
+    sds = exact * np.stack([np.full(len(relative), RELATIVE_SD_F), relative], axis=-1)
+    values = exact + sds * random.standard_normal(exact.shape)
+    ratio = 0.05 * theta[maker.at["ratio"]] + theta[maker.at["hysteretic-damping"]]
+    k = 3940.0 * float(np.exp(theta[0]))
+    truth = {
+        "k": k,
+        "kappa": 4.0 * np.pi**2 * 0.1 / k * float(np.exp(0.05 * theta[maker.at["ratio"]])),
+        "size": theta[maker.at[cause]] if cause else 0.0,
+        "ratio": float(ratio),
+    }
+    return {
+        "number": number,
+        "cause": cause,
+        "size": truth["size"],
+        "oracle": oracle(maker, theta, values, sds, cause),
+        **judge(maker, values, sds, truth, cause),
+    }
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """The figures, line by line."""
+    from scipy.stats import beta
+
+    def share(hits: int, of: int) -> str:
+        if not of:
+            return "none"
+        low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
+        high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
+        return f"{hits} of {of} ({hits / of:.1%}; {low:.1%} to {high:.1%})"
+
+    plain = [one for one in results if one["cause"] is None]
+    hidden = [one for one in results if one["cause"]]
+    sure = [one for one in hidden if one["oracle"]["gain"] >= COULD_SAY]
+    lines = [f"campaigns: {len(results)}, of which {len(plain)} lack nothing"]
+    lines.append(f"false alarms: {share(sum(one['missing'] for one in plain), len(plain))}")
+    lines.append(
+        f"found where the oracle could say: {share(sum(one['missing'] for one in sure), len(sure))}"
+    )
+    inside = sum(one["cause"] in one["class"] for one in sure)
+    lines.append(f"cause in the class, where it could say: {share(inside, len(sure))}")
+    seen = sum(one["cause"] in one["oracle"]["class"] for one in sure)
+    lines.append(f"cause in the oracle's class: {share(seen, len(sure))}")
+    for whose, sizes in (
+        ("judge", [len(one["class"]) for one in sure if one["missing"]]),
+        ("oracle", [len(one["oracle"]["class"]) for one in sure]),
+    ):
+        lines.append(f"mean size of the class, {whose}: {np.mean(sizes):.2f}")
+    more = sum(one["found"] > 1 for one in hidden)
+    lines.append(f"a second effect claimed: {share(more, len(hidden))}")
+    for key in ("k", "kappa", "size", "uniform-drag-excess", "history-term"):
+        pulls = np.array([one["pulls"][key] for one in results if key in one["pulls"]])
+        if not len(pulls):
+            continue
+        one_sd, two_sd = (int(np.sum(np.abs(pulls) < limit)) for limit in (1.0, 1.96))
+        lines.append(
+            f"{key}: within 1 sd {share(one_sd, len(pulls))}, within 1.96 sd"
+            f" {share(two_sd, len(pulls))}, pulls {np.mean(pulls):+.2f} +- {np.std(pulls):.2f}"
+        )
+    ratios = [one["sd"] / one["oracle"]["sd"][one["cause"]] for one in sure if "sd" in one]
+    if ratios:
+        low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95])
+        lines.append(f"sd of the size over the oracle's: {middle:.2f} ({low:.2f} to {high:.2f})")
+    lines.append(
+        f"processor seconds a campaign: {np.mean([one['seconds'] for one in results]):.2f}"
+    )
+    lines.append("")
+    lines.append("| cause | could say | found | in the class | class, judge | class, oracle |")
+    lines.append("|---|---|---|---|---|---|")
+    for cause in CAUSES:
+        part = [one for one in sure if one["cause"] == cause]
+        if part:
+            sizes = [np.mean([len(one["class"]) for one in part])]
+            sizes.append(np.mean([len(one["oracle"]["class"]) for one in part]))
+            found = sum(one["missing"] for one in part)
+            named_ = sum(cause in one["class"] for one in part)
+            lines.append(
+                f"| {cause} | {len(part)} | {found} | {named_} | {sizes[0]:.1f} | {sizes[1]:.1f} |"
+            )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Draw, judge, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--campaigns", type=int, default=300)
+    parser.add_argument("--journal", type=Path, help="a line a campaign; goes on where it ended")
+    arguments = parser.parse_args()
+    maker = Generator()
+    results: list[dict[str, Any]] = []
+    if arguments.journal and arguments.journal.exists():
+        results = [json.loads(line) for line in arguments.journal.read_text().splitlines()]
+    done = {one["number"] for one in results}
+    for number in range(arguments.campaigns):
+        if number in done:
+            continue
+        results.append(draw(maker, number))
+        if arguments.journal:
+            with arguments.journal.open("a") as stream:
+                stream.write(json.dumps(results[-1]) + "\n")
+        if number % 20 == 0:
+            print(number, results[-1]["cause"], results[-1]["class"], file=sys.stderr, flush=True)
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()
