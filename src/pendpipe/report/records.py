@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from pendpipe.figures.data import Entry, error, number
@@ -73,7 +73,8 @@ def table_of_records(
             "branch": entry.get("branch") or "",
             "frequency": _cell(COLUMNS[0], entry).text,
             "cells": [_cell(column, entry) for column in columns],
-            "facts": [] if entry.get("refused") else list(_facts(entry)),
+            "entry": entry,
+            "known": _resolved(entry),
             "cuts": [
                 f"{number(cut.get('start_s')):.4g} s to {number(cut.get('stop_s')):.4g} s:"
                 f" {cut.get('reason', '')}"
@@ -130,54 +131,34 @@ def _unresolved(quantity: str, found: Any) -> bool:
     return quantity == "quality_factor_viscous" and spread > 0.3 * abs(number(found))
 
 
-def _facts(entry: Entry) -> Iterator[tuple[str, str]]:
-    """Everything that the section of a record lists, as pairs of name and value."""
-    yield "Source", without_folders(str(entry.get("source") or ""))
-    place = ", ".join(filter(None, (entry.get(key) for key in ("fluid", "branch", "geometry"))))
-    if place:
-        yield "Fluid, branch, geometry", place
-    quantities = {
-        "Frequency ω/(2π)": "frequency",
-        "Amplitude at the first turning point": "amplitude",
-        "Quadratic rate a": "a",
-        "Linear rate b": "b",
-        "Coulomb rate c": "c",
-        "Level": "offset",
-        "Limit of Q for a = c = 0": "quality_factor_limit",
-        "Hysteretic Q, k f²": "quality_factor_hysteretic",
-        "Viscous Q, Eq. 17": "quality_factor_viscous",
-        "Viscous Q of Eq. 16": "quality_factor_viscous_theory",
-        "Moment of inertia from distances": "moment_of_inertia",
-        "Moment of inertia from the frequency": "moment_of_inertia_from_frequency",
-        "Sensor constant": "volts_per_radian",
+QUANTITIES: Final = {
+    "Frequency ω/(2π)": "frequency",
+    "Amplitude at the first turning point": "amplitude",
+    "Quadratic rate a": "a",
+    "Linear rate b": "b",
+    "Coulomb rate c": "c",
+    "Level": "offset",
+    "Limit of Q for a = c = 0": "quality_factor_limit",
+    "Hysteretic Q, k f²": "quality_factor_hysteretic",
+    "Viscous Q, Eq. 17": "quality_factor_viscous",
+    "Viscous Q of Eq. 16": "quality_factor_viscous_theory",
+    "Moment of inertia from distances": "moment_of_inertia",
+    "Moment of inertia from the frequency": "moment_of_inertia_from_frequency",
+    "Sensor constant": "volts_per_radian",
+}
+"""What the section of a record lists."""
+
+
+def _resolved(entry: Entry) -> dict[str, str]:
+    """The quantities of a record that are known, as they are printed."""
+    return {
+        text: with_error(number(found), error(found), found.get("unit", ""))
+        + (", at its bound" if found.get("at_bound") else "")
+        for text, key in QUANTITIES.items()
+        if isinstance(found := entry.get(key), Mapping)
+        and math.isfinite(number(found))
+        and not _unresolved(key, found)
     }
-    for text, key in quantities.items():
-        found = entry.get(key)
-        if not isinstance(found, Mapping) or _unresolved(key, found):
-            continue
-        if math.isfinite(number(found)):
-            bound = ", at its bound" if found.get("at_bound") else ""
-            yield text, with_error(number(found), error(found), found.get("unit", "")) + bound
-    yield "Method", str(entry.get("method") or "")
-    yield (
-        "Used",
-        (
-            f"{entry.get('samples')} samples, {entry.get('turning_points')} turning points,"
-            f" {number(entry.get('start_s')):.4g} s to {number(entry.get('stop_s')):.4g} s"
-        ),
-    )
-    unit = (entry.get("amplitude") or {}).get("unit", "rad")
-    pair = (number(entry.get("noise_rms_rad")), number(entry.get("residual_rms_rad")))
-    if all(map(math.isfinite, pair)):
-        noise, residual = (compact(value, unit) for value in pair)
-        yield "Noise; residual (rms)", f"{noise}; {residual}"
-    misfit = entry.get("misfit")
-    if misfit:
-        own, linear = (
-            compact(number(misfit.get(key)), unit)
-            for key in ("amplitude_rms_rad", "linear_damping_rms_rad")
-        )
-        yield "Misfit of the amplitudes (rms)", f"{own}; with linear damping alone {linear}"
 
 
 CHI2_RANGE: Final = (0.5, 2.0)
