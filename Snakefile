@@ -43,4 +43,5 @@ rule all:
         # to run declares it.
         f"{RESULTS}/separation.json",
         campaign_diagnosis(),
+        pendulum_diagnoses(),
         of_every_record(),

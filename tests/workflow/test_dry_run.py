@@ -48,6 +48,25 @@ def test_the_default_campaign_has_a_job_a_record_in_each_of_its_stages(
     assert total == 5 * records + len(counted)
 
 
+def test_records_of_one_pendulum_have_a_job_together(tmp_path: Path) -> None:
+    header, *rows = (ROOT / "tests/workflow/small/records.tsv").read_text().splitlines()
+    width = header.count("\t")
+    names = ["brass", "brass", "alone", *[""] * (len(rows) - 3)]
+    lines = [
+        row + "\t" * (width - row.count("\t") + 1) + name
+        for row, name in zip(rows, names, strict=True)
+    ]
+    table = tmp_path / "records.tsv"
+    table.write_text("\n".join([f"{header}\tpendulum", *lines]) + "\n")
+    done = dry_run(
+        tmp_path / "results",
+        *("--configfile", "tests/workflow/small/config.yaml"),
+        override=f"records={table.as_posix()}",
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert jobs(done.stdout + done.stderr)["diagnose_pendulum"] == 1
+
+
 def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
     done = dry_run(tmp_path / "results", "--configfile", "benchmarks/shared_recordings.yaml")

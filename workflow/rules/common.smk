@@ -33,6 +33,11 @@ CAMPAIGN = checked(
 CONFIGURATION = checked(jobs.store, CAMPAIGN, ".snakemake/pendpipe")
 RESULTS = CAMPAIGN.configuration.results
 RECORDS = [record.record for record in CAMPAIGN.records]
+# Several records of one pendulum are diagnosed together as well.
+PENDULUMS = {}
+for record in CAMPAIGN.records:
+    if record.pendulum:
+        PENDULUMS.setdefault(record.pendulum, []).append(record.record)
 FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
 
@@ -93,6 +98,13 @@ def campaign_diagnosis():
     asked = CAMPAIGN.configuration.diagnose.enabled
     compared = CAMPAIGN.configuration.apparatus is not None
     return [f"{RESULTS}/campaign_diagnosis.json"] if asked and compared else []
+
+
+def pendulum_diagnoses():
+    """The diagnosis of each pendulum that several records are of."""
+    asked = CAMPAIGN.configuration.diagnose.enabled
+    names = [name for name, records in PENDULUMS.items() if asked and len(records) > 1]
+    return [f"{RESULTS}/pendulums/{name}/diagnosis.json" for name in names]
 
 
 def of_every_record():

@@ -73,7 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of several recordings: the sensor's errors are shared as well",
     )
     add(parser, "--json", "--baseline", "--fix")
-    add(parser, "--turning-points", "--calibration", "--record", "--refused")
+    add(parser, "--turning-points", "--record", "--refused")
+    # With several FILEs one for all, or one for each.
+    add(parser, "--calibration", nargs="+", default=[])
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -82,10 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
 
-    arguments.file = arguments.files[0]
     if len(arguments.files) > 1:
         keep_memory()
         return _diagnose_several(arguments)
+    arguments.file, given = arguments.files[0], arguments.calibration
+    arguments.calibration = given[0] if given else None
     if arguments.record is not None and arguments.out is None:
         raise InputError("--record", "a campaign's record needs a folder", "add --out DIR")
     keep_memory()
@@ -147,15 +150,22 @@ def _diagnose_several(arguments: argparse.Namespace) -> int:
         if getattr(arguments, name):
             option = f"--{name.replace('_', '-')}"
             raise InputError(option, "it is for one recording", "give one FILE, or leave it out")
-    recordings, made = [], []
-    for file in arguments.files:
+    recordings, made, given = {}, [], arguments.calibration
+    if len(given) not in (0, 1, len(arguments.files)):
+        raise InputError("--calibration", f"{len(given)} are given", "give one, or one for each")
+    for number, file in enumerate(arguments.files):
+        if Path(file).with_name("refused.json").exists():
+            print(f"{file}: refused, and left out", file=sys.stderr)
+            continue
         arguments.file = file
-        recording, provenance = read_motion(arguments)
-        recordings.append(recording)
+        arguments.calibration = given[number % len(given)] if given else None
+        recordings[file], provenance = read_motion(arguments)
         made.append({"name": file, **provenance})
+    if len(recordings) < 2:
+        return _not_analysable(arguments, "fewer than two recordings can be used", {})
     joint = diagnose_several(
-        recordings,
-        arguments.files,
+        list(recordings.values()),
+        list(recordings),
         baseline=arguments.baseline,
         level=arguments.level,
         seed=arguments.seed,

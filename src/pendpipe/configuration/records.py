@@ -24,14 +24,16 @@ COLUMNS: Final = (
     "volts_per_radian",
     "temperature_c",
     "order",
+    "pendulum",
 )
+_NUMBERS: Final = ("start_s", "stop_s", "volts_per_radian", "temperature_c", "order")
 REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST_NAME: Final = 100
 """The names of files made from it stay below the 255 bytes that file systems allow."""
 _OF_WINDOWS: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _OF_THE_CAMPAIGN: Final = (
-    *("figures", "calibration", "logs", "manifest", "challenge", "challenge-sealed"),
+    *("figures", "calibration", "logs", "manifest", "pendulums", "challenge", "challenge-sealed"),
     *("campaign.json", "comparison.json", "separation.json", "report.html", "readme.md"),
     "campaign_diagnosis.json",
 )
@@ -60,6 +62,8 @@ class Record:
         Of the fluid.
     order
         When it was taken: a number that rises over the day (an hour, a count); blank: its row.
+    pendulum
+        A name: records of one name are diagnosed together as well (docs/several.md).
     """
 
     record: str
@@ -73,6 +77,7 @@ class Record:
     volts_per_radian: float | None = None
     temperature_c: float | None = None
     order: float | None = None
+    pendulum: str = ""
 
     @property
     def file(self) -> Path | None:
@@ -135,8 +140,10 @@ def _record(where: str, row: dict[str, str]) -> Record:
     _check_name(where, row["record"])
     if not row["source"]:
         raise InputError(where, "the source is blank", "write simulated, dataq:<port> or a file")
-    cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS[:6]}
-    cells |= {name: _number(where, row, name) for name in COLUMNS[6:]}
+    if row.get("pendulum"):
+        _check_name(where, row["pendulum"])
+    cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS if name not in _NUMBERS}
+    cells |= {name: _number(where, row, name) for name in _NUMBERS}
     return Record(**cells)
 
 

@@ -1,0 +1,37 @@
+def of_pendulum(name):
+    """One file of each record of a pendulum."""
+
+    def files(wildcards):
+        return expand(
+            "{results}/{record}/{name}",
+            results=RESULTS,
+            record=PENDULUMS[wildcards.pendulum],
+            name=name,
+        )
+
+    return files
+
+
+rule diagnose_pendulum:
+    input:
+        recordings=of_pendulum("recording.csv"),
+        calibrations=of_pendulum("calibration.json"),
+    output:
+        f"{RESULTS}/pendulums/{{pendulum}}/diagnosis.json",
+    log:
+        f"{RESULTS}/pendulums/{{pendulum}}/diagnose.log",
+    conda:
+        "../envs/pendpipe.yaml"
+    params:
+        folder=subpath(output[0], parent=True),
+        refusal="" if STRICT else "--refused -",
+        baseline=CAMPAIGN.configuration.diagnose.baseline,
+        level=CAMPAIGN.configuration.diagnose.level,
+        seed=CAMPAIGN.configuration.seed,
+        code=code_version("pendpipe.commands.diagnose"),
+    message:
+        "{wildcards.pendulum}: what its recordings say together"
+    shell:
+        "pendpipe diagnose {input.recordings:q} --calibration {input.calibrations:q}"
+        " --baseline {params.baseline:q} --level {params.level:q} --seed {params.seed}"
+        " --out {params.folder:q} {params.refusal} > {log:q} 2>&1"
