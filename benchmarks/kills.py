@@ -323,7 +323,10 @@ def chain(kill: Kill) -> Part:
 
 
 def wrong(trial: Trial, project: Project) -> list[str]:
-    """Results that their manifests call sound and that are not as in the undisturbed run."""
+    """Results that their manifests call sound and that are others than in the undisturbed run.
+
+    One that is missing is none: Snakemake deletes what a job that was killed had written.
+    """
     homes = [project.results, *project.results.glob("*/")]
     sound = [
         (home / name).relative_to(project.results).as_posix()
@@ -333,7 +336,7 @@ def wrong(trial: Trial, project: Project) -> list[str]:
         for name in (*entry.outputs, *entry.extras)
     ]
     sums = project.sums()
-    return [name for name in sound if sums.get(name) != trial.sums.get(name)]
+    return [name for name in sound if name in sums and sums[name] != trial.sums.get(name)]
 
 
 def group(trial: Trial, project: Project, _draw: random.Random, share: float) -> Case:

@@ -44,5 +44,9 @@ class NotAnalysableError(InputError):
     """The recording can be read, but holds no free decay that could be analysed."""
 
 
+class UnwritableError(InputError):
+    """A result can't be written: a full disk, say. The record that it belongs to may be sound."""
+
+
 class DamagedError(InputError):
     """A result is not what its stage wrote; the record that it belongs to may be sound."""

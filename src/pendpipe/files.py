@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
 
-from pendpipe.errors import DamagedError, InputError
+from pendpipe.errors import DamagedError, InputError, UnwritableError
 
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
 
@@ -97,9 +97,9 @@ def check_writable(folder: str | Path) -> None:
         raise _cannot_write(folder, fault) from None
 
 
-def _cannot_write(path: str | Path, fault: OSError) -> InputError:
+def _cannot_write(path: str | Path, fault: OSError) -> UnwritableError:
     reason = fault.strerror or str(fault)
-    return InputError(path, f"it can't be written ({reason})", "name another place")
+    return UnwritableError(path, f"it can't be written ({reason})", "name another place")
 
 
 def finite(value: Any) -> Any:

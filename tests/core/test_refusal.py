@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import pytest
 
-from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import read_json
+from pendpipe.errors import DamagedError, InputError, UnwritableError
+from pendpipe.files import read_json, replaced
 from pendpipe.stages.refusal import reason_of, run_stage
 
 
@@ -102,3 +103,16 @@ def test_a_damaged_result_refuses_no_record(tmp_path: Path) -> None:
 
 def write(path: Path, text: str) -> None:
     path.write_text(text)
+
+
+def test_a_full_disk_refuses_no_record(tmp_path: Path) -> None:
+    refused, out = tmp_path / "x/refused.json", tmp_path / "x/recording.csv"
+
+    def has_no_room() -> None:
+        with replaced(out):
+            raise OSError(errno.EFBIG, "File too large")
+
+    with pytest.raises(UnwritableError, match="too large"):
+        run_stage("acquire", "x", has_no_room, outputs=[out], refused=refused)
+    assert not refused.exists()
+    assert not out.exists()

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.errors import DamagedError, InputError
+from pendpipe.errors import DamagedError, InputError, UnwritableError
 from pendpipe.files import read_json, replaced, without_folders, write_json
 from pendpipe.manifest import check, job
 
@@ -52,6 +52,8 @@ def run_stage(
     ------
     DamagedError
         If a result that is read is not what its stage wrote. That refuses no record.
+    UnwritableError
+        If there is no room for the outputs, say. Nor does that.
     """
     if record is None:
         return _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
@@ -86,7 +88,7 @@ def _work_or_refuse(
     refused.unlink(missing_ok=True)
     try:
         work()
-    except DamagedError:
+    except (DamagedError, UnwritableError):
         raise
     except InputError as error:
         reason = within_results(error, refused, sources)
