@@ -1,6 +1,7 @@
 rule figures:
     input:
         comparison=f"{RESULTS}/comparison.json",
+        together=campaign_diagnosis(),
         turning_points=of_all_records("turning_points.csv"),
         fits=of_all_records("fit.json"),
         recordings=of_all_records("recording.csv"),

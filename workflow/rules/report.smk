@@ -2,6 +2,7 @@ rule report:
     input:
         comparison=f"{RESULTS}/comparison.json",
         campaign=f"{RESULTS}/campaign.json",
+        together=campaign_diagnosis(),
         figures=rules.figures.output.drawn,
         diagnoses=diagnoses(),
     output:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pendpipe.analysis.distributions import chi_square_p_value
+from pendpipe.campaign.causes import causes
 from pendpipe.campaign.diagnose import CampaignSearch, Found, Rival, held_out
 from pendpipe.campaign.fit import JointFit
 from pendpipe.campaign.next_measurement import NextRun, next_measurements
@@ -20,8 +21,9 @@ BASELINE = "eq16"
 def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> dict[str, Any]:
     """Return the content of campaign_diagnosis.json: the keys of diagnosis.json, and more.
 
-    Added are ``baseline.chi2`` and ``improved.chi2``, for each effect ``rivals`` (values and chi^2
-    of its class) and ``next_measurements``, for the campaign ``excluded`` and ``records``.
+    Added are ``baseline.chi2`` and ``improved.chi2``; for each effect ``rivals`` (values and chi^2
+    of its class) and ``next_measurements``; for the campaign ``excluded``, ``records`` and
+    ``patterns`` (`causes`).
     """
     ranked = [
         next_measurements(
@@ -55,6 +57,7 @@ def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> di
         },
         "unexplained": {"residual_rms_rad": None, "p_value": left},
         "excluded": search.excluded,
+        "patterns": causes(search),
         "records": [
             {"record": run.record, "pull_from_the_others": float(pull)}
             for run, pull in zip(search.improved.design.runs, pulls, strict=True)

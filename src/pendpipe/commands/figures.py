@@ -44,6 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
         for name in ("recording.csv", "turning_points.csv", "fit.json")
     ]
     inputs.append(arguments.comparison)
+    together = folder / "campaign_diagnosis.json"
+    inputs += [together] if together.is_file() else []
     with job(folder, "figures", inputs=inputs, out=arguments.out) as running:
         return _draw(arguments, folder, comparison, running)
 

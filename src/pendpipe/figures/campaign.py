@@ -45,6 +45,7 @@ from pendpipe.figures.style import (
     second_scale,
     styled,
 )
+from pendpipe.files import read_json
 from pendpipe.quantities import axis_unit, prefixed, with_error
 from pendpipe.recording import read_plain
 
@@ -127,6 +128,7 @@ def _campaign_figures(comparison: Comparison) -> dict[str, Callable[[Comparison,
             "fig06": lambda comparison, _: draw_fig06(comparison),
             "fig09": lambda comparison, _: draw_fig09(comparison),
             "fig10": lambda comparison, _: draw_fig10(comparison),
+            "causes": lambda _, folder: draw_causes(folder / "campaign_diagnosis.json"),
         }
     return dict(sorted(figures.items()))
 
@@ -434,6 +436,38 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
         lower.set_title(f"Drag measured over Eq. 16: {text}", fontsize=8.5, pad=3)
     lower.set(xlabel="Frequency (Hz)", ylabel="Q, measured\nover theory")
     lower.margins(y=0.15)
+    return figure
+
+
+@styled
+def draw_causes(path: Path) -> Figure:
+    """Draw what each cause alone predicts of the excess over Eq. 16, and what was measured."""
+    patterns = read_json(path).get("patterns") if path.is_file() else None
+    if not patterns:
+        raise NothingToDrawError("the records were not diagnosed together")
+    figure = Figure(figsize=(WIDTH_IN, 5.0), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    records = patterns["records"]
+    frequency = np.array([record["frequency_hz"] for record in records])
+    excess = np.array([record["excess"] for record in records])
+    order = np.argsort(frequency)
+    span = max(1.6 * float(np.abs(excess).max()), 0.01)
+    for axes, within in ((left, True), (right, False)):
+        for name in dict.fromkeys(record["branch"] for record in records):
+            at = [number for number, record in enumerate(records) if record["branch"] == name]
+            look = branch(name)
+            sds = [records[number]["sd"] for number in at]
+            points = {"fmt": look.marker, "color": look.colour, "zorder": 3}
+            axes.errorbar(frequency[at], 100 * excess[at], 100 * np.array(sds), **points)
+        shown = [cause for cause in patterns["causes"] if cause["in_class"] == within]
+        for colour, cause in enumerate(shown[:8]):
+            curve_ = 100.0 * np.array(cause["excess"])[order]
+            axes.plot(frequency[order], curve_, color=f"C{colour}", label=cause["name"])
+        axes.set(xlabel="Frequency (Hz)", ylim=(-10.0 * span, 110.0 * span))
+        axes.set_title("not told apart" if within else "rejected by all records together")
+        if shown:
+            axes.legend(fontsize=7.0, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+    left.set(ylabel="Viscous loss above Eq. 16 (%)")
     return figure
 
 

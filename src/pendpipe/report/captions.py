@@ -79,6 +79,15 @@ CAPTIONS: Final = {
         "The later a fit begins, the less it knows: bars of one standard deviation grow until"
         " they leave the panel, first in a, then in b and c. Fit whole records.",
     ),
+    "causes": Caption(
+        "What each cause predicts",
+        "The viscous loss of every record in the fluid above that of Eq. 16, inputs as configured"
+        " (symbols), and what each cause alone would add if its size were the best for these"
+        " points (lines). Left the causes that all records together cannot tell apart, right"
+        " the others.",
+        "A cause explains the mismatch only if its line has the sign, the size and the flatness"
+        " of the points; how large it has to be for that is in the table.",
+    ),
     "residual_map": Caption(
         "Residual, before and after",
         "Data minus model against time and phase of the cycle, in standard errors of a cell: the"

@@ -35,6 +35,8 @@ _RESERVE_BYTES: Final = 350_000
 _RECORD_BYTES: Final = 6_000
 """What a record takes beside its figures: its row, its section, its share of the downloads."""
 
+TOGETHER: Final = "campaign_diagnosis.json"
+
 Content = Mapping[str, Any]
 
 
@@ -89,6 +91,8 @@ def render(
         captions=CAPTIONS,
         columns=columns,
         diagnosed=diagnoses(folder, names, room),
+        together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
+        joint=remarks.joint_rows(comparison),
         asked=asked,
         proof=proven,
         records=lines,
@@ -122,7 +126,7 @@ def own_files() -> dict[str, str]:
 
 def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
     """The results beside the comparison that a page is made of, where they are there."""
-    files = [figures / f"{name}.svg" for name in CAPTIONS]
+    files = [folder / TOGETHER, *(figures / f"{name}.svg" for name in CAPTIONS)]
     files += [
         folder / str(entry["record"]) / name
         for entry in comparison["records"]

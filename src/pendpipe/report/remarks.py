@@ -106,3 +106,23 @@ def check_rows(comparison: Comparison) -> list[tuple[str, str, str, str]]:
             )
         )
     return rows
+
+
+def joint_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """The numbers of the joint fits beside those of the paper's route."""
+    joint = comparison.get("joint")
+    if not joint:
+        return []
+    names = {
+        "hysteretic_coefficient": ("Hysteretic coefficient k", "hysteretic_coefficient"),
+        "drag_factor": ("Drag over Eq. 16", "theory_factor"),
+        "history_coefficient": ("History coefficient C_H", "history_coefficient"),
+        "added_mass_coefficient": ("Added mass over the displaced fluid", ""),
+    }
+    routes = [joint["with_benchmark"], joint["without_benchmark"] or {}]
+    rows = []
+    for name, (words, paper) in names.items():
+        found = [*(route.get(name) for route in routes), comparison.get(paper)]
+        texts = (with_error(number(x), error(x), x.get("unit", "")) if x else "" for x in found)
+        rows.append((words, *texts))
+    return rows
