@@ -9,9 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 
-from pendpipe.analysis.fit.least_squares import Bounds, bounded_step, covariance, intervals95
+from pendpipe.analysis.fit.least_squares import (
+    Bounds,
+    bounded_least_squares,
+    bounded_step,
+    covariance,
+    intervals95,
+)
 
 HALF_95 = 1.959963984540054
 ENTRY = st.floats(-2.0, 2.0)
@@ -32,6 +38,20 @@ def test_a_bounded_step_is_the_lowest_allowed_point(root, gradient) -> None:  # 
     )  # fmt: skip
     assert np.all((bounds.lower <= step) & (step <= bounds.upper))
     assert 0.5 * step @ normal @ step - gradient @ step <= found.fun + 1e-7
+
+
+@given(st.integers(1, 9), st.integers(0, 2**32 - 1))
+def test_least_squares_within_bounds(count: int, seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    matrix = generator.normal(size=(count + 2, count))
+    right = 10.0 * generator.normal(size=count + 2)
+    floor = np.where(generator.random(count) < 0.4, -np.inf, -generator.integers(0, 2, count))
+    ceiling = np.where(generator.random(count) < 0.4, np.inf, 3.0 * generator.random(count) + 0.1)
+    found = bounded_least_squares(matrix, right, floor, ceiling)
+    best = lsq_linear(matrix, right, (floor - 1e-9, ceiling + 1e-9), method="bvls").x
+    assert np.all((found >= floor) & (found <= ceiling))
+    cost, least = (float(np.sum((matrix @ x - right) ** 2)) for x in (found, best))
+    assert cost == pytest.approx(least, rel=1e-5, abs=1e-6)
 
 
 def test_far_from_bounds_the_interval_is_symmetric() -> None:

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.least_squares import FRACTIONS, bounded_least_squares
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.numerics import bounded_least_squares
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
@@ -22,8 +22,6 @@ SETTLED: Final = 0.02
 """Expected fall of chi^2 below which a step is the last."""
 _LARGEST_RATIO: Final = 1.5
 """By which a scale (a time, a speed, a length) may change in one step."""
-_FRACTIONS: Final = (0.3, 0.1, 0.02)
-"""Fractions of a step to try where the whole step does not lower chi^2."""
 _REFITTED_FRACTIONS: Final = (1.0, 0.3)
 """The same where the linear values are refitted after the scales have moved."""
 _ENOUGH: Final = 0.5
@@ -118,7 +116,7 @@ class GaussNewton:
         if whole is not None and whole.chi2 < enough:
             return whole
         refitted = (self._refitted(here, part * step, free) for part in _REFITTED_FRACTIONS)
-        shorter = (self._evaluated(here.value + part * step) for part in _FRACTIONS)
+        shorter = (self._evaluated(here.value + part * step) for part in FRACTIONS[1:])
         lowest: Evaluation | None = None
         for way in (refitted, shorter):
             found = next((there for there in way if there and there.chi2 < enough), None)

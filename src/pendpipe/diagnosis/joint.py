@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.distributions import chi2_beyond
+from pendpipe.analysis.fit.least_squares import bounded_least_squares
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Lead
@@ -31,7 +32,6 @@ from pendpipe.diagnosis.evidence import (
 )
 from pendpipe.diagnosis.gauss_newton import GaussNewton
 from pendpipe.diagnosis.moves import CHOICE, FURTHER
-from pendpipe.diagnosis.numerics import bounded_least_squares
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.refits import NEAR
 from pendpipe.diagnosis.remainder import remainder_of

@@ -1,6 +1,6 @@
 """Numerics that would otherwise need scipy, whose import takes as long as a whole fit.
 
-Bounded linear least squares, the cosine transform, and tails of weighted sums of squares.
+The cosine transform, and tails of weighted sums of squares.
 """
 
 from __future__ import annotations
@@ -12,61 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pendpipe.arrays import BoolArray, FloatArray
-
-_SLACK = 1e-9
-"""Rounding error of the gradient."""
-
-
-def bounded_least_squares(
-    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
-) -> FloatArray:
-    """Minimise |matrix x - right| with floor <= x <= ceiling, by active sets.
-
-    The values move from zero (which must be within the bounds) towards the free optimum. A value
-    that meets a bound is held there, and released if that lowers the sum (Stark and Parker 1995).
-
-    Parameters
-    ----------
-    matrix, right
-        Shapes (m, n) and (m,).
-    floor, ceiling
-        Shape (n,); infinite for no bound.
-    """
-    x = np.clip(np.zeros(len(floor)), floor, ceiling)
-    held = np.zeros(len(floor), dtype=bool)
-    for _ in range(10 * len(floor) + 10):
-        goal = x.copy()
-        rest = right - matrix[:, held] @ x[held]
-        goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
-        met, share = _first_met(x, goal, floor, ceiling, ~held)
-        x = np.clip(x + share * (goal - x), floor, ceiling)
-        if met is not None:
-            x[met] = floor[met] if goal[met] < x[met] else ceiling[met]
-            held[met] = True
-            continue
-        pull = matrix.T @ (right - matrix @ x)
-        inwards = np.where(x <= floor, pull, -pull) * held
-        released = int(np.argmax(inwards))
-        if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
-            break
-        held[released] = False
-    return x
-
-
-def _first_met(
-    x: FloatArray, goal: FloatArray, floor: FloatArray, ceiling: FloatArray, free: BoolArray
-) -> tuple[int | None, float]:
-    """Return the first free value that meets its bound, and the fraction of the way to it."""
-    out = free & ((goal < floor) | (goal > ceiling))
-    if not out.any():
-        return None, 1.0
-    wall = np.where(goal < floor, floor, ceiling)
-    share = np.full(len(x), np.inf)
-    share[out] = (wall[out] - x[out]) / (goal[out] - x[out])
-    met = int(np.argmin(share))
-    return met, max(float(share[met]), 0.0)
-
+from pendpipe.arrays import FloatArray
 
 _Complex = NDArray[np.complex128]
 

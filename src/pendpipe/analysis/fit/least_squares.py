@@ -12,8 +12,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 
+_SLACK: Final = 1e-9
+"""Rounding error of the gradient."""
 _BEYOND: Final = 1e-9
 """Standard deviations by which rounding may put a step beyond its bound."""
 _SINGULAR: Final = 1e12
@@ -43,32 +45,77 @@ def bounded_step(
 ) -> FloatArray:
     """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
 
-    The step is found as if nothing were bounded; what then lies beyond its bound is put there, and
-    what its bound holds back no more is let go, until the step stays.
-
     Parameters
     ----------
     normal, gradient
         H, shape (n, n), positive definite in what is free, and g, shape (n,).
     bounds
-        Of d.
+        Of d; zero is within them.
     held
         Entries that stay zero.
     """
-    if len(held) == 0:
-        step = solved(normal, gradient)
-        if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
-            return step
-    step, on = np.zeros(len(gradient)), dict[int, float]()
-    for _ in range(4 * len(step)):
-        free = [j for j in range(len(step)) if j not in held and j not in on]
-        step = np.zeros(len(step))
-        step[list(on)] = list(on.values())
-        pulled = gradient - normal @ step
-        step[free] = solved(normal[np.ix_(free, free)], pulled[free])
-        if not exchanged(on, free, step, normal, gradient, bounds):
-            break
+    free = [j for j in range(len(gradient)) if j not in held]
+    step, part = np.zeros(len(gradient)), normal[np.ix_(free, free)]
+    step[free] = solved(part, gradient[free])
+    if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
+        return step
+    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    # A hair for what the readings do not tell apart.
+    root = np.linalg.cholesky(part * scale[:, None] * scale + 1e-13 * np.eye(len(free)))
+    within = Bounds(bounds.lower[free] / scale, bounds.upper[free] / scale)
+    right = np.linalg.solve(root, gradient[free] * scale)
+    step[free] = bounded_least_squares(root.T, right, *within) * scale
     return bounds.clip(step)
+
+
+def bounded_least_squares(
+    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
+) -> FloatArray:
+    """Minimise |matrix x - right| with floor <= x <= ceiling, by active sets.
+
+    The values move from zero (which must be within the bounds) towards the free optimum. A value
+    that meets a bound is held there, and released if that lowers the sum (Stark and Parker 1995).
+
+    Parameters
+    ----------
+    matrix, right
+        Shapes (m, n) and (m,).
+    floor, ceiling
+        Shape (n,); infinite for no bound.
+    """
+    x = np.clip(np.zeros(len(floor)), floor, ceiling)
+    held = np.zeros(len(floor), dtype=bool)
+    for _ in range(10 * len(floor) + 10):
+        goal = x.copy()
+        rest = right - matrix[:, held] @ x[held]
+        goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
+        met, share = _first_met(x, goal, floor, ceiling, ~held)
+        x = np.clip(x + share * (goal - x), floor, ceiling)
+        if met is not None:
+            x[met] = floor[met] if goal[met] < x[met] else ceiling[met]
+            held[met] = True
+            continue
+        pull = matrix.T @ (right - matrix @ x)
+        inwards = np.where(x <= floor, pull, -pull) * held
+        released = int(np.argmax(inwards))
+        if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
+            break
+        held[released] = False
+    return x
+
+
+def _first_met(
+    x: FloatArray, goal: FloatArray, floor: FloatArray, ceiling: FloatArray, free: BoolArray
+) -> tuple[int | None, float]:
+    """Return the first free value that meets its bound, and the fraction of the way to it."""
+    out = free & ((goal < floor) | (goal > ceiling))
+    if not out.any():
+        return None, 1.0
+    wall = np.where(goal < floor, floor, ceiling)
+    share = np.full(len(x), np.inf)
+    share[out] = (wall[out] - x[out]) / (goal[out] - x[out])
+    met = int(np.argmin(share))
+    return met, max(float(share[met]), 0.0)
 
 
 def exchanged(
@@ -141,7 +188,8 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     return result
 
 
-_DAMPING: Final = (0.0, 1e-3, 1e-2, 0.1, 1.0, 1e2, 1e4, 1e6)
+FRACTIONS: Final = (1.0, 0.3, 0.1, 0.02)
+"""Of a step: the first that lowers chi^2 is taken."""
 _PREDICTED: Final = 1e-2
 """Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
 
@@ -176,7 +224,7 @@ def minimise(
     predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
     most: int = 60,
 ) -> Minimum:
-    """Minimise chi^2 by damped Gauss-Newton steps that respect bounds.
+    """Minimise chi^2 by Gauss-Newton steps that respect bounds, shortened where they overshoot.
 
     Parameters
     ----------
@@ -197,32 +245,25 @@ def minimise(
     """
     value = bounds.clip(start)
     now = evaluate(value)
-    level = 0
-    for _ in range(most - 1):
-        damped = now.normal
-        if level > 0:
-            damped = damped + _DAMPING[level] * np.diag(np.diag(damped))
-        step = bounded_step(damped, now.gradient, bounds.about(value), held)
+    for _ in range(most):
+        step = bounded_step(now.normal, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
-        if promised < tolerance and level < 3:
-            return Minimum(bounds.clip(value + step), _moved(now, step), True, value, promised)
         trial = bounds.clip(value + step)
-        if (
+        if promised < tolerance or (
             predict_remaining is not None
-            and level == 0
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
             return Minimum(trial, _moved(now, step), True, value, promised)
-        then = evaluate(trial)
-        if np.isfinite(then.chi2) and then.chi2 <= now.chi2 + 0.1 * tolerance:
-            if now.chi2 - then.chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2:
-                return Minimum(trial, then, True, trial)
-            value, now = trial, then
-            level = max(level - 2, 0)
-        elif level == len(_DAMPING) - 1:
+        ways = (bounds.clip(value + part * step) for part in FRACTIONS)
+        tried = ((way, evaluate(way)) for way in ways)
+        enough = now.chi2 + 0.1 * tolerance
+        found = next((there for there in tried if there[1].chi2 <= enough), None)
+        if found is None:
             return Minimum(value, now, False, value)
-        else:
-            level += 1
+        settled = now.chi2 - found[1].chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2
+        value, now = found
+        if settled:
+            return Minimum(value, now, True, value)
     return Minimum(value, now, False, value)
 
 
