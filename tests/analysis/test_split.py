@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.fit.by_waveform import split_quality_factors
-from pendpipe.analysis.fit.waveform import OMEGA, SHARE, B
+from pendpipe.dynamics.eq8 import OMEGA, SHARE, B
 
 OMEGA_PER_S = 2.0 * np.pi * 0.9
 RATE_PER_S, PART = 0.01, 0.4

@@ -57,10 +57,8 @@ def test_coulomb_and_fluid_quality_factors_go_with_and_against_the_amplitude() -
 def test_eq9b_and_eq15_are_the_same_quality_factor(
     qualities: tuple[float, float, float, float], y0: float, y: float
 ) -> None:
-    rates = decay_rates(qualities, y0, OMEGA)
-    by_rates = quality_factor(
-        y, OMEGA / (2.0 * np.pi), rates.quadratic, rates.linear, rates.coulomb
-    )
+    a, hysteretic, viscous, c = decay_rates(qualities, y0, OMEGA)
+    by_rates = quality_factor(y, OMEGA / (2.0 * np.pi), a, hysteretic + viscous, c)
     assert float(by_rates) == pytest.approx(float(net_quality_factor(qualities, y, y0)), rel=1e-12)
 
 
@@ -69,9 +67,9 @@ def test_eq9b_and_eq15_are_the_same_quality_factor(
 def test_quality_factors_to_rates_and_back(
     qualities: tuple[float, float, float, float], y0: float, omega: float
 ) -> None:
-    rates = decay_rates(qualities, y0, omega)
-    share = rates.hysteretic / rates.linear
-    back = quality_factors(rates.quadratic, rates.linear, rates.coulomb, y0, omega, share)
+    a, hysteretic, viscous, c = decay_rates(qualities, y0, omega)
+    b = hysteretic + viscous
+    back = quality_factors(a, b, c, y0, omega, hysteretic / b)
     np.testing.assert_allclose(back[:3], qualities[:3], rtol=1e-12)
     # 1 - share has lost the digits in which the viscous part is below the hysteretic one.
     slack = 4e-16 * (1.0 + qualities[3] / qualities[1])
@@ -148,8 +146,8 @@ def test_turning_points_of_eq8_follow_eq14(losses: tuple[float, float, float, fl
             atol=1e-15,
         )
         turning, time = float(run.y_events[0][0][0]), time + float(run.t_events[0][0])
-    rates = decay_rates(losses, y0, OMEGA)
-    law = amplitude(time, y0, rates.quadratic, rates.linear, rates.coulomb)
+    a, hysteretic, viscous, c = decay_rates(losses, y0, OMEGA)
+    law = amplitude(time, y0, a, hysteretic + viscous, c)
     # First order: what remains is second order in 1/Q, 1e-6 here.
     assert np.log(y0 / abs(turning)) == pytest.approx(np.log(y0 / float(law)), rel=2e-5)
 

@@ -79,7 +79,7 @@ def begin(
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
     span = usable_span(samples, points, start)
-    value = _values(start.value)
+    value = start.value.copy()
     if "offset" in fixed:
         value[OFFSET] = fixed["offset"]
     sine = None
@@ -87,7 +87,7 @@ def begin(
         known = start_of(points, stated=stated)
         if known.sine and known.favoured == "sine" and known.linear.slip_rad > LARGE_PHASE_ERROR:
             # Both laws begin at the first turning point, so that they count the same half cycles.
-            value, sine = _values(known.linear.value), _values(known.sine.value)
+            value, sine = known.linear.value, known.sine.value
             value[TIME] = sine[TIME]
             if baseline == "viscous":
                 value[[A, C]] = sine[[A, C]] = 0.0
@@ -121,15 +121,6 @@ def begin(
     data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
     return Beginning(data, model, value, held, data.noise_rms, points, sine)
-
-
-def _values(named: FloatArray) -> FloatArray:
-    """Put values in the order of `waveform.NAMES` into that of the model."""
-    a, b, c, omega, angle, time, offset, share = named
-    value = np.empty(8)
-    value[[A, B, C, SHARE]] = a, b, c, min(max(share, 0.0), 1.0)
-    value[[OMEGA, START, TIME, OFFSET]] = omega, angle, time, offset
-    return value
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

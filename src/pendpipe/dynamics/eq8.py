@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -27,6 +27,11 @@ RATES = ("quadratic", "hysteretic", "viscous", "coulomb")
 """The losses of Eq. 8, in the order of Eq. 13: a, the two parts of b, c."""
 JACOBIAN_COLUMNS = (*RATES, "angular_frequency", "angle", "time", "offset")
 """The columns of every Jacobian."""
+BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")
+"""The vector that fit and diagnosis search: Eq. 13's rates; the hysteretic share of b; omega; the
+turning point from which the motion starts (about the equilibrium) and when; and the reading of the
+equilibrium."""
+A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
 
 
 @dataclass(frozen=True)

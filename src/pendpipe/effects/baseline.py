@@ -14,12 +14,11 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.clock import Clock
+from pendpipe.dynamics.eq8 import BASELINE as BASELINE
+from pendpipe.dynamics.eq8 import OFFSET as OFFSET
+from pendpipe.dynamics.eq8 import OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.effect import Pendulum
 
-BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "offset")
-"""Eq. 13's rates; the hysteretic share of b; omega; the turning point from which the motion
-starts (about the equilibrium) and when; and the reading of the equilibrium."""
-A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
 LOW: Final = (0.0, 0.0, 0.0, 0.0, 1e-9, -math.inf, -math.inf, -math.inf)
 HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, math.inf)
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeVar, c
 
 import numpy as np
 
+from pendpipe.dynamics.eq8 import Eq8
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -54,26 +56,20 @@ class Kick(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Pendulum:
-    """The baseline's constants (Eq. 8 by the first-order rates of Eq. 13).
+class Pendulum(Eq8):
+    """The baseline's constants, and when the first reading was taken.
 
     Parameters
     ----------
-    angular_frequency
-        omega, rad/s.
-    quadratic, hysteretic, viscous, coulomb
-        a in 1/(rad s); the parts b_h and b_v of b in 1/s; c in rad/s.
     first_s
         When the first reading was taken: the pendulum was let go at the last turning point
         before it. By default, at the start of the motion.
     """
 
-    angular_frequency: float
-    quadratic: float = 0.0
-    hysteretic: float = 0.0
-    viscous: float = 0.0
-    coulomb: float = 0.0
     first_s: float = -math.inf
+
+    def __post_init__(self) -> None:
+        """On a search's way any values may come."""
 
     @property
     def linear(self) -> float:

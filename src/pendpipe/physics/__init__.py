@@ -24,7 +24,6 @@ from pendpipe.physics.drag import (
 )
 from pendpipe.physics.free_decay import cylinder_drag, free_decay_root, rotation_of_sphere
 from pendpipe.physics.friction import (
-    DecayRates,
     QualityFactors,
     decay_rates,
     energy_power_friction,
@@ -82,7 +81,6 @@ __all__ = [
     "POTENTIAL_FLOW_ADDED_MASS",
     "STANDARD_GRAVITY_M_PER_S2",
     "Confined",
-    "DecayRates",
     "Fluid",
     "Lengthening",
     "Part",

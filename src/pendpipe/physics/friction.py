@@ -25,29 +25,11 @@ class QualityFactors(NamedTuple):
     viscous: FloatArray
 
 
-class DecayRates(NamedTuple):
-    """The rates of Eq. 13, its b split into the two kinds of exponential loss."""
-
-    quadratic: FloatArray
-    """a in 1/(rad s)."""
-    hysteretic: FloatArray
-    """The hysteretic part of b in 1/s."""
-    viscous: FloatArray
-    """The viscous part of b in 1/s."""
-    coulomb: FloatArray
-    """c in rad/s."""
-
-    @property
-    def linear(self) -> FloatArray:
-        """Both parts of b together, in 1/s."""
-        return plain(self.hysteretic + self.viscous)
-
-
 def decay_rates(
     quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
     amplitude0_rad: Numbers,
     angular_frequency_per_s: Numbers,
-) -> DecayRates:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Turn (Q_c0, Q_h, Q_f0, Q_v) at y0 into the rates of Eq. 13, to first order.
 
     Parameters
@@ -56,11 +38,17 @@ def decay_rates(
         Q_c0, Q_h, Q_f0, Q_v in this order; infinite for a loss that is absent.
     amplitude0_rad, angular_frequency_per_s
         y0 in rad, omega in rad/s; broadcast.
+
+    Returns
+    -------
+    tuple of FloatArray
+        a in 1/(rad s), the hysteretic and the viscous part of b in 1/s, and c in rad/s: the order
+        of `pendpipe.Eq8`.
     """
     coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
     y0, omega = floats(amplitude0_rad, angular_frequency_per_s)
     half = 0.5 * omega
-    return DecayRates(
+    return (
         plain(half / (y0 * fluid)),
         plain(half / hysteretic),
         plain(half / viscous),

@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit import waveform
 from pendpipe.analysis.fit.assemble import (
     Bounded,
     Numbers,
@@ -27,13 +26,14 @@ from pendpipe.analysis.fit.decrement import check_decrement, light_of
 from pendpipe.analysis.fit.least_squares import Minimum, covariance, minimise
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
-from pendpipe.analysis.fit.waveform import NAMES, OMEGA, SHARE, B, Waveform, best_noise
+from pendpipe.analysis.fit.waveform import BOUNDS, PRIOR_INVERSE, Waveform, best_noise
 from pendpipe.analysis.losses import quality_of_rate
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import turning_points_with_jacobian
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, A, B, C
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Estimate
 
@@ -121,7 +121,7 @@ def _result(
     """Judge what the fit has left; return the result."""
     # Of where the last step began, if that was so small that it was accepted unverified.
     residual = fitted.problem.residual(fitted.minimum.at)
-    dof = len(residual) - len(NAMES) + len(fitted.held)
+    dof = len(residual) - 8 + len(fitted.held)
     noise = judge_noise(samples, points, residual, fitted.problem)
     gained = fitted.minimum.gained * fitted.problem.noise_rms**2
     rms = math.sqrt(max(float(residual @ residual) - gained, 0.0) / len(residual))
@@ -191,7 +191,7 @@ def _fit(
         minimum = minimise(
             problem.evaluate,
             value,
-            waveform.BOUNDS,
+            BOUNDS,
             held=held,
             tolerance=_TOLERANCE,
             predict_remaining=problem.predict_remaining,
@@ -218,9 +218,7 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     for _ in range(_ROUNDS):
         noise = best_noise(problem.residual(value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
-        minimum = minimise(
-            problem.evaluate, value, waveform.BOUNDS, held=fitted.held, tolerance=_TOLERANCE
-        )
+        minimum = minimise(problem.evaluate, value, BOUNDS, held=fitted.held, tolerance=_TOLERANCE)
         if not math.isfinite(minimum.quadratic.chi2):
             return fitted
         value = minimum.value
@@ -230,7 +228,7 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
 def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> int:
     """The reading after the `used`-th turning point."""
     found = int(np.searchsorted(samples.time_s, points.time_s[used - 1], side="right"))
-    return int(min(max(found, span.start + 4 * len(NAMES)), span.stop))
+    return int(min(max(found, span.start + 4 * 8), span.stop))
 
 
 def _held(
@@ -240,10 +238,10 @@ def _held(
     baseline: Baseline,
 ) -> tuple[int, ...]:
     """Indices of what is not fitted."""
-    index = {"a": 0, "b": 1, "c": 2, "amplitude": waveform.ANGLE, "offset": waveform.OFFSET}
+    index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
     held = [index[name] for name in held_rates]
     if "frequency" in fixed:
-        held.append(waveform.OMEGA)
+        held.append(OMEGA)
     if parts or baseline == "viscous" or held_rates.get("b") == 0.0:
         held.append(SHARE)
     return tuple(held)
@@ -254,21 +252,21 @@ def _numbers(fitted: _Fitted, scale: float, start_s: float) -> tuple[Numbers, Fl
     value, held = fitted.minimum.value, fitted.held
     quadratic = fitted.minimum.quadratic
     normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
-    normal[SHARE, SHARE] += (1.0 - scale) * waveform.PRIOR_INVERSE
+    normal[SHARE, SHARE] += (1.0 - scale) * PRIOR_INVERSE
     first, jacobian = _first_turning_point(fitted, start_s)
     matrix = covariance(normal, held)
     numbers = np.array(
         [
             *value[:3],
-            0.5 * value[waveform.OMEGA] / math.pi,
+            0.5 * value[OMEGA] / math.pi,
             first[0],
             first[1],
-            value[waveform.OFFSET],
+            value[OFFSET],
         ]
     )
     fit = Bounded(value, normal, gradient, held, matrix)
     covariances = jacobian @ matrix @ jacobian.T
-    return with_intervals(numbers, covariances, fit, waveform.BOUNDS), matrix
+    return with_intervals(numbers, covariances, fit, BOUNDS), matrix
 
 
 def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
@@ -289,15 +287,15 @@ def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, 
     late, high = by_time[-1] @ change, by_angle[-1] @ change
     time, side = float(turning.time_s[-1]), math.copysign(1.0, release.angle_rad)
     side *= -1.0 if fitted.start.before % 2 else 1.0
-    omega = float(value[waveform.OMEGA])
+    omega = float(value[OMEGA])
     amplitude = side * (float(turning.angle_rad[-1]) - release.offset_rad)
     jacobian = np.zeros((7, 8))
-    jacobian[0, 0] = jacobian[1, 1] = jacobian[2, 2] = jacobian[6, waveform.OFFSET] = 1.0
-    jacobian[3, waveform.OMEGA] = 0.5 / math.pi
+    jacobian[0, 0] = jacobian[1, 1] = jacobian[2, 2] = jacobian[6, OFFSET] = 1.0
+    jacobian[3, OMEGA] = 0.5 / math.pi
     jacobian[4] = side * high
-    jacobian[4, waveform.OFFSET] -= side
+    jacobian[4, OFFSET] -= side
     jacobian[5] = -omega * late
-    jacobian[5, waveform.OMEGA] += start_s - time
+    jacobian[5, OMEGA] += start_s - time
     phase = omega * (start_s - time) + (0.0 if side > 0 else math.pi)
     return (amplitude, math.remainder(phase, 2.0 * math.pi)), jacobian
 

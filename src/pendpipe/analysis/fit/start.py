@@ -92,9 +92,9 @@ class LawStart(NamedTuple):
 
     @property
     def value(self) -> FloatArray:
-        """The same in the order of `waveform.NAMES`, b half hysteretic; shape (8,)."""
+        """The same in the order of `eq8.BASELINE`, b half hysteretic; shape (8,)."""
         return np.array(
-            [*self.rates, self.angular_frequency, self.angle_rad, self.time_s, self.offset_rad, 0.5]
+            [*self.rates, 0.5, self.angular_frequency, self.angle_rad, self.time_s, self.offset_rad]
         )
 
 
@@ -302,10 +302,8 @@ def start_values(
     )
     if restoring == "sine":
         angle = math.copysign(min(abs(angle), TOP), angle)
-    value = np.array(
-        [a, b, c, known.angular_frequency, angle, time,
-         float(np.mean(points.level_rad)) - level, middle_share]
-    )  # fmt: skip
+    offset = float(np.mean(points.level_rad)) - level
+    value = np.array([a, b, c, middle_share, known.angular_frequency, angle, time, offset])
     return Start(value, before, reliable, tuple(warnings))
 
 
@@ -355,9 +353,9 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     Where Coulomb friction has stopped the pendulum is a discontinuous function of the
     parameters; so the last half cycles before the stop are left out.
     """
-    a, b, c, omega = (float(number) for number in start.value[:4])
+    a, b, c, _, omega, _, time, _ = start.value.tolist()
     half_period = math.pi / omega
-    first = float(start.value[5]) if start.before == 0 else samples.time_s[0]
+    first = time if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
     y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))

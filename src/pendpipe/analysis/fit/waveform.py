@@ -20,6 +20,7 @@ from pendpipe.analysis.fit.least_squares import Bounds, Quadratic
 from pendpipe.analysis.fit.result import Restoring
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.kernel import kernel
 
 ROOT_HALF = math.sqrt(0.5)
@@ -88,11 +89,9 @@ def best_noise(residual: FloatArray, step: float, start: float) -> float:
     return math.exp(grid[best] + min(max(turn, -1.0), 1.0) * (grid[1] - grid[0]))
 
 
-NAMES: Final = ("a", "b", "c", "omega", "angle", "time", "offset", "share")
-A, B, C, OMEGA, ANGLE, TIME, OFFSET, SHARE = range(8)
 BOUNDS: Final = Bounds(
-    np.array([0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, 0.0]),
-    np.array([np.inf] * 7 + [1.0]),
+    np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf]),
+    np.array([np.inf] * 3 + [1.0] + [np.inf] * 4),
 )
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
@@ -136,7 +135,7 @@ class Waveform:
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
         hysteretic, viscous = self.parts(value)
-        a, _, c, omega, angle, time, offset, _ = value.tolist()
+        a, _, c, _, omega, angle, time, offset = value.tolist()
         law = Eq8(omega, a, hysteretic, viscous, c, self.restoring)
         return law, Release(time, angle, offset)
 
@@ -178,8 +177,7 @@ class Waveform:
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
-        size = len(NAMES)
-        refused = Quadratic(np.inf, np.zeros(size), np.eye(size))
+        refused = Quadratic(np.inf, np.zeros(8), np.eye(8))
         model, release = self.model(value)
         if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
             return refused
@@ -194,7 +192,7 @@ class Waveform:
 
     def _summed(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix by the engine's parameters."""
-        chi2, gradient, normal = 0.0, np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
+        chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
         residual = np.empty(len(self.values))
         for first in range(0, len(residual), _PIECE):
             piece = slice(first, first + _PIECE)
@@ -225,7 +223,7 @@ class Waveform:
             by_b, by_share = (share, 1.0 - share), float(value[B])
         change = np.zeros((8, 8))
         change[0, A] = change[3, C] = change[4, OMEGA] = 1.0
-        change[5, ANGLE] = change[6, TIME] = change[7, OFFSET] = 1.0
+        change[5, START] = change[6, TIME] = change[7, OFFSET] = 1.0
         change[1:3, B] = by_b
         change[1:3, SHARE] = by_share, -by_share
         return change

@@ -11,7 +11,7 @@ import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import LossRates, loss_rates
+from pendpipe.analysis.turning_points.shape import loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.analysis.turning_points.tracking import LEVEL_BLOCK, track
 from pendpipe.arrays import FloatArray
@@ -114,11 +114,11 @@ def _start(
     amplitude = float(first.amplitude_rad[0])
     if not plain or amplitude > _LARGEST or len(first) < 16:
         return None
-    losses = float(np.array(_rates(first)) @ [amplitude, 1.0, 1.0 / amplitude])
+    losses = float(_rates(first) @ [amplitude, 1.0, 1.0 / amplitude])
     return first if losses / (2.0 * np.pi * first.apparent_frequency_hz) < _SLIGHT else None
 
 
-def _rates(points: TurningPoints) -> LossRates:
+def _rates(points: TurningPoints) -> FloatArray:
     return loss_rates(points.time_s, points.amplitude_rad, points.angle_sd_rad)
 
 

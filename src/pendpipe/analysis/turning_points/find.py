@@ -21,7 +21,6 @@ from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.shape import (
     HARMONICS,
-    LossRates,
     half_cycle_shape,
     loss_rates,
     shape_error,
@@ -293,7 +292,7 @@ def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measur
 
 def _losses(
     places: Places, measured: Measured, noise: float, start: float
-) -> tuple[FloatArray, LossRates, float]:
+) -> tuple[FloatArray, FloatArray, float]:
     """Amplitudes at the mean level, the rates they fall at, and that level."""
     known = np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.one_sided
     shift = float(np.sum(measured.score[known]) / np.sum(measured.information[known]))
@@ -304,12 +303,12 @@ def _losses(
     if use.sum() >= 3:
         rates = loss_rates(places.centre_s[use], amplitude[use], sd[use])
     else:
-        rates = LossRates(0.0, 0.0, 0.0)
+        rates = np.zeros(3)
     return np.nan_to_num(amplitude), rates, start + shift
 
 
 def _shaped(
-    samples: Samples, places: Places, amplitude: FloatArray, rates: LossRates, level: float,
+    samples: Samples, places: Places, amplitude: FloatArray, rates: FloatArray, level: float,
     stride: int,
 ) -> tuple[Places, Measured, FloatArray]:  # fmt: skip
     """Measure again with the shape that the losses, and odd harmonics, give the half cycles."""

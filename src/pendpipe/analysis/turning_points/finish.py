@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.analysis.noise import undithered_rms
 from pendpipe.analysis.turning_points.measure import Measured, Places
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import LossRates, shape_error
+from pendpipe.analysis.turning_points.shape import shape_error
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 
@@ -143,7 +143,7 @@ class State(NamedTuple):
     places: Places
     measured: Measured
     shape: FloatArray
-    rates: LossRates
+    rates: FloatArray
     start: float
     """The level that the half cycles were measured at."""
 

@@ -15,8 +15,6 @@ constant +-b/(4 omega^2).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from pendpipe.arrays import FloatArray
@@ -26,16 +24,8 @@ HARMONICS = 3
 """How many odd harmonics above the first the shape may hold (3, 5, 7)."""
 
 
-class LossRates(NamedTuple):
-    """The rates of Eq. 13, as far as the turning points themselves have told them."""
-
-    a: float
-    b: float
-    c: float
-
-
 def half_cycle_shape(
-    amplitude: FloatArray, angular_frequency: FloatArray, rates: LossRates
+    amplitude: FloatArray, angular_frequency: FloatArray, rates: FloatArray
 ) -> FloatArray:
     """Coefficients of the half cycles' shapes, for `measure.half_cycle_sums`.
 
@@ -54,7 +44,7 @@ def half_cycle_shape(
         Shape (k, 4 + HARMONICS): friction, viscous, second orders of both, and the odd
         harmonics 3, 5, 7 (zero).
     """
-    a, b, c = (max(rate, 0.0) for rate in rates)
+    a, b, c = np.maximum(rates, 0.0).tolist()
     least = 1e-3 * float(np.max(amplitude))
     y = np.maximum(amplitude, least)
     quadratic, linear, coulomb = (rate / angular_frequency for rate in (a * y, b, c / y))
@@ -68,7 +58,7 @@ def half_cycle_shape(
 
 
 def shape_error(
-    amplitude: FloatArray, angular_frequency: FloatArray, rates: LossRates
+    amplitude: FloatArray, angular_frequency: FloatArray, rates: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """What the shape leaves open: relative error of the amplitude, and of the phase in rad.
 
@@ -76,13 +66,13 @@ def shape_error(
     what the unknown share of b leaves, 0.1 e b/omega. At Q = 136 it is 1e-6; at Q = 5, 2e-3.
     """
     y = np.maximum(amplitude, 1e-300)
-    quadratic, linear, coulomb = (max(rate, 0.0) for rate in rates)
+    quadratic, linear, coulomb = np.maximum(rates, 0.0).tolist()
     losses = np.minimum((quadratic * y + linear + coulomb / y) / angular_frequency, 1.0)
     third = losses**3
     return 1.5 * third + 0.1 * losses * linear / angular_frequency, third
 
 
-def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> LossRates:
+def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> FloatArray:
     """Rates of Eq. 13 in one linear step, by its integral: y0 - y = a S y^2 + b S y + c t.
 
     The integrals come from the amplitudes by Simpson-like cubic sums, so this is a start
@@ -96,7 +86,7 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Los
     t = time_s - time_s[0]
     if len(t) < 4:
         fall = np.log(max(amplitude[0], 1e-300) / max(amplitude[-1], 1e-300))
-        return LossRates(0.0, max(float(fall / t[-1]), 0.0), 0.0)
+        return np.array([0.0, max(float(fall / t[-1]), 0.0), 0.0])
     y = np.maximum(amplitude, 0.0)
     columns = np.stack([-_integral(t, y**2), -_integral(t, y), -t, np.ones_like(t)], axis=1)
     # Late integrals carry the errors of all before: the weights must not be sharper.
@@ -112,7 +102,7 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Los
         rates *= scale
         if np.all(rates[:3] >= 0.0):
             break
-    return LossRates(*(max(float(rate), 0.0) for rate in rates[:3]))
+    return np.maximum(rates[:3], 0.0)
 
 
 def _integral(t: FloatArray, f: FloatArray) -> FloatArray:
