@@ -189,6 +189,7 @@ class Recording:
     ) -> Recording:
         """Return the same recording in radians where the sensor's constant is known.
 
+        Angles are counted from where the pendulum hangs, without jumps (`from_below`).
         Anything else stays in its own unit: metres, volts without a constant, counts,
         pixels. The analysis is the same, and Q and the period need no constant; but the
         amplitude, a and c are then in that unit and no angle, so that sin x does not apply.
@@ -205,6 +206,9 @@ class Recording:
         InputError
             If the recording's own constant is no number, or 0.
         """
+        if self.quantity == "angle_rad":
+            values, notes = from_below(self.values)
+            return replace(self, values=values, notes=self.notes + notes) if notes else self
         if self.quantity != "volts":
             return self
         constant = volts_per_radian or self.number("volts_per_radian", place)
@@ -224,6 +228,50 @@ class Recording:
             resolution=None if self.resolution is None else self.resolution / abs(constant),
             metadata={**self.metadata, "volts_per_radian": repr(float(constant))},
         )
+
+
+def jumps_of_a_turn(values: FloatArray) -> bool:
+    """Say whether readings (radians) stay within a turn, and neighbours lie a turn apart."""
+    if len(values) < 2 or np.ptp(values) > 2.02 * np.pi:
+        return False
+    jumps = np.abs(np.diff(values))
+    return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
+
+
+def from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Count an angle from where the pendulum hangs: undo wraps, then whole half turns.
+
+    A centre within 0.35 rad of a multiple of pi is taken to be where the pendulum hangs:
+    at an odd one the angle counts from the top, at an even one from some turns ago. So is
+    one within 0.15 rad of a quarter turn: polar angles are counted from the horizontal.
+
+    Returns
+    -------
+    angle_rad
+        Shape (n,).
+    notes
+        What was done.
+    """
+    notes, good = list[str](), np.isfinite(values)
+    # No centre of these lies a quarter turn off.
+    if not good.any() or np.abs(values[good]).max() < 0.5 * np.pi - 0.15:
+        return values, ()
+    if jumps_of_a_turn(values[good]):
+        values = values.copy()
+        values[good] = np.unwrap(values[good])
+        notes.append("the angle jumps by a turn: unwrapped")
+    low, centre, high = np.percentile(values[good], (5, 50, 95)).tolist()
+    centre = centre if high - low < 1.0 else 0.5 * (low + high)
+    for quarters, words, near in ((2, "half turn", 0.35), (1, "quarter turn", 0.15)):
+        turns = round(centre / (0.5 * np.pi * quarters))
+        shift = 0.5 * np.pi * quarters * turns
+        if turns and abs(centre - shift) < near:
+            notes.append(
+                f"the angle swings about {centre:.3f} rad: {shift:.4f} rad"
+                f" ({turns} {words}) taken off, so that it hangs at 0"
+            )
+            return values - shift, tuple(notes)
+    return values, tuple(notes)
 
 
 def _the_only(given: list[tuple[str, ArrayLike]]) -> tuple[Quantity, ArrayLike]:

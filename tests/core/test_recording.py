@@ -152,3 +152,15 @@ def test_the_last_row_of_a_cut_file_is_no_sample(
     whole = text[:-cut].count("\n") - 1
     np.testing.assert_array_equal(again.values, np.sin(time_s[:whole]))
     assert len(again.notes) == (0 if text[:-cut].endswith("\n") else 1)
+
+
+@pytest.mark.parametrize("level", [np.pi, 2 * np.pi, 0.5 * np.pi])
+def test_angles_given_as_arrays_hang_at_zero_and_do_not_jump(level: float) -> None:
+    time_s = np.arange(400) / 50.0
+    angle = 0.8 * np.exp(-0.05 * time_s) * np.cos(4.0 * time_s)
+    wrapped = (angle + level + np.pi) % (2 * np.pi) - np.pi
+    motion = Recording(time_s=time_s, angle_rad=wrapped).as_motion()
+    np.testing.assert_allclose(motion.values, angle, atol=1e-12)
+    assert motion.as_motion() is motion
+    if level != 2 * np.pi:  # so many turns leave nothing to do
+        assert "hangs at 0" in motion.notes[-1]

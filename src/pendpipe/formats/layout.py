@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -26,7 +26,7 @@ _NAMES: Final = {
     "pipe": "|",
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
-_DELIMITERS: Final = ("\t", ";", "|", ",", " ")
+_DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
 COMMENT: Final = ("#", "%", "//", "!")
 _IN_A_ROW: Final = 4
 """So many rows follow one another where the samples begin; a header has fewer."""
@@ -85,6 +85,19 @@ class Layout:
             cell = "x" if "." in cell else cell.replace(",", ".")
         return _NUMBER.fullmatch(cell) is not None
 
+    def kinds(self, cells: Iterable[str]) -> str:
+        """Say what each cell is, by a letter: number, clock time or date, blank, text."""
+        return "".join(
+            "n"
+            if self.is_number(cell)
+            else "b"
+            if is_blank(cell)
+            else "c"
+            if _DATE.fullmatch(cell) or _CLOCK.fullmatch(cell.lstrip("'"))
+            else "t"
+            for cell in cells
+        )
+
     def ungrouped(self, cell: str) -> str:
         """Take the signs between thousands out of ``1,234.5``, ``1.234,5`` and ``1'234``."""
         if _GROUPED[self.decimal].fullmatch(cell) is None:
@@ -126,8 +139,8 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
     quoted = any('"' in line for line in sample)
     candidates = [
         Layout(delimiter, decimal, 0)
-        for delimiter in _wanted_delimiters(options)
-        for decimal in _wanted_decimals(options)
+        for delimiter in _wanted("--delimiter", options.delimiter, _NAMES, "\t;|, ", r"[^\w.+\"-]")
+        for decimal in _wanted("--decimal", options.decimal, _DECIMALS, ".,", r"[.,]")
         if delimiter != decimal or (quoted and delimiter == ",")
     ]
     best, best_score = None, (0.0, 0)
@@ -147,28 +160,15 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
 def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
     """Score a layout: share of number cells in rows of the usual width; width; numbers."""
     rows = [layout.split(line) for line in sample]
-    if not rows:
+    width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
+    if not 0 < width <= MOST_COLUMNS:
         return 0.0, 0, 0
-    width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    if width > MOST_COLUMNS:
-        return 0.0, 0, 0
-    total = 0.0
-    numbers = [0] * width
-    for row in rows:
-        if len(row) != width:
-            continue
-        found = 0
-        blank = 0
-        for place, cell in enumerate(row):
-            if layout.is_number(cell):
-                found += 1
-                numbers[place] += 1
-            elif _DATE.fullmatch(cell) or (":" in cell and _CLOCK.fullmatch(cell.lstrip("'"))):
-                found += 1
-            else:
-                blank += is_blank(cell)
-        total += found / max(width - blank, 1)
-    return total / len(rows), width, sum(count > len(rows) / 2 for count in numbers)
+    kinds = [layout.kinds(row) for row in rows if len(row) == width]
+    full = sum(
+        (width - row.count("t") - row.count("b")) / max(width - row.count("b"), 1) for row in kinds
+    )
+    numbers = sum(column.count("n") > len(rows) / 2 for column in zip(*kinds, strict=True))
+    return full / len(rows), width, numbers
 
 
 def _is_one_column(sample: Sequence[str]) -> bool:
@@ -180,28 +180,13 @@ def _is_one_column(sample: Sequence[str]) -> bool:
     return any(b < a for a, b in pairwise(first))
 
 
-def _wanted_delimiters(options: ReadOptions) -> tuple[str, ...]:
-    if options.delimiter is None:
-        return _DELIMITERS
-    sign = _NAMES.get(options.delimiter.lower(), options.delimiter)
-    if len(sign) != 1 or sign.isalnum() or sign in '.+-"':
-        raise InputError("--delimiter", f"'{sign}' can't part cells", "give tab, space, ',' or ';'")
-    return (sign,)
-
-
-def _wanted_decimals(options: ReadOptions) -> tuple[str, ...]:
-    if options.decimal is None:
-        return (".", ",")
-    sign = {"comma": ",", "point": ".", "dot": "."}.get(options.decimal.lower(), options.decimal)
-    if sign not in (".", ","):
-        raise InputError("--decimal", f"'{sign}' is no decimal sign", "give '.' or ','")
-    return (sign,)
-
-
-def is_text(cell: str, layout: Layout) -> bool:
-    """Say whether a cell is neither a number, nor a time, nor empty."""
-    known = layout.is_number(cell) or is_blank(cell)
-    return not known and not _DATE.fullmatch(cell) and not _CLOCK.fullmatch(cell)
+def _wanted(option: str, given: str | None, names: dict[str, str], usual: str, fit: str) -> str:
+    """Give the signs that are tried: all usual ones, or the one that the user gives."""
+    sign = usual if given is None else names.get(given.lower(), given)
+    if given is not None and not re.fullmatch(fit, sign):
+        remedy = "'.' or ','" if option == "--decimal" else "tab, space, ',' or ';'"
+        raise InputError(option, f"'{sign}' can't be used", f"give {remedy}")
+    return sign
 
 
 def first_row(lines: Sequence[str], layout: Layout) -> int:
@@ -216,7 +201,8 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
     for place, line in enumerate(lines):
         if not line.strip() or is_comment(line):
             continue
-        cells = layout.split(line) if _is_row(line, layout) else []
+        cells = layout.split(line)
+        cells = cells if _is_row(cells, layout) else []
         if cells and first is None:
             first = place
         if not cells or (above and _is_title(above[-1][1], cells, layout)):
@@ -239,14 +225,9 @@ def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> boo
     )
 
 
-def _is_row(line: str, layout: Layout) -> bool:
-    cells = layout.split(line)
-    if len(cells) != layout.width:
-        return False
-    filled = [cell for cell in cells if not is_blank(cell)]
-    numbers = sum(map(layout.is_number, filled))
-    dates = sum(bool(_DATE.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in filled)
-    return numbers > 0 and 2 * (numbers + dates) >= len(filled)
+def _is_row(cells: Sequence[str], layout: Layout) -> bool:
+    kinds = layout.kinds(cells) if len(cells) == layout.width else ""
+    return "n" in kinds and 2 * kinds.count("t") <= len(kinds) - kinds.count("b")
 
 
 def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
@@ -294,36 +275,20 @@ def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
     if layout.decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]
     filled = [row for row, cell in enumerate(cells) if not is_blank(cell)]
-    matches = [_WITH_UNIT.fullmatch(cells[row]) for row in filled[:2]]
-    if matches and all(matches):
-        bare = _without_unit(cells, filled)
-        if bare is not None:
-            return Numbers(bare[0], None, bare[1])
+    unit, fault = "", None
+    if filled and all(_WITH_UNIT.fullmatch(cells[row]) for row in filled[:2]):
+        parts = [_WITH_UNIT.fullmatch(cells[row]) for row in filled]
+        units = {part[2] for part in parts if part is not None}
+        if all(parts) and len(units) == 1:
+            unit = units.pop()
+            cells = [cell.removesuffix(unit).rstrip() for cell in cells]
     values = np.full(len(cells), np.nan)
-    fault = None
     for row in filled:
         try:
             values[row] = float(cells[row].lower().replace("d", "e"))
         except ValueError:
-            if fault is None:
-                fault = (row, cells[row])
-    return Numbers(values, fault)
-
-
-def _without_unit(cells: Sequence[str], filled: Sequence[int]) -> tuple[FloatArray, str] | None:
-    """Take off the unit that stands behind every number; ``None`` unless it is one."""
-    values = np.full(len(cells), np.nan)
-    units = set()
-    for row in filled:
-        match = _WITH_UNIT.fullmatch(cells[row])
-        if match is None:
-            return None
-        try:
-            values[row] = float(match[1])
-        except ValueError:
-            return None
-        units.add(match[2])
-    return (values, units.pop()) if len(units) == 1 else None
+            fault = fault or (row, cells[row])
+    return Numbers(values, fault, unit)
 
 
 _CLOCK: Final = re.compile(

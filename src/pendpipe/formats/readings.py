@@ -13,7 +13,7 @@ from pendpipe.formats.choose import Choice
 from pendpipe.formats.samples import derivative_slope, follows_sine, periods, resolution
 from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Unit, unit_of
-from pendpipe.recording import Quantity
+from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
 
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
@@ -62,7 +62,7 @@ def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatAr
     values = column.values * guess.unit.factor
     notes: tuple[str, ...] = ()
     if guess.unit.kind == "angle":
-        values, notes = _from_below(values)
+        values, notes = from_below(values)
     elif guess.unit.name == "counts":
         values, notes = _over_the_turn(values)
     found = Readings(
@@ -186,7 +186,7 @@ def _by_size(
     """Judge by how far it swings, and by whether the period follows the amplitude."""
     named = choice.roles.get(column.number) == "angle"
     # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
-    if _jumps_of_a_turn(finite):
+    if jumps_of_a_turn(finite):
         return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
     if reach > 1.1 * np.pi:
         slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 170 else None
@@ -298,14 +298,6 @@ def _ratio(one: FloatArray, other: FloatArray) -> float | None:
     return product / float(one @ one)
 
 
-def _jumps_of_a_turn(values: FloatArray) -> bool:
-    """Say whether readings (radians) stay within a turn, and neighbours lie a turn apart."""
-    if len(values) < 2 or np.ptp(values) > 2.02 * np.pi:
-        return False
-    jumps = np.abs(np.diff(values))
-    return bool(np.any((jumps > 1.8 * np.pi) & (jumps < 2.2 * np.pi)))
-
-
 def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Undo the jumps of an absolute encoder of 2^k counts that hangs near its zero."""
     finite = np.isfinite(values)
@@ -317,34 +309,6 @@ def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     values = values.copy()
     values[finite] = np.unwrap(values[finite], period=turn)
     return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
-
-
-def _from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Count the angle from where the pendulum hangs: undo wraps, then whole half turns.
-
-    A centre within 0.35 rad of a multiple of pi is taken to be where the pendulum hangs:
-    at an odd one the file counts from the top, at an even one from some turns ago. So is
-    one within 0.15 rad of a quarter turn: polar angles are counted from the horizontal.
-    """
-    notes = []
-    finite = np.isfinite(values)
-    if _jumps_of_a_turn(values[finite]):
-        values = values.copy()
-        values[finite] = np.unwrap(values[finite])
-        notes.append("the angle jumps by a turn: unwrapped")
-    low, high = np.percentile(values[finite], (5, 95)) if finite.any() else (0.0, 0.0)
-    centre = float(np.median(values[finite])) if finite.any() else 0.0
-    centre = centre if high - low < 1.0 else 0.5 * float(low + high)
-    for quarters, words in ((2, "half turn"), (1, "quarter turn")):
-        turns = round(centre / (0.5 * np.pi * quarters))
-        shift = 0.5 * np.pi * quarters * turns
-        if turns and abs(centre - shift) < (0.35 if quarters == 2 else 0.15):
-            notes.append(
-                f"the angle swings about {centre:.3f} rad: {shift:.4f} rad"
-                f" ({turns} {words}) taken off, so that it hangs at 0"
-            )
-            return values - shift, tuple(notes)
-    return values, tuple(notes)
 
 
 def _position(x: Column, y: Column) -> Readings:

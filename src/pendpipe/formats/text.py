@@ -22,7 +22,6 @@ from pendpipe.formats.layout import (
     first_row,
     guess_layout,
     is_comment,
-    is_text,
 )
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
 from pendpipe.formats.words import split_header, unit_of
@@ -332,15 +331,12 @@ def _text_of(line: str, layout: Layout) -> tuple[bool, bool]:
 
     A row with one cell that is no number is a row with a fault.
     """
-    if _NO_TEXT.fullmatch(line):
-        return False, False
-    if is_comment(line):
-        return True, True
-    cells = [cell for cell in layout.split(line) if cell]
-    texts = [is_text(cell, layout) for cell in cells]
-    begins = bool(texts) and texts[0]
-    whole = begins and (all(texts) or len(layout.split(line)) != layout.width)
-    return whole, begins
+    if _NO_TEXT.fullmatch(line) or is_comment(line):
+        return (is_comment(line),) * 2
+    cells = layout.split(line)
+    kinds = layout.kinds(filter(None, cells))
+    begins = kinds.startswith("t")
+    return begins and (set(kinds) == {"t"} or len(cells) != layout.width), begins
 
 
 _NO_TEXT: Final = re.compile(r"[\s\d.,;:+\-eE|/\"']*")
