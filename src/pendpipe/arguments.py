@@ -91,6 +91,12 @@ SHARED: Final[Flags] = {
 """Arguments of more than one command."""
 
 
+def declare(parser: argparse._ActionsContainer, flags: Flags) -> None:
+    """Declare arguments that stand in a table."""
+    for name, options in flags.items():
+        parser.add_argument(name, **options)
+
+
 def add(parser: argparse._ActionsContainer, *names: str, **more: Any) -> None:
     """Declare shared arguments."""
     for name in names:
@@ -102,9 +108,7 @@ def add_file(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
     about = "a recording in any supported format; - is standard input"
     named = ("files", "+") if several else ("file", None)
     parser.add_argument(named[0], metavar="FILE", nargs=named[1], help=about)
-    group = parser.add_argument_group("where a guess is wrong")
-    for name, options in READING.items():
-        group.add_argument(name, **options)
+    declare(parser.add_argument_group("where a guess is wrong"), READING)
 
 
 def read_options(arguments: argparse.Namespace) -> ReadOptions:

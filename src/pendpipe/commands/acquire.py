@@ -20,10 +20,47 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, Final
 
-from pendpipe.arguments import add, load
+from pendpipe.arguments import Flags, add, declare, load
 from pendpipe.errors import InputError
+
+_FLAGS: Final[Flags] = {
+    "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
+    "--model": {"help": "the instrument on --port: di154rs, di2108, ..."},
+    "--channel": {"type": int, "help": "as printed on the box (1)"},
+    "--rate": {"type": float, "default": 60.0, "metavar": "HZ", "help": "scans a second (60)"},
+    "--duration": {"type": float, "default": 60.0, "metavar": "S", "help": "length (60)"},
+    "--samples": {"type": int, "metavar": "N", "help": "length, instead of --duration"},
+    "--until-noise": {
+        "action": "store_true",
+        "help": "end when the amplitude has reached the noise",
+    },
+    "--range-volts": {"type": float, "metavar": "V", "help": "the signal stays within +-V"},
+    "--reconnect": {
+        "type": float,
+        "default": 30.0,
+        "metavar": "S",
+        "help": "how long a device that was unplugged is waited for (30)",
+    },
+    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"},
+    "--raw": {
+        "metavar": "FILE",
+        "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
+    },
+    "--anew": {
+        "action": "store_true",
+        "help": "record even if there is a recording: of a campaign's record, or not yet written",
+    },
+    "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
+    "--seed": {"type": int, "default": 0, "help": "of the simulated noise (0)"},
+    "--clock-scale": {"type": float, "default": 1.0, "help": "simulated seconds in a real one (1)"},
+    "--signal": {
+        "metavar": "TOML",
+        "help": "with --serve: what it reads, as for pendpipe simulate",
+    },
+    "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,47 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--serve", metavar="MODEL", help="be a simulated instrument for other programs: di2108, ..."
     )
-    parser.add_argument("--list", action="store_true", help="list ports; with --port, ask it")
-    parser.add_argument("--model", help="the instrument on --port: di154rs, di2108, ...")
-    parser.add_argument("--channel", type=int, help="as printed on the box (1)")
-    parser.add_argument(
-        "--rate", type=float, default=60.0, metavar="HZ", help="scans a second (60)"
-    )
-    parser.add_argument("--duration", type=float, default=60.0, metavar="S", help="length (60)")
-    parser.add_argument("--samples", type=int, metavar="N", help="length, instead of --duration")
-    parser.add_argument(
-        "--until-noise", action="store_true", help="end when the amplitude has reached the noise"
-    )
-    parser.add_argument(
-        "--range-volts", type=float, metavar="V", help="the signal stays within +-V"
-    )
-    parser.add_argument(
-        "--reconnect",
-        type=float,
-        default=30.0,
-        metavar="S",
-        help="how long a device that was unplugged is waited for (30)",
-    )
-    parser.add_argument("--out", metavar="FILE", help="the recording; FILE.wdh for WinDaq")
-    parser.add_argument(
-        "--raw",
-        metavar="FILE",
-        help="a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
-    )
-    parser.add_argument(
-        "--anew",
-        action="store_true",
-        help="record even if there is a recording: of a campaign's record, or not yet written",
-    )
-    parser.add_argument("--volts-per-radian", type=float, help="sensor constant, for the metadata")
-    parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (0)")
-    parser.add_argument(
-        "--clock-scale", type=float, default=1.0, help="simulated seconds in a real one (1)"
-    )
-    parser.add_argument(
-        "--signal", metavar="TOML", help="with --serve: what it reads, as for pendpipe simulate"
-    )
-    parser.add_argument("--link", choices=("pty", "socket"), help="with --serve: on which line")
+    declare(parser, _FLAGS)
     workflow = parser.add_argument_group("as a stage of a campaign")
     add(workflow, "--campaign", "--record", "--refused")
     workflow.add_argument(

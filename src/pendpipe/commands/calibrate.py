@@ -12,32 +12,38 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import add, print_json
+from pendpipe.arguments import Flags, add, declare, print_json
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibrate import Calibration
 
 
+_FLAGS: Final[Flags] = {
+    "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"},
+    "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"},
+}
+
+_FLAGS_2: Final[Flags] = {
+    "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
+    "--arm-sd-m": {"type": float, "default": 0.0, "metavar": "M", "help": "its standard deviation"},
+    "--displacement-sd-m": {
+        "type": float,
+        "default": 0.0,
+        "metavar": "M",
+        "help": "standard deviation of a displacement (the caliper's)",
+    },
+    "--delimiter": {"help": "between the cells; guessed from the header"},
+    "--decimal": {"choices": ".,", "help": "decimal mark; guessed from the delimiter"},
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe calibrate``."""
-    parser.add_argument("file", metavar="FILE", type=Path, help="table of volts against angles")
-    parser.add_argument("--out", type=Path, metavar="JSON", help="write the result here")
+    declare(parser, _FLAGS)
     add(parser, "--json")
-    parser.add_argument("--arm-m", type=float, metavar="M", help="arm of the displacements, metres")
-    parser.add_argument(
-        "--arm-sd-m", type=float, default=0.0, metavar="M", help="its standard deviation"
-    )
-    parser.add_argument(
-        "--displacement-sd-m",
-        type=float,
-        default=0.0,
-        metavar="M",
-        help="standard deviation of a displacement (the caliper's)",
-    )
-    parser.add_argument("--delimiter", help="between the cells; guessed from the header")
-    parser.add_argument("--decimal", choices=".,", help="decimal mark; guessed from the delimiter")
+    declare(parser, _FLAGS_2)
     workflow = parser.add_argument_group("with --record")
     add(workflow, "--record", "--refused")
     workflow.add_argument("--sensor", type=Path, metavar="JSON", help="the campaign's calibration")

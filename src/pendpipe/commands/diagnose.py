@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.arguments import add, add_file, print_json, read_motion
+from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
 from pendpipe.errors import DamagedError, InputError
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 
@@ -32,46 +32,57 @@ _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 """
 
 
+def _probability(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number between 0 and 1") from None
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text} does not lie between 0 and 1")
+    return value
+
+
+_FLAGS: Final[Flags] = {
+    "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"},
+    "--level": {
+        "type": _probability,
+        "default": 0.01,
+        "metavar": "P",
+        "help": "false-alarm probability for a recording that lacks nothing (%(default)s)",
+    },
+    "--seed": {"type": int, "default": 0, "metavar": "N", "help": "of the draws that count trials"},
+    "--fail-on": {
+        "choices": ("missing-physics",),
+        "help": f"end with status {FOUND} on that verdict",
+    },
+    "--figures": {
+        "choices": ("all", "found", "none"),
+        "default": "all",
+        "help": "draw them always (all), where something is missing (found), or never (none)",
+    },
+    "--no-figures": {
+        "dest": "figures",
+        "action": "store_const",
+        "const": "none",
+        "help": "as --figures none",
+    },
+    "--own": {
+        "action": "append",
+        "default": [],
+        "metavar": "NAME",
+        "help": "of several recordings: what each has of its own (a, b, c, frequency); repeatable",
+    },
+    "--same-sensor": {
+        "action": "store_true",
+        "help": "of several recordings: the sensor's errors are shared as well",
+    },
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe diagnose``."""
     add_file(parser, several=True)
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write diagnosis.json and the figures there"
-    )
-    parser.add_argument(
-        "--level",
-        type=_probability,
-        default=0.01,
-        metavar="P",
-        help="false-alarm probability for a recording that lacks nothing (%(default)s)",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the draws that count trials"
-    )
-    parser.add_argument(
-        "--fail-on", choices=("missing-physics",), help=f"end with status {FOUND} on that verdict"
-    )
-    parser.add_argument(
-        "--figures",
-        choices=("all", "found", "none"),
-        default="all",
-        help="draw them always (all), where something is missing (found), or never (none)",
-    )
-    parser.add_argument(
-        "--no-figures", dest="figures", action="store_const", const="none", help="as --figures none"
-    )
-    parser.add_argument(
-        "--own",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="of several recordings: what each has of its own (a, b, c, frequency); repeatable",
-    )
-    parser.add_argument(
-        "--same-sensor",
-        action="store_true",
-        help="of several recordings: the sensor's errors are shared as well",
-    )
+    declare(parser, _FLAGS)
     add(parser, "--json", "--baseline", "--fix")
     add(parser, "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
@@ -259,13 +270,3 @@ def _print_answer(arguments: argparse.Namespace, content: dict[str, Any]) -> Non
 def _print_progress(line: str) -> None:
     """Progress goes to standard error."""
     print(f"  {line}", file=sys.stderr, flush=True)
-
-
-def _probability(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number between 0 and 1") from None
-    if not 0.0 < value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text} does not lie between 0 and 1")
-    return value

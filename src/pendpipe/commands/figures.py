@@ -9,27 +9,34 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.arguments import add
+from pendpipe.arguments import Flags, add, declare
 
 if TYPE_CHECKING:
     from pendpipe.manifest import Job
 
 
+_FLAGS: Final[Flags] = {
+    "--out": {
+        "required": True,
+        "type": Path,
+        "metavar": "FOLDER",
+        "help": "where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
+    },
+    "--processes": {
+        "type": int,
+        "default": 1,
+        "metavar": "N",
+        "help": "how many may draw at once (1)",
+    },
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe figures``."""
     add(parser, "--campaign", "--comparison", required=True)
-    parser.add_argument(
-        "--out",
-        required=True,
-        type=Path,
-        metavar="FOLDER",
-        help="where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
-    )
-    parser.add_argument(
-        "--processes", type=int, default=1, metavar="N", help="how many may draw at once (1)"
-    )
+    declare(parser, _FLAGS)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,42 +16,46 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import add, add_file, print_json, read_motion
+from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
 from pendpipe.errors import InputError
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit import FitResult
 
 
+_FLAGS: Final[Flags] = {
+    "--out": {"metavar": "JSON", "help": "the result; - is standard output"},
+    "--figure": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
+    },
+    "--length": {"type": float, "metavar": "M", "help": "length of a simple pendulum, m: prints g"},
+    "--gravity": {
+        "type": float,
+        "metavar": "G",
+        "help": "g in m/s^2: prints the equivalent length",
+    },
+    "--method": {"choices": ("auto", "waveform", "turning-points"), "default": "auto"},
+    "--restoring": {
+        "choices": ("auto", "linear", "sine"),
+        "default": "auto",
+        "help": "the restoring torque: omega^2 x, omega^2 sin x, or what the recording asks for",
+    },
+    "--accept": {
+        "action": "store_true",
+        "help": "print a law that contradicts the decay, status 0",
+    },
+    "--seed": {"type": int, "metavar": "N", "help": "recorded only"},
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe fit``."""
     add_file(parser, several=True)
-    parser.add_argument("--out", metavar="JSON", help="the result; - is standard output")
-    parser.add_argument(
-        "--figure",
-        type=Path,
-        metavar="FILE",
-        help="draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
-    )
-    parser.add_argument(
-        "--length", type=float, metavar="M", help="length of a simple pendulum, m: prints g"
-    )
-    parser.add_argument(
-        "--gravity", type=float, metavar="G", help="g in m/s^2: prints the equivalent length"
-    )
-    parser.add_argument("--method", choices=("auto", "waveform", "turning-points"), default="auto")
-    parser.add_argument(
-        "--restoring",
-        choices=("auto", "linear", "sine"),
-        default="auto",
-        help="the restoring torque: omega^2 x, omega^2 sin x, or what the recording asks for",
-    )
-    parser.add_argument(
-        "--accept", action="store_true", help="print a law that contradicts the decay, status 0"
-    )
-    parser.add_argument("--seed", type=int, metavar="N", help="recorded only")
+    declare(parser, _FLAGS)
     add(parser, "--json", "--baseline", "--fix")
     add(parser, "--turning-points", "--calibration", "--record", "--refused")
 

@@ -10,33 +10,35 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Final
 
-from pendpipe.arguments import add
+from pendpipe.arguments import Flags, add, declare
+
+_FLAGS: Final[Flags] = {
+    "--summary": {
+        "required": True,
+        "type": Path,
+        "metavar": "FILE",
+        "help": "campaign.json, from pendpipe compare; it can be saved from the page",
+    },
+    "--figures": {
+        "type": Path,
+        "metavar": "FOLDER",
+        "help": "where figures 3 to 10 are; the folder figures beside the page by default",
+    },
+    "--proof": {
+        "type": Path,
+        "metavar": "FOLDER",
+        "help": "scores of a challenge, if there is one, from pendpipe challenge score",
+    },
+    "--out": {"required": True, "type": Path, "metavar": "PAGE.html", "help": "the page"},
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe report``."""
     add(parser, "--campaign", "--comparison", required=True)
-    parser.add_argument(
-        "--summary",
-        required=True,
-        type=Path,
-        metavar="FILE",
-        help="campaign.json, from pendpipe compare; it can be saved from the page",
-    )
-    parser.add_argument(
-        "--figures",
-        type=Path,
-        metavar="FOLDER",
-        help="where figures 3 to 10 are; the folder figures beside the page by default",
-    )
-    parser.add_argument(
-        "--proof",
-        type=Path,
-        metavar="FOLDER",
-        help="scores of a challenge, if there is one, from pendpipe challenge score",
-    )
-    parser.add_argument("--out", required=True, type=Path, metavar="PAGE.html", help="the page")
+    declare(parser, _FLAGS)
 
 
 def run(arguments: argparse.Namespace) -> int:

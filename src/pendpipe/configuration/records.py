@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -125,14 +126,14 @@ def read_records(path: str | Path) -> list[Record]:
 
 def _check_columns(where: str, names: list[str]) -> None:
     """Refuse a header with a column too few, unknown or twice."""
-    for name in REQUIRED:
-        if name not in names:
-            raise InputError(where, f"the column '{name}' is missing", "separate columns by tabs")
-    for name in names:
-        if name not in COLUMNS:
-            raise InputError(where, f"unknown column '{name}'", nearest(name, COLUMNS))
-        if names.count(name) > 1:
-            raise InputError(where, f"the column '{name}' stands twice", "drop one")
+    for name in (*REQUIRED, *names):
+        for wrong, problem, remedy in (
+            (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
+            (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
+            (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
+        ):
+            if wrong:
+                raise InputError(where, problem, remedy)
 
 
 def _record(where: str, row: dict[str, str]) -> Record:
@@ -149,45 +150,47 @@ def _record(where: str, row: dict[str, str]) -> Record:
 
 def _check_name(where: str, name: str) -> None:
     """Refuse what can't be the name of a folder on Linux, Windows and macOS alike."""
-    if len(name) > LONGEST_NAME:
-        raise InputError(
-            where,
+    for wrong, problem, remedy in (
+        (
+            len(name) > LONGEST_NAME,
             f"the record's name has {len(name)} characters",
             f"use at most {LONGEST_NAME}",
-        )
-    if not NAME.fullmatch(name) or name.endswith("."):
-        raise InputError(
-            where,
+        ),
+        (
+            not NAME.fullmatch(name) or name.endswith("."),
             f"'{name}' is no name for a folder",
             "use letters, digits, . _ -, and no dot at the end",
-        )
-    if _OF_WINDOWS.fullmatch(name):
-        raise InputError(where, f"Windows keeps the name '{name}' for itself", "rename the record")
-    if name.lower() in _OF_THE_CAMPAIGN:
-        raise InputError(
-            where, f"the campaign has a file or folder '{name}' of its own", "rename the record"
-        )
+        ),
+        (
+            _OF_WINDOWS.fullmatch(name),
+            f"Windows keeps the name '{name}' for itself",
+            "rename the record",
+        ),
+        (
+            name.lower() in _OF_THE_CAMPAIGN,
+            f"the campaign has a file or folder '{name}' of its own",
+            "rename the record",
+        ),
+    ):
+        if wrong:
+            raise InputError(where, problem, remedy)
 
 
 def _number(where: str, row: dict[str, str], name: str) -> float | None:
     """Read a cell that holds a number or nothing."""
     text = row.get(name, "")
-    if not text:
-        return None
     try:
-        value = float(text)
+        value = float(text) if text else None
     except ValueError:
         raise InputError(where, f"{name} '{text}' is no number", "fix or blank the cell") from None
-    if not math.isfinite(value):
+    if value is not None and not math.isfinite(value):
         raise InputError(where, f"{name} is not finite", "fix or blank the cell")
     return value
 
 
 def _check_names(place: Path, records: list[Record]) -> None:
     """Refuse two records of one name, also where only the case differs (Windows)."""
-    seen: dict[str, str] = {}
-    for entry in records:
-        key = entry.record.lower()
-        if key in seen:
-            raise InputError(place, f"the record '{entry.record}' stands twice", "rename one")
-        seen[key] = entry.record
+    counts = Counter(entry.record.lower() for entry in records)
+    again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
+    if again:
+        raise InputError(place, f"the record '{again[-1]}' stands twice", "rename one")
