@@ -104,14 +104,15 @@ def test_the_summary_has_the_contracts_keys(campaign: Campaign) -> None:
     assert all(names <= set(record) for record in summary["records"])
 
 
-def test_the_inertia_has_twice_the_relative_error_of_its_frequency(campaign: Campaign) -> None:
-    """I = K/(2 pi f)^2."""
+def test_the_inertia_has_the_errors_of_its_frequency_and_of_its_torque(campaign: Campaign) -> None:
+    """I = K/(2 pi f)^2, with K from distances of 0.1 mm and masses: per mille to some per cent."""
     comparison = json.loads((campaign.results / "comparison.json").read_text())
     measured = [entry for entry in comparison["records"] if not entry["refused"]]
     for entry in measured:
         inertia, frequency = entry["moment_of_inertia_from_frequency"], entry["frequency"]
         relative = frequency["sd"] / frequency["value"]
-        assert inertia["sd"] / inertia["value"] == pytest.approx(2.0 * relative)
+        of_torque = (inertia["sd"] / inertia["value"]) ** 2 - (2.0 * relative) ** 2
+        assert 0.0 < of_torque < 0.15**2
     assert measured
 
 
