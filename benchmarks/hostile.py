@@ -130,6 +130,8 @@ def main() -> None:
     """Run the rows that are asked for and print the table; status 1 where one is wrong."""
     asked = sys.argv[1:]
     wrong = 0
+    # Under nohup the recorder would inherit that SIGHUP is ignored.
+    signal.signal(signal.SIGHUP, lambda *_: None)
     # The first fit on a machine compiles the engine: that is no row's time.
     subprocess.run([sys.executable, "-m", "pendpipe.warm_up"], check=True)
     lines = ["| input | s | s of the processor | MB | exit | answer |", "|---|---|---|---|---|---|"]
