@@ -127,6 +127,15 @@ def test_play_is_right_to_two_hundredths() -> None:
     assert np.max(np.abs(found - expected)) < 0.02 * effect
 
 
+def test_x_times_its_size_is_right_to_a_thousandth() -> None:
+    """Its curvature jumps at x = 0, between the nodes of the clock."""
+    law = with_extra(lambda t, x, v, s, turn: -0.1 * OMEGA**2 * x * abs(x))
+    expected = integrate(law, START, 0.0, TIME)
+    found = evaluated("amplitude-linear-stiffness", (0.1,), BASE, TIME).sampled.angle
+    effect = np.max(np.abs(expected - plain(BASE, TIME)))
+    assert np.max(np.abs(found - expected)) < 1e-3 * effect
+
+
 def test_presliding_friction_is_dahls() -> None:
     """With Dahl's own equation integrated beside the motion, from the same contact."""
     k_d, z_c = 1e-2, 0.02

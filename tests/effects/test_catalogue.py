@@ -27,6 +27,7 @@ DYNAMICS = [
     "circular-error",
     "cubic-stiffness",
     "quadratic-stiffness",
+    "amplitude-linear-stiffness",
     "coulomb-friction",
     "quadratic-drag",
     "drag-form",
@@ -54,6 +55,10 @@ DYNAMICS = [
 MEASUREMENT = [
     "sensor-quadratic",
     "sensor-cubic",
+    "camera-geometry",
+    "rolling-shutter",
+    "count-slips",
+    "clock-slips",
     "sensor-backlash",
     "offset-drift",
     "gain-drift",

@@ -35,6 +35,29 @@ def test_a_cubic_sensor_has_a_third_harmonic_and_no_frequency_shift() -> None:
     assert found.angular_frequency == pytest.approx(OMEGA, rel=1e-8)
 
 
+def test_a_rolling_shutter_reads_the_motion_later_on_one_side() -> None:
+    """y(t) = x(t + kappa x(t)), looked up on a fine grid."""
+    kappa, base = -0.01, baseline(b=0.005, start=0.6)
+    fine = times(41.0, 0.001)
+    own = plain(base, TIME)
+    expected = np.interp(TIME + kappa * own, fine, plain(base, fine))
+    found = reading("rolling-shutter", (kappa,), base, TIME)
+    # Half of the angular acceleration times (kappa x)^2 b/omega is left.
+    np.testing.assert_allclose(found[1:-1], expected[1:-1], 0.0, 2e-5)
+    assert np.max(np.abs(found - own)) > 5e-3
+
+
+def test_a_camera_sees_the_angle_of_a_turned_plane_and_a_misplaced_pivot() -> None:
+    """By projection: the plane turned by beta about the vertical, and e_1 of a length across."""
+    beta, across = 0.2, 0.004
+    own = plain(baseline(start=0.6), TIME)
+    x = np.cos(beta) * np.sin(own)
+    seen = np.arctan2(x, np.cos(own)) + across * (np.cos(own) - 1.0)
+    found = reading("camera-geometry", (across, -(beta**2) / 4.0), baseline(start=0.6), TIME)
+    # To the next order in beta^2.
+    np.testing.assert_allclose(found, seen, 0.0, beta**4 / 8.0)
+
+
 def test_play_in_the_sensor_is_the_play_operator() -> None:
     """Against the operator followed step by step on a fine grid."""
     width = 2e-3

@@ -60,6 +60,16 @@ def test_play_lowers_the_frequency_as_one_over_the_amplitude(amplitude: float) -
     assert found.lines[3].real == pytest.approx(b / (12.0 * math.pi), rel=0.1)
 
 
+@pytest.mark.parametrize("amplitude", [0.1, 0.4])
+def test_x_times_its_size_shifts_the_frequency_in_proportion(amplitude: float) -> None:
+    """dw/w = 4 kappa y/(3 pi)."""
+    kappa = 0.02
+    found = lines("amplitude-linear-stiffness", (kappa,), amplitude)
+    shift = found.angular_frequency / OMEGA - 1.0
+    assert shift == pytest.approx(4.0 * kappa * amplitude / (3.0 * math.pi), rel=0.02)
+    assert abs(found.lines[2]) < 1e-7
+
+
 def test_presliding_stiffens_below_its_breakaway_angle() -> None:
     """dw/w = k_d/2 at amplitudes far below z_c."""
     found = lines("presliding-friction", (1e-3, 1.0), 0.002)

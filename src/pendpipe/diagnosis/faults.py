@@ -18,7 +18,7 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import at_even_times
 from pendpipe.diagnosis.evidence import Rival
-from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples
+from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips
 from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
@@ -42,6 +42,8 @@ _CLEAN_CHI2: Final = 1.3
 """Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
 """Largest phase error in rad at which residuals reveal errors of the time stamps."""
+SLIPS: Final = {"count-slips": 3.0, "clock-slips": _IN_PHASE}
+"""Slips that are looked for, and the largest phase error in rad: the level hardly depends on it."""
 
 
 class Forensics:
@@ -73,6 +75,7 @@ class Forensics:
         """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""
         self._correct_time_stamps(state, progress)
         self._correct_lost_samples(state, progress)
+        self._correct_slips(state, progress)
         if is_gross(state.fit, state.data):
             self._examine("glitches", state, progress, find_in_misfit)
             return
@@ -205,6 +208,33 @@ class Forensics:
         )
         state.faults.append(Fault(found, 0.0, len(state.steps)))
         state.settle(fit, corrected)
+
+    def _correct_slips(self, state: State, progress: Progress) -> None:
+        """Correct the values of an encoder that loses counts, or the times of a slipping clock."""
+        clean = state.fit.chi2 <= _CLEAN_CHI2 * state.data.used
+        for name, most in SLIPS.items():
+            if (
+                clean
+                or state.fit.max_phase_error_rad > most
+                or any(fault.finding.identifier == name for fault in state.faults)
+            ):
+                continue
+            corrected, finding = slips.find(name, state.data, state.fit, self.samples)
+            p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
+            if p_value > self.level:
+                continue
+            model, before = state.fit.model, state.fit.chi2
+            if corrected.time_s is not state.data.time_s:
+                model = model.at_times(corrected.time_s)
+            try:
+                fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
+                if fit.chi2 < before:
+                    state.settle(fit, corrected)
+                    progress(finding.summary)
+                    found = replace(finding, delta_chi2=before - fit.chi2)
+                    state.faults.append(Fault(found, p_value, len(state.steps)))
+            except NoMotionError:
+                continue  # the model comes to rest before the corrected times
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
         """Test whether random kicks explain more than the best effect of the catalogue."""

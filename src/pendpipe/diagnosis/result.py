@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.held_out import HeldOut
@@ -80,6 +80,21 @@ class Location:
         }
 
 
+class Confirmation(NamedTuple):
+    """A second test of a finding, which does not use the model.
+
+    Parameters
+    ----------
+    summary
+        One clause.
+    p_value
+        Probability that chance does as well.
+    """
+
+    summary: str
+    p_value: float
+
+
 @dataclass(frozen=True, repr=False)
 class FoundEffect:
     """One effect that the baseline lacks.
@@ -104,6 +119,8 @@ class FoundEffect:
         Where it shows.
     curve
         For an unnamed effect: the curve with its band.
+    confirmed
+        What a second test found that does not use the model.
     """
 
     identifier: str
@@ -118,6 +135,7 @@ class FoundEffect:
     discriminating_test: str
     location: Location
     curve: Mapping[str, Any] | None = None
+    confirmed: Confirmation | None = None
 
     def __repr__(self) -> str:
         return f"FoundEffect({self.identifier}, probability {self.probability:.2f})"
@@ -142,6 +160,8 @@ class FoundEffect:
         }
         if self.curve is not None:
             found["curve"] = dict(self.curve)
+        if self.confirmed is not None:
+            found["confirmed"] = self.confirmed._asdict()
         return found
 
 

@@ -185,12 +185,13 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     model, data = state.fit.model.bare(), state.data
     # Readings at the end may have been left out meanwhile.
     read = beginning.data.first(len(data))
-    if np.array_equal(data.time_s, read.time_s):
+    same_values = np.array_equal(data.values, read.values)
+    if same_values and np.array_equal(data.time_s, read.time_s):
         if not state.fit.model.effects and sorted(state.held) == sorted(beginning.held):
             return state.fit
     else:
         model = model.at_times(read.time_s)
-        data = replace(data, time_s=read.time_s, uniform=read.uniform)
+        data = replace(data, time_s=read.time_s, values=read.values, uniform=read.uniform)
     starts = [state.bare, beginning.value]
     for share in _LESS_FRICTION:
         starts.append(state.bare.copy())

@@ -135,6 +135,10 @@ def statement(
     return " ".join([*(part for part in text if part), *stamps])
 
 
+_CONFIRMED: Final = 0.01
+"""p-value of a second test below which it confirms."""
+
+
 def _has_a_name(effect: FoundEffect) -> bool:
     """Whether the effect's name deserves a sentence of its own."""
     return effect.kind != "unnamed" and effect.probability > _DOUBTFUL
@@ -153,6 +157,9 @@ def _effect(effect: FoundEffect) -> str:
     said = [f"{lead} ({'; '.join(facts)})."]
     if effect.location.summary:
         said.append(f"{_capital(effect.location.summary)}.")
+    if effect.confirmed is not None:
+        sure = "Confirmed" if effect.confirmed.p_value < _CONFIRMED else "Not confirmed"
+        said.append(f"{sure} without the fit: {effect.confirmed.summary}.")
     said.extend(_rivals(effect.indistinguishable))
     if effect.probability <= _CERTAIN or any(p > _IMPROBABLE for _, p in effect.indistinguishable):
         said.append(_ended(f"What to measure next: {effect.discriminating_test}"))

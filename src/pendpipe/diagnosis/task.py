@@ -31,6 +31,7 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         copy(effect) if effect.identifier in used else effect
         for effect in catalogue
         if effect.has_signature
+        and not effect.rare
         and baseline not in effect.inside
         and (unit == "rad" or not effect.angular)
         and all(present[name] for name in effect.needs)

@@ -153,6 +153,8 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
     finding = fault.finding
     effect = by_identifier(finding.identifier)
     doubt = math.exp(-0.5 * _clean_charge(found))
+    if finding.confirmed is not None:
+        doubt *= finding.confirmed.p_value
     # Effects that give exactly the same codes are equally probable.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _SEEN_IN_RESIDUAL:
@@ -169,6 +171,7 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
         tuple((name, each) for name in finding.also),
         effect.discriminating_test,
         replace(finding.location, summary=finding.summary),
+        confirmed=finding.confirmed,
     )
 
 

@@ -97,11 +97,19 @@ class Instrument:
         self.settings = {one.effect.identifier: one.named() for one in given}
 
     def times(self, time_s: FloatArray) -> FloatArray:
-        """When the readings are really taken (jitter)."""
+        """When the readings are really taken (slips, jitter)."""
+        if "clock-slips" in self.settings:
+            slips = self.settings["clock-slips"]
+            time_s = time_s + slips["dt"] * self._staircase(slips["number"], len(time_s))
         if "jitter" not in self.settings:
             return time_s
         scatter = self.settings["jitter"]["sigma_t"] * self.random.standard_normal(len(time_s))
         return np.sort(time_s + scatter)
+
+    def _staircase(self, number: float, count: int) -> FloatArray:
+        """Steps of one, up or down, at random readings."""
+        where = self.random.choice(count, min(round(number), count), replace=False)
+        return np.cumsum(np.bincount(where, self.random.choice([-1.0, 1.0], len(where)), count))
 
     def shaken(self, angle: FloatArray, time_s: FloatArray, equation: Eq8) -> FloatArray:
         """Add what a random torque of constant density does (linear response, by impulses)."""
@@ -132,8 +140,11 @@ class Instrument:
         return np.asarray(np.fft.irfft(lines, len(noise)))
 
     def spoilt(self, angle: FloatArray) -> FloatArray:
-        """Add glitches, then clip, then round coarsely."""
+        """Add slips and glitches, then clip, then round coarsely."""
         angle = angle.copy()
+        if "count-slips" in self.settings:
+            slips = self.settings["count-slips"]
+            angle += slips["step"] * self._staircase(slips["number"], len(angle))
         if "glitches" in self.settings:
             glitches = self.settings["glitches"]
             number = min(round(glitches["number"]), len(angle))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import Confirmation, Location
 from pendpipe.estimate import Estimate
 
 
@@ -39,6 +39,8 @@ class Finding:
         property of the record that does no harm.
     also
         Identifiers of effects that would give exactly the same codes.
+    confirmed
+        What a second test found that does not use the model.
     """
 
     identifier: str
@@ -51,6 +53,7 @@ class Finding:
     summary: str = ""
     kind: Literal["fault", "property"] = "fault"
     also: tuple[str, ...] = ()
+    confirmed: Confirmation | None = None
 
 
 def nothing(identifier: str) -> Finding:

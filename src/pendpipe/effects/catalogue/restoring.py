@@ -64,3 +64,21 @@ def cubic_stiffness(motion: Motion, pendulum: Pendulum, k3: float) -> FloatArray
 def quadratic_stiffness(motion: Motion, pendulum: Pendulum, k2: float) -> FloatArray:
     """omega^2 (x + k_2 x^2): mean shift -k_2 y^2/2, second harmonic k_2 y^2/6."""
     return np.asarray(-k2 * pendulum.angular_frequency**2 * motion.angle**2)
+
+
+@enters(
+    "acceleration",
+    identifier="amplitude-linear-stiffness",
+    name="restoring torque with x|x|",
+    equation=r"\omega^2 x \to \omega^2 (x + \kappa\, x |x|)",
+    parameters=(Parameter("kappa", "1/rad", -30.0, 30.0),),
+    rare=True,
+    example=(0.05,),
+    discriminating_test=(
+        "release it again with half the amplitude: the frequency must follow the amplitude itself"
+    ),
+)
+def amplitude_linear_stiffness(motion: Motion, pendulum: Pendulum, kappa: float) -> FloatArray:
+    """omega^2 (x + kappa x|x|): the frequency changes by 4 kappa y/(3 pi), in proportion to y."""
+    omega = pendulum.angular_frequency
+    return np.asarray(-kappa * omega * omega * motion.angle * np.abs(motion.angle))

@@ -46,6 +46,29 @@ def sensor_cubic(sampled: Sampled, pendulum: Pendulum, s3: float) -> FloatArray:
 
 @enters(
     "reading",
+    identifier="camera-geometry",
+    name="geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
+    equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x",
+    parameters=(Parameter("e_1", "rad", -1.0, 1.0), Parameter("e_2", "rad", -0.5, 0.5)),
+    sizes=2,
+    rare=True,
+    angular=True,
+    example=(0.03, 0.01),
+    discriminating_test="move the camera, or turn the encoder on its shaft by a quarter turn",
+)
+def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float) -> FloatArray:
+    """The angle on an image whose pivot is misplaced, or that is seen obliquely.
+
+    A pivot misplaced across by e_1 pendulum lengths adds e_1 cos x; a camera that looks at the
+    plane of swing from an angle beta, turned about the vertical, e_2 = -beta^2/4. The constant
+    is the offset's. What sin x and cos 2x would add is a scale and e_1 up to a quarter turn.
+    """
+    angle = sampled.angle
+    return np.asarray(e_1 * (np.cos(angle) - 1.0) + e_2 * np.sin(2.0 * angle))
+
+
+@enters(
+    "reading",
     identifier="sensor-backlash",
     name="play in the sensor's coupling",
     equation=(
@@ -196,6 +219,15 @@ COARSE_QUANTISATION: Final[Effect] = without_template(
     equation=r"y = q\, \operatorname{round}(x/q)",
     parameters=(Parameter("step", "rad", 0.0, math.inf),),
     discriminating_test="narrow the range, or add noise of a step's size",
+)
+COUNT_SLIPS: Final[Effect] = without_template(
+    __name__,
+    "An encoder loses whole counts, or gains them: the level jumps, the motion does not.",
+    identifier="count-slips",
+    name="lost counts",
+    equation=r"y = x + Q \sum_k n_k\, H(t - t_k), \quad n_k \in \mathbb{Z}",
+    parameters=(Parameter("step", "rad", 0.0, math.inf), Parameter("number", "1", 0.0, 1e6)),
+    discriminating_test="count against the encoder's index pulse, or read it more often",
 )
 
 _WIDTHS: Final = (0.01, 0.03, 0.1)

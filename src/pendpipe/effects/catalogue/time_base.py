@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.effects.effect import Effect, Parameter, Span, enters, without_template
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, without_template
 from pendpipe.effects.scan import (
     INSTANT,
     RELAXATION,
@@ -21,6 +21,7 @@ from pendpipe.effects.scan import (
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
+    from pendpipe.dynamics.sampling import Sampled
 
 
 @enters(
@@ -54,6 +55,17 @@ JITTER: Final[Effect] = without_template(
 )
 
 
+CLOCK_SLIPS: Final[Effect] = without_template(
+    __name__,
+    "The clock misses whole samples, or repeats them, again and again.",
+    identifier="clock-slips",
+    name="clock slips by whole samples",
+    equation=r"t \to t + \mathrm{d}t \sum_k m_k\, H(t - t_k), \quad m_k \in \mathbb{Z}",
+    parameters=(Parameter("dt", "s", 0.0, math.inf), Parameter("number", "1", 0.0, 1e6)),
+    discriminating_test="log the computer's own clock with every sample",
+)
+
+
 def _part_of_a_sample(values: FloatArray, span: Span) -> float:
     """Return what a part of a sample costs.
 
@@ -79,6 +91,29 @@ def _part_of_a_sample(values: FloatArray, span: Span) -> float:
 def dropped_samples(time_s: FloatArray, late_s: float, instant_s: float) -> FloatArray:
     """Samples were lost (or doubled): later readings come later (earlier) by a time."""
     return np.asarray(late_s * reading_step(time_s, instant_s))
+
+
+@enters(
+    "reading",
+    identifier="rolling-shutter",
+    name="rolling shutter",
+    equation=r"y(t) = x(t + \kappa x)",
+    parameters=(Parameter("kappa", "s/rad", -1.0, 1.0),),
+    rare=True,
+    angular=True,
+    example=(0.005,),
+    discriminating_test="turn the camera by 180 degrees: the sign of kappa must turn with it",
+)
+def rolling_shutter(sampled: Sampled, pendulum: Pendulum, kappa: float) -> FloatArray:
+    """A camera reads its rows one after another: the later, the farther the bob is to one side.
+
+    The phase is shifted by omega kappa x, which makes a second harmonic in quadrature,
+    -omega kappa y^2/2 sin 2 psi.
+    """
+    omega = pendulum.angular_frequency
+    turned = omega * kappa * sampled.angle
+    moved = sampled.angle * (np.cos(turned) - 1.0) + sampled.velocity / omega * np.sin(turned)
+    return np.asarray(moved)
 
 
 DroppedSamples = type(dropped_samples)

@@ -1,0 +1,271 @@
+"""Slips: an encoder that loses whole counts, a clock that misses whole samples, time and again.
+
+Either is a staircase in what is left of the readings: of the level in counts Q, or of the time in
+sampling intervals dt, which moves a reading by v dt. No motion of the pendulum does that. So
+whatever varies slowly is fitted beside the steps (level, amplitude, phase and harmonics, over ten
+cycles), their sizes are free, and that they come out *whole* is the test.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.finding import Finding, nothing
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Confirmation, Location
+from pendpipe.effects.derivatives import jacobian
+from pendpipe.estimate import Estimate
+
+_SLOW_CYCLES: Final = 10.0
+_HARMONICS: Final = 3
+_MOST: Final = {False: 150, True: 60}
+"""Slips at most, between readings and within them (which takes three columns each)."""
+_CHOICE: Final = 6.0
+"""Price of a slip beside the places where it may have been (2 ln n)."""
+_FEWEST: Final = 4
+_NEIGHBOURS: Final = 11
+_IN_A_HALF_SWING: Final = 12
+
+
+class Slips(NamedTuple):
+    """Steps of whole units.
+
+    Parameters
+    ----------
+    rows
+        The first reading after each, shape (k,).
+    sizes
+        As they were fitted, in units.
+    p_value
+        Probability that steps of any sizes are so near whole numbers.
+    """
+
+    rows: IntArray
+    sizes: FloatArray
+    p_value: float
+
+    @property
+    def whole(self) -> FloatArray:
+        """The sizes as whole numbers."""
+        return np.round(self.sizes)
+
+    def staircase(self, count: int) -> FloatArray:
+        """Return the sum of the whole steps at each of `count` readings."""
+        steps = np.zeros(count)
+        np.add.at(steps, self.rows, self.whole)
+        return np.cumsum(steps)
+
+
+def find_slips(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False) -> Slips | None:
+    """Find steps of whole units; None where there are too few.
+
+    Parameters
+    ----------
+    data, fit
+        The readings, and a model that keeps their phase.
+    unit
+        What a step of one changes in each reading, rad, shape (n,).
+    within
+        Whether a step may lie within a reading, which is a mean: such readings are left out.
+    """
+    left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+    left = left - basis @ (basis.T @ left)
+    whole = _later(unit[:, None] ** 2 * data.weight[:, None])
+    alone = whole - np.sum(_later(unit[:, None] * basis) ** 2, axis=1, keepdims=True)
+    rows: list[int] = []
+    for _ in range(_MOST[within]):
+        seen = alone[:, 0] > 1e-6 * whole[0]
+        product = _later((unit * left)[:, None])[:, 0]
+        gain = np.where(seen, product**2 / np.where(seen, alone[:, 0], 1.0), 0.0)
+        row = int(np.argmax(gain))
+        if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
+            break
+        rows.append(row)
+        for column in _columns([row], unit, data, within=within):
+            known = basis.shape[1]
+            left, basis = _without(left, basis, column)
+            alone -= np.sum(_later(unit[:, None] * basis[:, known:]) ** 2, axis=1, keepdims=True)
+    return _whole(data, fit, unit, np.sort(np.array(rows, dtype=np.int64)), within=within)
+
+
+def _later(columns: FloatArray) -> FloatArray:
+    """Sum each column from every reading on."""
+    return np.asarray(np.cumsum(columns[::-1], axis=0)[::-1])
+
+
+def spread(left: FloatArray) -> float:
+    """Return the standard deviation of what is left, whatever single readings do."""
+    return 1.4826 * float(np.median(np.abs(left[left != 0.0])))
+
+
+def _slow(data: Data, fit: Fit) -> FloatArray:
+    """Return an orthonormal basis of what varies slowly, and of the model's own values."""
+    sampled = fit.at.sampled
+    turned = sampled.phase - sampled.phase[0]
+    number = max(int(turned[-1] / (math.pi * _SLOW_CYCLES)), 2)
+    waves = np.cos(math.pi / turned[-1] * turned[:, None] * np.arange(number))
+    parts = [waves, waves * sampled.angle[:, None], waves * sampled.velocity[:, None]]
+    for harmonic in range(2, _HARMONICS + 1):
+        turns = harmonic * sampled.phase[:, None]
+        parts += [waves * np.cos(turns), waves * np.sin(turns)]
+    parts.append(jacobian(fit.model, fit.value, fit.at)[:, list(fit.free)])
+    columns = np.concatenate(parts, axis=1) * data.weight[:, None]
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    basis, lengths, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(basis[:, lengths > 1e-6 * lengths[0]])
+
+
+def _columns(rows: list[int], unit: FloatArray, data: Data, *, within: bool) -> list[FloatArray]:
+    """Return a step's change of the readings, and the reading within which it may lie."""
+    found = []
+    for row in rows:
+        found.append(np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight)
+        for at in (row - 1, row) if within else ():
+            found += [np.eye(1, len(unit), max(at, 0))[0]]
+    return found
+
+
+def _without(
+    left: FloatArray, basis: FloatArray, column: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Project one more column out of the residual, and add it to the basis."""
+    length = float(np.linalg.norm(column))
+    for _ in range(2):
+        column = column - basis @ (basis.T @ column)
+    alone = float(np.linalg.norm(column))
+    if alone < 1e-6 * length:
+        return left, basis
+    column = column / alone
+    return left - column * float(column @ left), np.column_stack([basis, column])
+
+
+def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray, *, within: bool) -> Slips | None:
+    """Fit all sizes together, and test whether they are whole."""
+    left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+    if within:
+        for at in {max(at, 0) for row in rows.tolist() for at in (row - 1, row)}:
+            left, basis = _without(left, basis, np.eye(1, len(unit), at)[0])
+    while len(rows) >= _FEWEST:
+        columns = np.column_stack(_columns(rows.tolist(), unit, data, within=False))
+        columns -= basis @ (basis.T @ columns)
+        sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
+        steps = np.abs(sizes) > 0.5
+        if steps.all():
+            near = float(np.sum(np.cos(2.0 * math.pi * sizes))) / math.sqrt(0.5 * len(rows))
+            return Slips(rows, sizes, 0.5 * math.erfc(near / math.sqrt(2.0)))
+        rows = rows[steps]
+    return None
+
+
+def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Finding]:
+    """Test for slips, and correct them.
+
+    Returns
+    -------
+    Data
+        The readings without the slips: an encoder's values, or a clock's times, are corrected.
+    Finding
+        Its p-value is that of whole numbers: steps of any sizes explain a wandering level, or
+        clock, as well.
+    """
+    clock = name == "clock-slips"
+    unit = data.interval_s / data.fold if clock else count_of(samples)
+    possible = data.uniform and not data.time_noise if clock else unit > 0.0
+    change = fit.at.sampled.velocity if clock else np.ones(len(data))
+    slips = find_slips(data, fit, unit * change, within=clock) if possible else None
+    if slips is None:
+        return data, nothing(name)
+    stairs = unit * slips.staircase(len(data))
+    if clock:
+        corrected = replace(data, time_s=data.time_s + stairs, uniform=False)
+    else:
+        corrected = replace(data, values=data.values - stairs)
+    off = slips.sizes - slips.whole
+    scatter = float(np.sqrt(np.mean(off**2)))
+    squares = float(np.sum(slips.whole**2))
+    size = float(slips.sizes @ slips.whole) / squares
+    words = "the clock slips by whole samples" if clock else "whole counts are lost, or gained,"
+    when = data.time_s[slips.rows]
+    finding = Finding(
+        name,
+        slips.p_value,
+        parameters={
+            "dt" if clock else "step": Estimate(
+                unit * size, unit * scatter / math.sqrt(squares), "s" if clock else data.unit
+            ),
+            "number": Estimate(float(len(when)), 0.0, ""),
+        },
+        location=Location((float(when[0]), float(when[-1]))),
+        summary=f"{words} {len(when)} times between {when[0]:.5g} and {when[-1]:.5g} s: fitted"
+        f" freely, the steps are whole within {scatter:.2f} (by chance 0.29)",
+        confirmed=steps_of_the_level(samples, unit) if not clock else None,
+    )
+    return corrected, finding
+
+
+def count_of(samples: Samples) -> float:
+    """Return the step of an encoder that writes a row at each count, rad; 0 for other sensors."""
+    return float(np.median(np.abs(np.diff(samples.values)))) if samples.counts else 0.0
+
+
+def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
+    """Test whether the level changes by whole counts between half swings, without any model.
+
+    Four half swings at a time are one oscillation with slopes and a third harmonic, each at a
+    level of its own; the step between the middle two counts. Above half a count it is whole,
+    or not.
+    """
+    from scipy.ndimage import median_filter
+
+    ends = _turns(samples.values)
+    found = [
+        _middle_step(samples, ends[first : first + 5]) / count for first in range(len(ends) - 4)
+    ]
+    steps = np.array([step for step in found if math.isfinite(step)])
+    # An edge of the scale has a width, which is a step of either sign at each reversal.
+    for way in (slice(0, None, 2), slice(1, None, 2)):
+        steps[way] -= median_filter(steps[way], _NEIGHBOURS, mode="nearest")
+    large = steps[np.abs(steps) > 0.5]
+    if len(large) < _FEWEST:
+        return None
+    near = float(np.sum(np.cos(2.0 * math.pi * large))) / math.sqrt(0.5 * len(large))
+    off = float(np.sqrt(np.mean((large - np.round(large)) ** 2)))
+    return Confirmation(
+        f"of {len(steps)} steps of the level between half swings, from four half swings each,"
+        f" {len(large)} are above half a count, and these whole within {off:.2f}"
+        " (by chance 0.29)",
+        0.5 * math.erfc(near / math.sqrt(2.0)),
+    )
+
+
+def _turns(values: FloatArray) -> list[int]:
+    """Return the rows of the turning points: the extremes between crossings of the middle."""
+    above = values > 0.5 * (np.max(values) + np.min(values))
+    crossed = np.flatnonzero(above[:-1] != above[1:]) + 1
+    return [
+        first + int(np.argmax(np.abs(values[first:last] - values[first])))
+        for first, last in itertools.pairwise(crossed.tolist())
+    ]
+
+
+def _middle_step(samples: Samples, ends: list[int]) -> float:
+    """Return the step of the level between the second and the third of four half swings, rad."""
+    if min(np.diff(ends)) < _IN_A_HALF_SWING:
+        return math.nan
+    time, values = samples.time_s[ends[0] : ends[4]], samples.values[ends[0] : ends[4]]
+    late = (time - time[0]) / (time[-1] - time[0]) - 0.5
+    phase = 4.0 * math.pi * late
+    halves = np.searchsorted(np.array(ends[1:4]) - ends[0], np.arange(len(time)), side="right")
+    waves = [halves == half for half in range(4)]
+    waves += [wave * late**power for wave in (np.cos(phase), np.sin(phase)) for power in (0, 1)]
+    columns = np.column_stack([*waves, np.cos(3.0 * phase)]).astype(np.float64)
+    fitted = np.linalg.lstsq(columns, values, rcond=None)[0]
+    return float(fitted[2] - fitted[1])
