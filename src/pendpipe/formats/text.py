@@ -436,8 +436,7 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     row_of_units = _row_of_units(below, layout)
     if row_of_units:
         units = [unit or own for unit, own in zip(row_of_units, units, strict=True)]
-    if len(cells) < layout.width:
-        missing = layout.width - len(cells)
+    if missing := layout.width - len(cells):
         names, units = [""] * missing + names, [""] * missing + units
         notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the last",)
     return Header(tuple(_unique(names)), tuple(units), interval, metadata, notes)
@@ -560,11 +559,9 @@ def _interval(lines: Sequence[str]) -> float | None:
                     continue
             if not 1e-9 < number < 1e12:
                 continue
-            if inverse:
-                return 1.0 / (number * (1e3 if "khz" in unit else 1.0))
-            return number * (
-                1e-3 if "ms" in unit else 1e-6 if "us" in unit or "µs" in unit else 1.0
-            )
+            known = {"khz": 1e3} if inverse else {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+            number *= next((size for word, size in known.items() if word in unit), 1.0)
+            return 1.0 / number if inverse else number
     alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)Hz\b", " ".join(lines))
     if len(alone) == 1 and float(alone[0][0]) > 0.0:
         return 1.0 / (float(alone[0][0]) * (1e3 if alone[0][1] else 1.0))
@@ -583,9 +580,8 @@ def _metadata(lines: Sequence[str]) -> dict[str, str]:
 
 def _unique(names: Sequence[str]) -> list[str]:
     """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
-    seen: dict[str, int] = {}
-    out = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 or not name else f"{name} ({seen[name]})")
-    return out
+    counts = [list(names[:place]).count(name) + 1 for place, name in enumerate(names)]
+    return [
+        name if count == 1 or not name else f"{name} ({count})"
+        for name, count in zip(names, counts, strict=True)
+    ]

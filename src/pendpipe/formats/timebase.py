@@ -154,11 +154,9 @@ def _unit_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
     step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
     whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
     if period > _LONGEST_S or (not period and whole and step >= 500):
-        factor, name = 1e-3, "milliseconds"
-        if (period or 50.0 * step) > 3e4:
-            factor, name = 1e-6, "microseconds"
-        if (period or 50.0 * step) > 3e7:
-            factor, name = 1e-9, "nanoseconds"
+        cycle = period or 50.0 * step
+        ticks = ((3e7, 1e-9, "nanoseconds"), (3e4, 1e-6, "microseconds"), (0, 1e-3, "milliseconds"))
+        factor, name = next((size, name) for least, size, name in ticks if cycle > least)
         seen = f"a period of {period:.4g}" if period else f"steps of {step:.4g}"
         note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
         return factor, note, True

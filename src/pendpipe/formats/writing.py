@@ -25,20 +25,15 @@ _WORTH_SAYING: Final = 0.02
 
 
 @dataclass(frozen=True)
-class Pause:
-    """Time that is missing before a scan, beyond the usual interval."""
-
-    before_scan: int
-    missing_s: float
-
-
-@dataclass(frozen=True)
 class Grid:
-    """The rows with a reading, their interval, the pauses between; what was lost by it."""
+    """The rows with a reading, their interval, the pauses between; what was lost by it.
+
+    A pause is a scan, and the seconds beyond the usual interval that are missing before it.
+    """
 
     rows: IntArray
     interval_s: float
-    pauses: tuple[Pause, ...]
+    pauses: tuple[tuple[int, float], ...]
     notes: tuple[str, ...]
 
 
@@ -59,7 +54,10 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
     steps = np.diff(time_s)
     breaks = np.flatnonzero(steps > 1.5 * float(np.median(steps)))
     edges = np.concatenate(([0], breaks + 1, [len(rows)]))
-    interval_s = _interval(time_s, edges)
+    # From the ends of all stretches together, gaps left out.
+    counted = int((np.diff(edges) - 1).sum())
+    span_s = float((time_s[edges[1:] - 1] - time_s[edges[:-1]]).sum())
+    interval_s = span_s / counted if counted else float(np.median(steps))
     off = np.concatenate(
         [
             time_s[a:b] - time_s[a] - interval_s * np.arange(b - a)
@@ -74,25 +72,16 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
             f"the samples are not evenly spaced (by up to {worst:.2g} of an interval)",
             "this form has no times: write OUT.csv instead",
         )
-    pauses = tuple(Pause(int(at) + 1, float(steps[at]) - interval_s) for at in breaks)
+    pauses = tuple((int(at) + 1, float(steps[at]) - interval_s) for at in breaks)
     notes = []
     if pauses:
         notes.append(
-            f"{len(pauses)} gap(s) of {sum(p.missing_s for p in pauses):.6g} s in all"
+            f"{len(pauses)} gap(s) of {sum(missing for _, missing in pauses):.6g} s in all"
             " are pauses, each with an event that gives its length"
         )
     if worst > _WORTH_SAYING:
         notes.append(f"times moved by up to {worst:.2g} of an interval, onto an even grid")
     return Grid(rows, interval_s, pauses, tuple(notes))
-
-
-def _interval(time_s: FloatArray, edges: IntArray) -> float:
-    """Find the interval from the ends of all stretches together, gaps left out."""
-    spans = time_s[edges[1:] - 1] - time_s[edges[:-1]]
-    counts = np.diff(edges) - 1
-    if not counts.sum():
-        return float(np.median(np.diff(time_s)))
-    return float(spans.sum() / counts.sum())
 
 
 _LOWEST, _HIGHEST = -32768, 32767
@@ -154,16 +143,15 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
     """
     grid = on_grid(place, recording)
     values = recording.values[grid.rows]
-    if len(values) > MOST_SAMPLES:
-        raise InputError(place, f"{len(values)} samples are too many for a .WDH", "cut it")
-    if np.abs(values).max() > _LARGEST:
-        raise InputError(place, "the readings are too large for a .WDH", "check their unit")
     begin_s = float(recording.time_s[grid.rows[0]])
     length_s = float(recording.time_s[grid.rows[-1]]) - begin_s
-    if length_s > _LONGEST_S:
-        raise InputError(
-            place, f"{length_s:.3g} s are too long for a .WDH", "check the time's unit"
-        )
+    for wrong, problem, remedy in (
+        (len(values) > MOST_SAMPLES, f"{len(values)} samples are too many", "cut it"),
+        (np.abs(values).max() > _LARGEST, "the readings are too large", "check their unit"),
+        (length_s > _LONGEST_S, f"{length_s:.3g} s are too long", "check the time's unit"),
+    ):
+        if wrong:
+            raise InputError(place, f"{problem} for a .WDH", remedy)
     slope, intercept, counts, notes = _scaled(recording, values)
     number = recording.metadata.get("channel", "1")
     channel = Channel(
@@ -225,12 +213,14 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
     return 4.0 * step, intercept, counts.astype(np.int64), [note]
 
 
-def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> list[Event]:
+def _events(
+    recording: Recording, rows: IntArray, pauses: tuple[tuple[int, float], ...]
+) -> list[Event]:
     """Gather pauses, markers and the starts of suspect stretches, in the order of scans."""
     time_s = recording.time_s[rows]
     by_scan: dict[int, list[str]] = {}
-    for pause in pauses:
-        by_scan.setdefault(pause.before_scan, []).append(gap_comment(pause.missing_s))
+    for scan, missing_s in pauses:
+        by_scan.setdefault(scan, []).append(gap_comment(missing_s))
     for mark in markers_of(recording):
         scan = int(np.clip(np.searchsorted(time_s, mark.time_s - 1e-9), 0, len(rows) - 1))
         comments = by_scan.setdefault(scan, [])
@@ -242,13 +232,9 @@ def _events(recording: Recording, rows: IntArray, pauses: tuple[Pause, ...]) -> 
         for scan in np.flatnonzero(starts).tolist():
             by_scan.setdefault(scan, []).append("suspect")
     return [
-        Event(scan, round(float(time_s[scan] - time_s[0])), _joined(comments))
+        Event(scan, round(float(time_s[scan] - time_s[0])), "; ".join(filter(None, comments)))
         for scan, comments in sorted(by_scan.items())
     ]
-
-
-def _joined(comments: list[str]) -> str:
-    return "; ".join(comment for comment in comments if comment)
 
 
 def _seconds_since_1970(text: str) -> float:
