@@ -14,10 +14,29 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.clock import Clock
-from pendpipe.dynamics.eq8 import BASELINE as BASELINE
-from pendpipe.dynamics.eq8 import OFFSET as OFFSET
-from pendpipe.dynamics.eq8 import OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.effect import Pendulum
+
+__all__ = [
+    "BASELINE",
+    "HIGH",
+    "HYSTERETIC",
+    "LOW",
+    "OFFSET",
+    "OMEGA",
+    "SHARE",
+    "START",
+    "TIME",
+    "VISCOUS",
+    "A",
+    "B",
+    "C",
+    "closed_form",
+    "held_indices",
+    "pendulum_of",
+    "share_by_b",
+    "with_parts",
+]
 
 LOW: Final = (0.0, 0.0, 0.0, 0.0, 1e-9, -math.inf, -math.inf, -math.inf)
 HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, math.inf)

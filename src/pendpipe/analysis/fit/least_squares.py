@@ -61,9 +61,10 @@ def bounded_step(
         return step
     scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
     # A hair for what the readings do not tell apart.
-    root = np.linalg.cholesky(part * scale[:, None] * scale + 1e-13 * np.eye(len(free)))
+    scaled = part * scale[:, None] * scale + 1e-13 * np.eye(len(free))
+    root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
     within = Bounds(bounds.lower[free] / scale, bounds.upper[free] / scale)
-    right = np.linalg.solve(root, gradient[free] * scale)
+    right = np.asarray(np.linalg.solve(root, gradient[free] * scale), dtype=np.float64)
     step[free] = bounded_least_squares(root.T, right, *within) * scale
     return bounds.clip(step)
 
