@@ -425,7 +425,7 @@ class Joint:
         for member in self.members:
             for step in member.found.steps:
                 effect = step.winner.lead.effect
-                if _may_be_common(effect) and effect.key in self._starts:
+                if may_be_common(effect) and effect.key in self._starts:
                     gain = gains.get(effect.key, (0.0, effect))[0] + step.winner.gain
                     gains[effect.key] = (gain, effect)
         names = [effect for _, effect in sorted(gains.values(), key=lambda each: -each[0])]
@@ -449,11 +449,9 @@ class Joint:
         self.progress(f"adding {rivals[0][0].name}")
         return rivals[0][1]
 
-    def rivals(
-        self, without: Together, leads: Sequence[Lead], best: float | None = None
-    ) -> list[tuple[Rival, Together]]:
+    def rivals(self, without: Together, leads: Sequence[Lead]) -> list[tuple[Rival, Together]]:
         """Refit the leads in all recordings together, and rank them."""
-        best = max((lead.score for lead in leads), default=0.0) if best is None else best
+        best = max((lead.score for lead in leads), default=0.0)
         near = [lead for lead in leads if lead.score > (1.0 - _PART_BEHIND) * best - NEAR]
         found: dict[int, tuple[Rival, Together]] = {}
         for lead in near[:_MOST_REFITTED]:
@@ -474,29 +472,30 @@ class Joint:
     def settled(self) -> tuple[Together, list[Named]]:
         """Search; then compare each effect with its rivals, exchange it or drop it."""
         here = self.search()
-        for _ in range(_MOST_SWAPS):
-            named = []
+        for left in range(_MOST_SWAPS, -1, -1):
+            named: list[Named] = []
+            there: Together | None = None
             for effect in here.effects:
                 others = [other for other in here.effects if other is not effect]
                 without = self.fitted(others, here.released, here)
                 if without is None:
                     raise NoMotionError(f"there is no motion without {effect.name}")
                 rivals = self.rivals(without, self._contenders(without, effect))
-                own = next((pair for pair in rivals if pair[0].lead.effect is effect), None)
-                if own is None or own[0].evidence < CHOICE:
+                own = next((pair[0] for pair in rivals if pair[0].lead.effect is effect), None)
+                if own is None or own.evidence < CHOICE:
                     self.progress(f"dropping {effect.name}")
-                    here = without
+                    there = without
                     break
-                named.append(_weighed(own[0], [rival for rival, _ in rivals]))
+                named.append(_weighed(own, [rival for rival, _ in rivals]))
                 odds = named[-1].weights[1:-1] / named[-1].weights[0]
-                if odds.max(initial=0.0) > _LIKELIER:
+                if left and odds.max(initial=0.0) > _LIKELIER:
                     likelier = named[-1].mates[int(np.argmax(odds))]
                     self.progress(f"replacing {effect.name} by {likelier.name}")
-                    here = next(there for rival, there in rivals if rival is likelier)
+                    there = next(joint for rival, joint in rivals if rival is likelier)
                     break
-            else:
-                return here, named
-            here = self._rescaled(here)
+            if there is None:
+                break
+            here = self._rescaled(there)
         return here, named
 
     def _contenders(self, without: Together, effect: Effect) -> list[Lead]:
@@ -512,7 +511,7 @@ class Joint:
         }
         first = [lead for lead in leads if lead.effect.key in alone and lead.effect is not effect]
         rest = [lead for lead in leads if lead not in first and lead.effect.key != effect.key]
-        best = max(score, *(lead.score for lead in leads), 0.0) if leads else score
+        best = max([score, *(lead.score for lead in leads)])
         own = Lead(effect, (), best, 0.0)
         raised = [replace(lead, score=best) for lead in first[:3]]
         return [own, *raised, *rest]
@@ -534,7 +533,7 @@ class Joint:
         for effect in applicable(
             CATALOGUE, here.alone[0], self.baseline, self.members[0].found.data.unit
         ):
-            if effect.key in used or not _may_be_common(effect):
+            if effect.key in used or not may_be_common(effect):
                 continue
             shapes = [tuple(map(float, row)) for row in effect.shapes(loudest.baseline.at.span)]
             scores, sizes = self._scores(here, tangents, effect, shapes)
@@ -630,7 +629,7 @@ def _held(found: Search) -> Sequence[int]:
     return [index for index in found.held if index < len(BASELINE)]
 
 
-def _may_be_common(effect: Effect) -> bool:
+def may_be_common(effect: Effect) -> bool:
     """Whether an effect may be one of all recordings: no instant, no tone, no curve."""
     return effect.has_signature and not (
         effect.local or effect.spectral or effect.kind in ("unnamed", "parameter")
@@ -640,7 +639,7 @@ def _may_be_common(effect: Effect) -> bool:
 def _extras(found: Search) -> tuple[Effect, ...]:
     """Return what happened in one recording alone."""
     effects = found.named.model.effects
-    return tuple(e for e in effects if e.kind != "unnamed" and not _may_be_common(e))
+    return tuple(e for e in effects if e.kind != "unnamed" and not may_be_common(e))
 
 
 def _origin(fits: Sequence[Fit], layout: Layout) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,12 +14,13 @@ from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
-from pendpipe.diagnosis.joint import Joint, Named, Released, Together
-from pendpipe.diagnosis.result import BASELINES, FILE_NAME, FoundEffect, Location
+from pendpipe.diagnosis.chance import printed
+from pendpipe.diagnosis.joint import Joint, Named, Released, Together, may_be_common
+from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE, FILE_NAME, FoundEffect, Location
 from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import BASELINE, OMEGA
+from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Estimate
@@ -160,7 +161,20 @@ class _Answer:
         self.level, self.baseline = level, baseline
         self.unit = outcomes[0].search.data.unit
         self.released = [each for each in together.released if each not in joint.own]
-        self.effects = (*map(self._effect, named), *map(self._contradiction, self.released))
+        self.events = [
+            (name, each)
+            for name, outcome in zip(names, outcomes, strict=True)
+            for each in outcome.effects
+            if each.kind != "unnamed" and not may_be_common(by_identifier(each.identifier))
+        ]
+        self.effects = (
+            *map(self._effect, named),
+            *map(self._contradiction, self.released),
+            *(
+                replace(each, location=replace(each.location, summary=f"in {name} alone"))
+                for name, each in self.events
+            ),
+        )
 
     def content(self, provenance: dict[str, Any]) -> dict[str, Any]:
         """Return the whole answer."""
@@ -170,11 +184,12 @@ class _Answer:
         recordings = [self._recording(number) for number in range(len(self.outcomes))]
         after = self._model(self.together)
         unexplained = self._p_value(self.together)
+        missing = any(each.identifier != COLOURED_NOISE for each in self.effects)
         return {
             "schema_version": 1,
             "baseline": {"name": self.baseline, **self._model(self.bare)},
             "noise_rms_rad": _rms([outcome.diagnosis.noise_rms_rad for outcome in self.outcomes]),
-            "verdict": "missing-physics" if self.effects else "consistent",
+            "verdict": "missing-physics" if missing else "consistent",
             "p_value": p_value,
             "effects": [each.as_json() for each in self.effects],
             "improved": after,
@@ -199,7 +214,7 @@ class _Answer:
         shared = float(chi2_beyond(chi2, max(freedom, 1)))
         leads = self.joint.leads(model)
         scores = [self.joint.p_value(lead, lead.score) for lead in leads]
-        return min(1.0, 2.0 * min([shared, *(p / CATALOGUE_SHARE / 2.0 for p in scores)]))
+        return min(1.0, 2.0 * min([shared, *scores]))
 
     def _model(self, model: Together | None) -> dict[str, Any]:
         if model is None:
@@ -395,6 +410,9 @@ class _Answer:
             text.insert(
                 1, f"{model[0].upper()}{model[1:]} does not describe them ({printed(p_value)})."
             )
+        if self.events:
+            said = [f"{each.name} in {name}" for name, each in self.events]
+            text.append(f"One recording alone shows {_listed(said)}.")
         odd = [
             each["name"] for each in recordings if each["agreement"]["p_value"] < self.level / count
         ]
