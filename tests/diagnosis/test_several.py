@@ -57,6 +57,7 @@ def together(kind: str) -> JointOutcome:
 def test_three_releases_share_their_values_and_lack_nothing() -> None:
     found = together("nothing").to_dict()
     assert found["verdict"] == "consistent"
+    assert found["unexplained"]["p_value"] > 1e-3
     values = found["improved"]["parameters"]
     for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
         assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]

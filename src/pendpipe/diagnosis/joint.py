@@ -583,19 +583,23 @@ class Joint:
             inner.append((rows @ basis).reshape(count, width, -1))
             rest = rows - (rows @ basis) @ basis.T
             outer.append(rest.reshape(count, width, -1))
-            products.append((rows @ left[number]).reshape(count, width))
+            # A recording's own size can't restore what the others take from its own tangent space.
+            seen = rows if shared else rest
+            products.append((seen @ left[number]).reshape(count, width))
         scores, sizes = np.zeros(count), []
         for shape in range(count):
             flat = np.concatenate([each[shape] for each in inner], axis=1)
             gram = np.array([each[shape] @ each[shape].T for each in outer])
             pull = np.array([each[shape] for each in products])
             if not shared:
-                # Each recording's own size: its own tangent space is all that is projected out.
-                each = [
+                lengths = np.trace(gram, axis1=1, axis2=2)
+                whole = lengths + np.array([np.sum(each[shape] ** 2) for each in inner])
+                pull = pull * (lengths > 1e-8 * whole)[:, None]
+                own = [
                     np.linalg.lstsq(*pair, rcond=1e-10)[0] for pair in zip(gram, pull, strict=True)
                 ]
-                scores[shape] = float(np.sum(pull * each))
-                sizes.append(np.mean(each, axis=0))
+                scores[shape] = float(np.sum(pull * own))
+                sizes.append(np.mean(own, axis=0))
                 continue
             off = flat - (flat @ common) @ common.T
             matrix, right = gram.sum(axis=0) + off @ off.T, pull.sum(axis=0)
