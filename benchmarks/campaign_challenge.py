@@ -51,6 +51,10 @@ CAUSES: Final[dict[str, tuple[float, float]]] = {
 }
 """Causes with the sizes that are drawn, evenly."""
 
+OTHERWISE_MODELLED: Final = ("wall-confinement", "free-surface")
+"""Hidden as a concentric shell with thin layers, and with a mode at 1.3 Hz: the judge has a tank,
+and modes at three frequencies. They test the class; sizes and loss torques mean something else."""
+
 
 class Generator:
     """The readings of a campaign for nuisances in standard deviations, then causes in own units."""
@@ -331,7 +335,8 @@ def table(results: list[dict[str, Any]]) -> str:
     more = sum(one["found"] > 1 for one in hidden)
     lines.append(f"a second effect claimed: {share(more, len(hidden))}")
     for key in ("k", "kappa", "size", "uniform-drag-excess", "history-term"):
-        pulls = np.array([one["pulls"][key] for one in results if key in one["pulls"]])
+        known = [one for one in results if one["cause"] not in OTHERWISE_MODELLED]
+        pulls = np.array([one["pulls"][key] for one in known if key in one["pulls"]])
         if not len(pulls):
             continue
         one_sd, two_sd = (int(np.sum(np.abs(pulls) < limit)) for limit in (1.0, 1.96))

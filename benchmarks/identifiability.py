@@ -1,16 +1,17 @@
 """Which causes of a drag that is 12 % too large the default campaign can tell apart.
 
-    python -m benchmarks.identifiability
+    python -m benchmarks.identifiability [--sd 0.001]
 
-For 15 records in water and 12 in air, b to 0.1 %, each cause is scaled to 12 % at the paper's
-record (water-low-7). Printed are its excess over Eq. 16 at four records, the sigma by which the
-wrong one of each pair is rejected (above the diagonal; the worse direction), and the |cosine| of
-their patterns (below), from b alone and from b and frequency; then what is left of each outside
-the wall family.
+For 15 records in water and 12 in air, b to 0.1 % (or `--sd`), each cause is scaled to 12 % at the
+paper's record (water-low-7). Printed are its excess over Eq. 16 at four records; the sigma by
+which the wrong one of each pair is rejected (above the diagonal; the worse direction) and the
+|cosine| of their patterns (below), from b alone and from b and frequency; then what is left of
+each outside the wall family.
 """
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from typing import Final
 
@@ -77,11 +78,11 @@ def patterns(design: Design, fit: JointFit) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def table(design: Design, *, frequency: bool) -> str:
+def table(design: Design, relative_sd: float, *, frequency: bool) -> str:
     """Sigma above, |cosine| below the diagonal."""
     nothing = np.zeros(len(design.nuisances))
     plain = predict(design, (), nothing)
-    sds = plain * np.array([3e-6, 1e-3])
+    sds = plain * np.array([3e-6, relative_sd])
     covariance = sds[:, :, None] * sds[:, None, :] * np.eye(2)
     fit = joint_fit(design, measured(plain, covariance, frequency=frequency))
     basis, _ = np.linalg.qr(fit.jacobian)
@@ -136,9 +137,12 @@ def excess(design: Design) -> str:
 
 def main() -> None:
     """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--sd", type=float, default=1e-3, help="relative, of b (%(default)s)")
+    spread = parser.parse_args().sd
     design = default_design()
-    print(excess(design), "\nfrom b alone", table(design, frequency=False), sep="\n\n")
-    print("\nfrom b and the frequency", table(design, frequency=True), sep="\n\n")
+    print(excess(design), "\nfrom b alone", table(design, spread, frequency=False), sep="\n\n")
+    print("\nfrom b and the frequency", table(design, spread, frequency=True), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -132,7 +132,9 @@ class JointFit:
     @cached_property
     def covariance(self) -> FloatArray:
         """Of the unknowns."""
-        return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
+        information = self.jacobian.T @ self.jacobian
+        # What no record depends on gets a huge error, not a division by zero.
+        return np.asarray(np.linalg.inv(information + 1e-12 * np.eye(len(information))))
 
     def estimate(self, number: int, unit: str, scale: float, about: float = 0.0) -> Estimate:
         """One unknown as an estimate of ``about + scale u``."""

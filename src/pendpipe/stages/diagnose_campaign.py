@@ -65,7 +65,7 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
     if found is None:
         from pendpipe.diagnosis.result import not_analysable
 
-        reason = "no record with a geometry swings with a sphere in a fluid"
+        reason = "it takes three records with a geometry, two of them with a sphere in a fluid"
         return not_analysable(BASELINE, reason, provenance)
     level = campaign.configuration.diagnose.level
     return campaign_diagnosis(search(*found, level=level), provenance)

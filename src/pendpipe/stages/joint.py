@@ -11,13 +11,17 @@ from pendpipe.campaign.fit import Measured, measured
 from pendpipe.configuration.load import Campaign
 from pendpipe.stages.results import RecordResult
 
+FEWEST_RECORDS = 3
+"""With fewer there is nothing to compare: k and one effect are free."""
+
 
 def campaign_data(
     campaign: Campaign, results: Sequence[RecordResult]
 ) -> tuple[Design, Measured] | None:
-    """Design and data of the usable records with a geometry; None where the sphere never swings.
+    """Design and data of the usable records with a geometry; None where too few swing.
 
-    The joint fit compares with Eq. 16: it needs an apparatus with a sphere in a fluid.
+    The joint fit compares with Eq. 16: it needs an apparatus, and three records, two of them in a
+    fluid.
     """
     if campaign.configuration.apparatus is None:
         return None
@@ -26,8 +30,10 @@ def campaign_data(
         for result in results
         if result.usable and result.record.fluid and campaign.geometry(result.record) is not None
     ]
-    design = design_of(campaign, [result.record for result in used]) if used else None
-    if design is None or not design.wet.any():
+    if len(used) < FEWEST_RECORDS:
+        return None
+    design = design_of(campaign, [result.record for result in used])
+    if design.wet.sum() < 2.0:
         return None
     values, covariances = [], []
     for result in used:
