@@ -10,8 +10,7 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.progressive_window import progressive_start
-from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.progressive_window import fit_in_growing_window
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
@@ -36,8 +35,8 @@ def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_
     model = Model(TIME_S, 1.0 / RATE_HZ, (circular_error,), order=20)
     slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)
     start = np.array([0.0, LINEAR, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
-    value = progressive_start(model, data, NOISE_RAD, start)
-    fit = refine(model, data, white_noise(data, NOISE_RAD), value)
+    fit = fit_in_growing_window(model, data, white_noise(data, NOISE_RAD), start)
+    assert fit is not None
     assert fit.chi2 / len(TIME_S) == pytest.approx(1.0, abs=0.1)
     sd = math.sqrt(fit.covariance()[OMEGA, OMEGA])
     assert abs(fit.value[OMEGA] - OMEGA_TRUE) < 5.0 * sd

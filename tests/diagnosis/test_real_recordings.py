@@ -19,8 +19,8 @@ from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
 from pendpipe.diagnosis.location import beat_of
-from pendpipe.diagnosis.progressive_window import progressive_start
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.progressive_window import fit_in_growing_window
+from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.small_swings import small_swings
 from pendpipe.diagnosis.state import first_noise
 from pendpipe.effects.baseline import A, C
@@ -59,8 +59,9 @@ def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
         model = model.adding(by_identifier(identifier.replace("_", "-")))
         value = np.append(value, start)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        value = progressive_start(model, found.data, noise.white_rms, value, held=found.held)
-        return refine(model, found.data, noise, value, held=found.held)
+        fit = fit_in_growing_window(model, found.data, noise, value, held=found.held)
+    assert fit is not None
+    return fit
 
 
 def values(fit: Fit, identifier: str) -> FloatArray:

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit, refine
@@ -28,7 +26,6 @@ def test_noise_alone_leaves_nothing_and_enlarges_no_error() -> None:
     found = remainder_of(*null_fit())
     assert not found.systematic
     assert found.error_scale == 1.0
-    assert found.worth(20.0) == 20.0
     assert found.over_noise == pytest.approx(1.0, abs=4.0 / math.sqrt(2 * len(TIME_S)))
 
 
@@ -56,17 +53,3 @@ def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
     assert large.error_scale == pytest.approx(2.0 * small.error_scale, rel=0.2)
     assert small.error_scale > small.over_noise
     assert large.numbers < 30.0
-
-
-@given(
-    gain=st.floats(0.0, 1e6),
-    more=st.floats(1.0, 10.0),
-    excess=st.floats(1.0, 1e6),
-    numbers=st.floats(2.0, 500.0),
-)
-def test_a_gain_is_worth_no_more_than_itself_and_a_larger_one_no_less(
-    gain: float, more: float, excess: float, numbers: float
-) -> None:
-    left = Remainder(excess, 3.0, numbers)
-    assert 0.0 <= left.worth(gain) <= gain
-    assert left.worth(more * gain) >= left.worth(gain)

@@ -11,17 +11,16 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.begin import SINE, Beginning
+from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, SINE, Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
-from pendpipe.diagnosis.progressive_window import progressive_start
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.progressive_window import fit_in_growing_window
+from pendpipe.diagnosis.refine import Fit, best_fit, better
 from pendpipe.diagnosis.refits import LOST_PHASE_RAD
 from pendpipe.diagnosis.scores import Candidate, build_bank, whitened
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable
-from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
@@ -106,17 +105,9 @@ def _imitated(fit: Fit, effect: Effect, state: State, task: Task) -> list[tuple[
 
 
 def fitted_from(base: Model, state: State, effect: Effect, start: FloatArray) -> Fit | None:
-    """Fit at once, and in a growing window; return the better of the two."""
-    model, found = base.adding(effect), []
-    for growing in (False, True):
-        try:
-            value = start
-            if growing:
-                white = state.noise.white_rms
-                value = progressive_start(model, state.data, white, start, held=state.held)
-            found.append(refine(model, state.data, state.noise, value, held=state.held))
-        except (NoMotionError, np.linalg.LinAlgError):
-            continue
-        if found[-1].converged and found[-1].max_phase_error_rad < 0.1:
-            break
-    return min(found, key=lambda fit: fit.chi2, default=None)
+    """Fit at once, and in a growing window where that loses the phase; return the better one."""
+    model, data, noise = base.adding(effect), state.data, state.noise
+    fit = best_fit(model, data, noise, [start], held=state.held)
+    if fit and fit.converged and fit.max_phase_error_rad < LARGE_PHASE_ERROR:
+        return fit
+    return better(fit, fit_in_growing_window(model, data, noise, start, held=state.held))

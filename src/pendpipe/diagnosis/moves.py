@@ -20,13 +20,12 @@ import numpy as np
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Detection, Lead, detect, prepare
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
-from pendpipe.diagnosis.refine import Fit, best_fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable
-from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
@@ -191,11 +190,9 @@ def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
 
 def _with_curve(bare: Fit, curve: Curve, state: State) -> Fit | None:
     start = np.concatenate([bare.value, np.zeros(curve.count)])
-    try:
-        fit = refine(bare.model.adding(curve), state.data, state.noise, start, held=state.held)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
-    return fit if curve.believable(fit.value[len(bare.value) :]) else None
+    model = bare.model.adding(curve)
+    fit = best_fit(model, state.data, state.noise, [start], held=state.held)
+    return fit if fit and curve.believable(fit.value[len(bare.value) :]) else None
 
 
 def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:

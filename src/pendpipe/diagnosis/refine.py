@@ -157,19 +157,25 @@ def best_fit(
 
     None if the model has no motion from any. A start with values of another model is left out.
     """
-    fixed, begun = tuple(held), []
+    fixed, found, begun = tuple(held), None, []
     for start in starts:
         with suppress(NoMotionError, np.linalg.LinAlgError):
             if len(start) == model.size:
                 begun.append(Refining(model, data, noise, start, held=fixed))
-    found = []
     for refining in sorted(begun, key=lambda each: each.chi2):
         with suppress(NoMotionError, np.linalg.LinAlgError):
             refining.go(ROUNDS, useful)
-            found.append(refining.fit)
-            if found[-1].converged:
+            found = better(found, refining.fit)
+            if refining.fit.converged:
                 break
-    return min(found, key=lambda fit: fit.chi2, default=None)
+    return found
+
+
+def better(one: Fit | None, other: Fit | None) -> Fit | None:
+    """Return the fit of the smaller chi^2; None where there is neither."""
+    if one is None or other is None:
+        return one or other
+    return one if one.chi2 <= other.chi2 else other
 
 
 class Refining:

@@ -15,8 +15,8 @@ from pendpipe.diagnosis.detect import Detection, Lead
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, equivalent, ranked
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.progressive_window import progressive_start
-from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, pulled, refine
+from pendpipe.diagnosis.progressive_window import fit_in_growing_window
+from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, better, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import finer_shape
 from pendpipe.dynamics.any_law import NoMotionError
@@ -65,7 +65,7 @@ def refit_leads(
         lost = base.max_phase_error_rad > LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
         # With the baseline's friction the motion may stop before the end.
         if lost or (phase_lost and fit is None):
-            fit = _better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
+            fit = better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
         if fit is not None and believable(base, fit, lead.effect):
             fits.append((lead, fit))
     if not fits:
@@ -139,17 +139,7 @@ def _from_first_cycles(
     known = base.value[len(origin) :]
     start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
     model = base.model.adding(effect)
-    try:
-        value = progressive_start(model, data, noise.white_rms, start, held=held)
-        return refine(model, data, noise, value, held=held)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
-
-
-def _better(one: Fit | None, other: Fit | None) -> Fit | None:
-    if one is None or other is None:
-        return one or other
-    return one if one.chi2 <= other.chi2 else other
+    return fit_in_growing_window(model, data, noise, start, held=held)
 
 
 def side_by_side(

@@ -66,16 +66,6 @@ class Remainder:
             return 1.0
         return math.sqrt(max(self.excess / self.numbers, self.over_noise**2, 1.0))
 
-    def worth(self, gain: float) -> float:
-        """Return the significance of a gain of chi^2 beside the remaining misfit.
-
-        For an unknown function of m numbers and unknown size the likelihood is
-        (sum of squares)^(-m/2): the gain counts m ln(1 + gain/excess), at most itself.
-        """
-        if not self.systematic:
-            return gain
-        return min(gain, self.numbers * math.log1p(max(gain, 0.0) / max(self.excess, 1.0)))
-
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
         return {

@@ -9,14 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
-import numpy as np
-
 from pendpipe.diagnosis.evidence import SIZE_CHARGE, Rival
 from pendpipe.diagnosis.moves import FURTHER
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.state import State
-from pendpipe.dynamics.any_law import NoMotionError
 
 
 def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
@@ -68,10 +65,7 @@ def _together(state: State, released: Sequence[Rival]) -> Fit | None:
         assert isinstance(effect, ReleasedParameter)
         model, held = model.adding(effect), effect.without(held)
     best = min(released, key=lambda rival: rival.fit.chi2)
-    try:
-        return refine(model, state.data, state.noise, best.fit.value, held=held)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return None
+    return best_fit(model, state.data, state.noise, [best.fit.value], held=held)
 
 
 def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequence[Rival]) -> bool:
