@@ -38,6 +38,8 @@ from random import Random
 from typing import Any
 
 import numpy as np
+import openpyxl  # noqa: F401  (an import is no memory of the first workbook)
+import pandas as pd  # noqa: F401
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks import journal

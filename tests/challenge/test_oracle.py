@@ -82,12 +82,22 @@ def test_what_an_effect_was_sized_for_is_what_a_refit_loses(effect: str) -> None
     assert abs(with_it - without - sized.delta_chi2) < 4 * 2 * 20
 
 
-def test_every_effect_of_the_contract_can_be_hidden() -> None:
+APPARATUS = {
+    "amplitude-linear-stiffness",
+    "camera-geometry",
+    "clock-slips",
+    "count-slips",
+    "rolling-shutter",
+}
+"""Added after the generator was sealed: `benchmarks/apparatus` hides their like."""
+
+
+def test_every_effect_that_the_generator_knew_can_be_hidden() -> None:
     page = Path(__file__).parents[2] / "docs/effects.md"
     contract = re.findall(r"^### (\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     contract = [name for name in contract if not name.startswith("unnamed-")]
     assert len(contract) >= 41
-    assert sorted(EFFECTS) == sorted(contract)
+    assert sorted(EFFECTS) == sorted(set(contract) - APPARATUS)
 
 
 def test_a_third_of_the_laws_are_not_the_catalogues_own() -> None:

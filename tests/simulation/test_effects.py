@@ -20,6 +20,8 @@ from ..effects.pendulums import VALUES
 FORENSIC: dict[str, dict[str, float]] = {
     "broadband-drive": {"acceleration_density": 1e-8},
     "clipping": {"upper_level": 0.12},
+    "count-slips": {"step": 3e-3, "number": 6},
+    "clock-slips": {"dt": 0.05, "number": 6},
     "missing-codes": {"number": 20},
     "coarse-quantisation": {"step": 2e-3},
     "jitter": {"sigma_t": 2e-3},

@@ -158,6 +158,13 @@ def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray, *, within: bo
         columns -= basis @ (basis.T @ columns)
         sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
         steps = np.abs(sizes) > 0.5
+        if steps.all() and within:
+            # The readings about a step are left out, so two that undo each other there are hardly
+            # determined: each must be worth its choice.
+            noise = spread(left - columns @ sizes)
+            worth = (sizes / noise) ** 2 / np.diag(np.linalg.pinv(columns.T @ columns))
+            least = int(np.argmin(worth))
+            steps[least] = worth[least] > 2.0 * math.log(len(left)) + _CHOICE
         if steps.all():
             near = float(np.sum(np.cos(2.0 * math.pi * sizes))) / math.sqrt(0.5 * len(rows))
             return Slips(rows, sizes, 0.5 * math.erfc(near / math.sqrt(2.0)))
