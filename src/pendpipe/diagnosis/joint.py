@@ -59,7 +59,7 @@ _PART_BEHIND: Final = 0.3
 """Part of the best score that a refit may catch up."""
 _ROUNDS: Final = 10
 _SETTLED: Final = 0.05
-_FRACTIONS: Final = (1.0, 0.4, 0.1, 0.02)
+_DAMPINGS: Final = (0.0, 1e-4, 1e-3, 1e-2, 0.1)
 
 
 class Released(NamedTuple):
@@ -194,55 +194,57 @@ class Joint:
         self, effects: Sequence[Effect], released: Sequence[Released], near: Together | None = None
     ) -> Together | None:
         """Fit each recording by itself, then all together; None where there is no such motion."""
-        alone = []
+        alone, there = [], []
         for number, member in enumerate(self.members):
             found = member.found
             model = found.baseline.model.bare().at_times(found.data.time_s)
-            base = near.alone[number] if near else found.named
-            start = [base.value[: len(BASELINE)]]
-            for effect in (*member.extras, *effects):
+            own = (*member.extras, *effects)
+            for effect in own:
                 model = model.adding(effect)
-                place = [p for other, p in base.model.places() if other.key == effect.key]
-                start.append(base.value[place[0]] if place else self._starts[effect.key])
-            value = np.concatenate(start)
+            value = self._start(near.alone[number] if near else found.named, own)
             try:
                 fit = refine(model, found.data, found.noise, value, held=_held(found))
+                if near:
+                    value = self._start(near.fits[number], own)
+                    steps = GaussNewton(model, found.data, found.noise)
+                    there.append(replace(fit, evaluation=steps.evaluate_within_bounds(value)))
             except (NoMotionError, np.linalg.LinAlgError):
                 return None
             alone.append(fit)
-        return self.joined(alone, effects, released)
+        return self.joined(alone, effects, released, there)
+
+    def _start(self, base: Fit, effects: Sequence[Effect]) -> FloatArray:
+        """Return a model's values: those of a fit, and where it lacks an effect its own start."""
+        places = {other.key: place for other, place in base.model.places()}
+        start = [base.value[: len(BASELINE)]]
+        for effect in effects:
+            place = places.get(effect.key)
+            start.append(base.value[place] if place else self._starts[effect.key])
+        return np.concatenate(start)
 
     def joined(
         self,
         alone: Sequence[Fit],
         effects: Sequence[Effect],
         released: Sequence[Released],
+        near: Sequence[Fit] = (),
         only: Sequence[int] | None = None,
     ) -> Together:
-        """Solve for the values of all, from each recording's own; `only` some of them."""
+        """Solve for the values of all, from each recording's own and from those of a near model.
+
+        A recording that hardly shows an effect has values of it far from those of all; recordings
+        that contradict each other have none of all that are near. `only` some of them.
+        """
         chosen = list(range(len(alone))) if only is None else list(only)
         layout = self._layout(alone, effects, released, chosen)
-        here = [alone[number] for number in chosen]
-        values, triangle = self._solved(here, layout, chosen)
-        there = self._moved(here, layout, values, chosen)
-        if there is None:
+        own = [alone[number] for number in chosen]
+        starts = [own, [near[number] for number in chosen]] if near else [own]
+        solutions = [self._descended(start, layout, chosen) for start in starts]
+        here, values, triangle, chi2 = min(solutions, key=lambda each: each[-1])
+        if np.isinf(chi2):
             # The recordings contradict each other so much that no motion is common to them.
-            chi2, rounds = self._linear_chi2(here, layout, chosen), 0
-        else:
-            here, chi2, rounds = there, self._chi2(there, chosen), _ROUNDS
-        for _ in range(rounds):
-            goal, triangle = self._solved(here, layout, chosen)
-            for part in _FRACTIONS:
-                tried = values + part * (goal - values)
-                there = self._moved(here, layout, tried, chosen)
-                if there is not None and self._chi2(there, chosen) <= chi2 + 1e-9:
-                    break
-            else:
-                break
-            gained, here, values = chi2 - self._chi2(there, chosen), there, tried
-            chi2 -= gained
-            if gained < _SETTLED:
-                break
+            here, chi2 = own, self._linear_chi2(own, layout, chosen)
+            values, triangle = self._solved(own, layout, chosen)
         return Together(
             tuple(effects),
             tuple(released),
@@ -253,6 +255,30 @@ class Joint:
             triangle,
             chi2,
         )
+
+    def _descended(
+        self, here: Sequence[Fit], layout: Layout, chosen: Sequence[int]
+    ) -> tuple[Sequence[Fit], FloatArray, FloatArray, float]:
+        """Return fits, values, triangle and chi^2 of the minimum; inf where nothing moves so."""
+        values, _, _ = _origin(here, layout)
+        common = all(
+            np.allclose(values[slot], fit.value[list(fit.free)], rtol=1e-12, atol=0.0)
+            for fit, slot in zip(here, layout.slots, strict=True)
+        )
+        chi2 = self._chi2(here, chosen) if common else np.inf
+        for _ in range(_ROUNDS):
+            for damping in _DAMPINGS:
+                tried, triangle = self._solved(here, layout, chosen, values, damping)
+                there = self._moved(here, layout, tried, chosen)
+                if there is not None and self._chi2(there, chosen) <= chi2 + 1e-9:
+                    break
+            else:
+                break
+            gained, here, values = chi2 - self._chi2(there, chosen), there, tried
+            chi2 = self._chi2(here, chosen)
+            if gained < _SETTLED:
+                break
+        return here, values, triangle, chi2
 
     def _layout(
         self,
@@ -299,9 +325,17 @@ class Joint:
         return fit.jacobian[:count][:, list(fit.free)] / scale, fit.residual[:count] / scale
 
     def _solved(
-        self, fits: Sequence[Fit], layout: Layout, chosen: Sequence[int]
+        self,
+        fits: Sequence[Fit],
+        layout: Layout,
+        chosen: Sequence[int],
+        near: FloatArray | None = None,
+        damping: float = 0.0,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the best values of all for linear models about each recording's own values."""
+        """Return the best values of all for linear models about each recording's own values.
+
+        Damped as by Levenberg and Marquardt towards the values `near`.
+        """
         size = len(layout.keys)
         origin, low, high = _origin(fits, layout)
         rows, right = [], []
@@ -320,7 +354,11 @@ class Joint:
         scale = np.linalg.norm(triangle, axis=0)
         scale[scale == 0.0] = 1.0
         floor, ceiling = (low - origin) * scale, (high - origin) * scale
-        step = bounded_least_squares(triangle / scale, np.concatenate(right), floor, ceiling)
+        matrix, target = triangle / scale, np.concatenate(right)
+        if near is not None and damping:
+            matrix = np.concatenate([matrix, damping * np.eye(size)])
+            target = np.concatenate([target, damping * (near - origin) * scale])
+        step = bounded_least_squares(matrix, target, floor, ceiling)
         return origin + step / scale, triangle
 
     def _moved(
@@ -361,28 +399,29 @@ class Joint:
     def cost(self, together: Together, released: Released) -> float:
         """Return by how much chi^2 would rise if a value were shared after all."""
         kept = [each for each in together.released if each != released]
-        layout = self._layout(together.alone, together.effects, kept, range(len(self.members)))
-        after = self._linear_chi2(together.alone, together.layout)
-        return max(self._linear_chi2(together.alone, layout) - after, 0.0)
+        shared = self.joined(together.alone, together.effects, kept, together.fits)
+        return max(shared.chi2 - together.chi2, 0.0)
 
-    def _releases(self, together: Together) -> Iterator[tuple[float, float, Released]]:
-        """Yield evidence, gain and name of each value that may not be shared."""
-        count = len(self.members)
-        everyone = range(count)
+    def _releases(self, here: Together) -> Iterator[tuple[float, str, Together]]:
+        """Yield evidence, words and model where one more value is not shared, or is again."""
+        numbers = range(len(self.members) if len(self.members) > 2 else 0)
         for name in _RELEASED:
-            options = [Released(name), *(Released(name, number) for number in everyone)]
-            for option in options[: 1 if count == 2 else None]:
-                if {option, Released(name)} & {*together.released}:
+            for option in (Released(name), *(Released(name, number) for number in numbers)):
+                if option in self.own:
                     continue
-                released = (*together.released, option)
-                layout = self._layout(together.alone, together.effects, released, everyone)
-                more = len(layout.keys) - len(together.layout.keys)
+                again = option in here.released
+                others = [each for each in here.released if each != option]
+                if not again and option.recording is None:
+                    others = [each for each in others if each.name != name]
+                released = (*others, *(() if again else (option,)))
+                there = self.joined(here.alone, here.effects, released, here.fits)
+                more = len(there.layout.keys) - len(here.layout.keys)
                 if not more:
                     continue
-                after = self._linear_chi2(together.alone, layout)
-                gain = self._linear_chi2(together.alone, together.layout) - after
-                trials = 2.0 * np.log(len(options)) if option.recording is not None else 0.0
-                yield _worth(gain, more) - trials - FURTHER, gain, option
+                trials = 2.0 * np.log(1 + len(numbers)) if option.recording is not None else 0.0
+                worth = _worth(abs(here.chi2 - there.chi2), abs(more)) - trials - FURTHER
+                words = f"{name} is shared" if again else f"{name} is not shared"
+                yield -worth if again else worth, words, there
 
     def _linear_chi2(
         self, fits: Sequence[Fit], layout: Layout, chosen: Sequence[int] | None = None
@@ -403,19 +442,15 @@ class Joint:
         """Release what is contradicted and add what is missing, until chance explains the rest."""
         here = self._begun()
         for _ in range(_MOST_MOVES):
-            release = max(self._releases(here), default=(0.0, 0.0, None), key=lambda each: each[0])
+            moves = list(self._releases(here))
             leads = self.leads(here) if len(here.effects) < _MOST_EFFECTS else []
             leads = [lead for lead in leads if self.p_value(lead, lead.score) < self.level]
-            best = max((lead.score for lead in leads), default=0.0)
-            there = None
-            if best > release[1]:
-                there = self._with_best(here, leads)
-            if there is None and release[2] is not None and release[0] > 0.0:
-                self.progress(f"{release[2].name} is not shared")
-                released = (*here.released, release[2])
-                there = self.joined(here.alone, here.effects, released)
-            if there is None:
+            for rival, there in self.rivals(here, leads):
+                moves.append((rival.evidence - CHOICE, f"adding {rival.name}", there))
+            worth, words, there = max(moves, key=lambda move: move[0])
+            if worth <= 0.0:
                 break
+            self.progress(words)
             here = self._rescaled(there)
         return here
 
@@ -440,23 +475,22 @@ class Joint:
         for number, (member, fit) in enumerate(zip(self.members, here.alone, strict=True)):
             rest = remainder_of(fit, member.found.data, member.found.noise)
             self.members[number] = member._replace(scale=rest.error_scale)
-        return self.joined(here.alone, here.effects, here.released)
+        here = self.joined(here.alone, here.effects, here.released, here.fits)
+        for effect in here.effects:
+            self._remember(effect, here.fits[-1])
+        return here
 
-    def _with_best(self, here: Together, leads: Sequence[Lead]) -> Together | None:
-        rivals = self.rivals(here, leads)
-        if not rivals or rivals[0][0].evidence < CHOICE:
-            return None
-        self.progress(f"adding {rivals[0][0].name}")
-        return rivals[0][1]
-
-    def rivals(self, without: Together, leads: Sequence[Lead]) -> list[tuple[Rival, Together]]:
-        """Refit the leads in all recordings together, and rank them."""
+    def rivals(
+        self, without: Together, leads: Sequence[Lead], here: Together | None = None
+    ) -> list[tuple[Rival, Together]]:
+        """Refit the leads in all recordings together, and rank them; `here` has one of them."""
         best = max((lead.score for lead in leads), default=0.0)
         near = [lead for lead in leads if lead.score > (1.0 - _PART_BEHIND) * best - NEAR]
         found: dict[int, tuple[Rival, Together]] = {}
         for lead in near[:_MOST_REFITTED]:
             effect = lead.effect
-            there = self.fitted((*without.effects, effect), without.released, without)
+            there = here if here and effect in here.effects else None
+            there = there or self.fitted((*without.effects, effect), without.released, without)
             if there is None:
                 continue
             gain = without.chi2 - there.chi2
@@ -480,7 +514,7 @@ class Joint:
                 without = self.fitted(others, here.released, here)
                 if without is None:
                     raise NoMotionError(f"there is no motion without {effect.name}")
-                rivals = self.rivals(without, self._contenders(without, effect))
+                rivals = self.rivals(without, self._contenders(without, effect), here)
                 own = next((pair[0] for pair in rivals if pair[0].lead.effect is effect), None)
                 if own is None or own.evidence < CHOICE:
                     self.progress(f"dropping {effect.name}")
@@ -546,21 +580,21 @@ class Joint:
     def _tangents(self, here: Together) -> tuple[list[FloatArray], FloatArray, list[FloatArray]]:
         """Return each recording's basis, the constraint of sharing, and what it leaves."""
         everyone = range(len(self.members))
-        values, _ = self._solved(here.alone, here.layout, everyone)
-        _, low, high = _origin(here.alone, here.layout)
+        values = here.values
+        _, low, high = _origin(here.fits, here.layout)
         inside = (values > low) & (values < high)
         bases, rows, left = [], [], []
-        for fit, number, slot in zip(here.alone, everyone, here.layout.slots, strict=True):
+        for fit, number, slot in zip(here.fits, everyone, here.layout.slots, strict=True):
             columns, residual = self.block(fit, number, number == 0)
-            length = np.linalg.norm(columns, axis=0)
-            length[length == 0.0] = 1.0
-            basis, triangle = np.linalg.qr(columns / length)
+            basis, triangle = np.linalg.qr(columns)
             part = np.zeros((len(triangle), len(values)))
             part[:, slot] = triangle
             bases.append(basis)
             rows.append(part)
             left.append(residual - columns @ (values[slot] - fit.value[list(fit.free)]))
         stacked = np.concatenate(rows)[:, inside]
+        # A shared value has one unit for all: it is scaled only once they are stacked.
+        stacked /= np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
         common, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
         common = common[:, sizes > 1e-9 * sizes[0]]
         return bases, common, left
@@ -576,7 +610,7 @@ class Joint:
         bases, common, left = tangents
         width, count, shared = max(effect.sizes, 1), len(shapes), self.is_shared(effect)
         inner, outer, products = [], [], []
-        for number, (fit, basis) in enumerate(zip(here.alone, bases, strict=True)):
+        for number, (fit, basis) in enumerate(zip(here.fits, bases, strict=True)):
             member = self.members[number]
             rows = whitened(fit, member.found.noise, effect, shapes)[:, : len(basis)]
             rows = rows / member.scale

@@ -301,7 +301,11 @@ class _Answer:
         residual = data.residual(fit.at.reading)[data.weight > 0.0]
         others = [k for k in range(len(self.names)) if k != number]
         rest = self.joint.joined(
-            self.together.alone, self.together.effects, self.together.released, others
+            self.together.alone,
+            self.together.effects,
+            self.together.released,
+            self.together.fits,
+            others,
         )
         return {
             "name": self.names[number],
@@ -335,7 +339,7 @@ class _Answer:
 
         Readings are compared with the band of all values' errors and the noise.
         """
-        fit, joint = self.together.alone[number], self.joint
+        fit, joint = self.together.fits[number], self.joint
         found, scale = joint.members[number].found, joint.members[number].scale
         used = np.flatnonzero(found.data.weight > 0.0)
         head, tail = np.split(used, [int(_HEAD * len(used))])
