@@ -132,3 +132,17 @@ def proof_option(wildcards):
     """For the report: a scored challenge, if there is one; it depends on none."""
     scores = Path(OPEN, "scores")
     return option("proof", scores if (scores / "scores.json").exists() else None)
+
+
+def of_pendulum(name):
+    """One file of each record of a pendulum."""
+
+    def files(wildcards):
+        return expand(
+            "{results}/{record}/{name}",
+            results=RESULTS,
+            record=PENDULUMS[wildcards.pendulum],
+            name=name,
+        )
+
+    return files

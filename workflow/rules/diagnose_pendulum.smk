@@ -1,17 +1,3 @@
-def of_pendulum(name):
-    """One file of each record of a pendulum."""
-
-    def files(wildcards):
-        return expand(
-            "{results}/{record}/{name}",
-            results=RESULTS,
-            record=PENDULUMS[wildcards.pendulum],
-            name=name,
-        )
-
-    return files
-
-
 rule diagnose_pendulum:
     input:
         recordings=of_pendulum("recording.csv"),
