@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
 from pendpipe.analysis.fit.result import FitResult, read_fit
@@ -105,13 +106,13 @@ class Decay:
                 return y, physics.quality_factor(y, frequency, *rates)
         until_s = float(elapsed_s[-1]) + 2.0 / frequency
         turned = turning_points(self.fit.law, Release(0.0, start), until_s=until_s)
-        if len(turned.time_s) < 3:
-            raise NothingToDrawError("the fitted law stops within a cycle")
+        if len(turned.time_s) < 4:
+            raise NothingToDrawError("the fitted law stops within two cycles")
         y = np.abs(turned.angle_rad)
         quality = np.pi / np.log(y[:-2] / y[2:])
         return (
             np.interp(elapsed_s, turned.time_s, y),
-            np.interp(elapsed_s, turned.time_s[1:-1], quality),
+            make_interp_spline(turned.time_s[1:-1], quality, k=1)(elapsed_s),
         )
 
 
