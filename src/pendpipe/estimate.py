@@ -74,3 +74,14 @@ class Estimate:
         from pendpipe.quantities import with_error
 
         return with_error(self.value, self.sd, self.unit)
+
+
+def chi_square_p_value(chi2: float, degrees_of_freedom: int) -> float:
+    """Probability of a larger chi^2; NaN without degrees of freedom.
+
+    >>> round(chi_square_p_value(3.84, 1), 3)
+    0.05
+    """
+    from scipy.special import chdtrc
+
+    return float(chdtrc(degrees_of_freedom, chi2)) if degrees_of_freedom > 0 else float("nan")

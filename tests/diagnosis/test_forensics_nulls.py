@@ -13,7 +13,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics import TESTS, find_lost_samples
 from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
-from pendpipe.diagnosis.numerics import tail_of_squares
+from pendpipe.diagnosis.forensics.weighted_squares import tail_of_squares
 from pendpipe.diagnosis.state import settled
 
 from .decays import Fitted, Pendulum, fitted, rounded

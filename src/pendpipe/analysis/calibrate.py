@@ -12,15 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import fdtrc, stdtrit
 
-from pendpipe.analysis.distributions import (
-    chi_square_p_value,
-    student_quantile95,
-    variance_ratio_p_value,
-)
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate, number
+from pendpipe.estimate import Estimate, chi_square_p_value, number
 
 
 @dataclass(frozen=True)
@@ -180,7 +176,7 @@ def calibrate(
     residual = volts - offset - slope * angle_rad
     chi2 = float(np.sum(weights * residual**2))
     scale = 1.0 if known else chi2 / (count - 2)
-    reach = 1.959963984540054 if known else student_quantile95(count - 2)
+    reach = 1.959963984540054 if known else float(stdtrit(count - 2, 0.975))
     variances = scale * covariance
     slope_sd = float(np.hypot(np.sqrt(variances[1, 1]), relative_scale_sd * slope))
     return Calibration(
@@ -250,7 +246,7 @@ def _linearity(
     if known:
         p_value = chi_square_p_value(improvement, 2)
     else:
-        p_value = 1.0 if exact else variance_ratio_p_value(improvement / 2 / scale, 2, count - 4)
+        p_value = 1.0 if exact else float(fdtrc(2, count - 4, improvement / 2 / scale))
     curve = powers @ coefficients / np.sqrt(weights)
     return Linearity(
         quadratic=Estimate(

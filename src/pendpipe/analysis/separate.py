@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord, quality_of_rate
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import hysteretic_quality_factor
 
 _ROUNDS = 50

@@ -16,10 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe import physics
-from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.analysis.losses import SeparatedRecord
 from pendpipe.arrays import FloatArray
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, chi_square_p_value
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.campaign.causes import causes
 from pendpipe.campaign.diagnose import CampaignSearch, Found, Rival, held_out
 from pendpipe.campaign.fit import JointFit
 from pendpipe.campaign.next_measurement import NextRun, next_measurements
+from pendpipe.estimate import chi_square_p_value
 from pendpipe.quantities import with_error
 
 BASELINE = "eq16"

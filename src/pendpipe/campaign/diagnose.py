@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.special import ndtr
 
-from pendpipe.analysis.distributions import chi_square_p_value, normal_below
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit
+from pendpipe.estimate import chi_square_p_value
 
 CLASS_CHI2: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in the class (contract)."""
@@ -113,7 +114,7 @@ def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray,
 def _local_p(scores: FloatArray, tried: Sequence[Candidate]) -> FloatArray:
     """Probability of each score by chance; only positive scores count where the size must be."""
     one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
-    return np.where(one_sided, normal_below(-scores), 2.0 * normal_below(-np.abs(scores)))
+    return np.where(one_sided, ndtr(-scores), 2.0 * ndtr(-np.abs(scores)))
 
 
 def global_p_value(
@@ -130,8 +131,8 @@ def global_p_value(
     drawn = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(scores))) @ root.T
     one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
     least = np.minimum(
-        normal_below(-drawn[:, one_sided].max(axis=1, initial=0.0)),
-        2.0 * normal_below(-np.abs(drawn[:, ~one_sided]).max(axis=1, initial=0.0)),
+        ndtr(-drawn[:, one_sided].max(axis=1, initial=0.0)),
+        2.0 * ndtr(-np.abs(drawn[:, ~one_sided]).max(axis=1, initial=0.0)),
     )
     resolved = np.quantile(least, 0.01)
     if smallest >= resolved:

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.distributions import chi_square_p_value
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.fit import JointFit, Measured, joint_fit, named
 from pendpipe.campaign.prediction import terms_of
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.special import chdtrc, chdtri
 
-from pendpipe.analysis.distributions import chi2_beyond, chi2_of_one
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.chance import Chance, Trials
 from pendpipe.diagnosis.data import Data
@@ -216,7 +216,7 @@ def equivalent(p_value: float, score: float) -> float:
     """Return chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
     if p_value <= 1e-290:
         return score
-    return chi2_of_one(p_value)
+    return float(chdtri(1, p_value))
 
 
 def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.0) -> float:
@@ -243,7 +243,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.
     if effect.parameter_free:
         # The size is predicted: a free one would be charged.
         gain += max(math.log(gain) - 0.45, 0.0)
-    local = float(chi2_beyond(gain, sizes))
+    local = float(chdtrc(sizes, gain))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
     if local > 1e-290:
         worth = equivalent(trials.global_p_value(local), gain)

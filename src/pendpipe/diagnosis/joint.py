@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
-from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.analysis.fit.least_squares import bounded_least_squares
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis import Progress
@@ -648,7 +648,7 @@ class Joint:
         """Return the probability that chance gains as much anywhere in the catalogue."""
         freedom = lead.effect.sizes * (1 if self.is_shared(lead.effect) else len(self.members))
         everywhere = self._loudest.detection.chance.everywhere
-        return float(everywhere.global_p_value(float(chi2_beyond(max(gain, 0.0), max(freedom, 1)))))
+        return float(everywhere.global_p_value(float(chdtrc(max(freedom, 1), max(gain, 0.0)))))
 
 
 def _weighed(own: Rival, rivals: Sequence[Rival]) -> Named:
@@ -660,7 +660,7 @@ def _weighed(own: Rival, rivals: Sequence[Rival]) -> Named:
 
 def _worth(gain: float, freedom: int) -> float:
     beyond = gain - SIZE_CHARGE * (freedom - 1)
-    return equivalent(float(chi2_beyond(max(gain, 0.0), freedom)), beyond)
+    return equivalent(float(chdtrc(freedom, max(gain, 0.0))), beyond)
 
 
 def _held(found: Search) -> Sequence[int]:

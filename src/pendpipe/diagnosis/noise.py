@@ -8,11 +8,11 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
+from scipy.fft import dct, idct
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.log_variance import Smooth, Squares, log_variance
-from pendpipe.diagnosis.numerics import cosines, from_cosines
 
 _HARMONICS: Final = 7
 _HARMONIC_HALF_WIDTH: Final = 0.08
@@ -85,7 +85,7 @@ class Noise:
             return np.asarray((columns.T * (self.scale * scale)).T)
         # The transform is much faster on contiguous memory.
         rows = np.multiply(columns.T, self.scale, order="C")
-        return np.asarray((cosines(rows) * scale).T)
+        return np.asarray((dct(rows, norm="ortho") * scale).T)
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
         """Apply the transpose of `whiten`: from white numbers back to weights of readings."""
@@ -93,7 +93,7 @@ class Noise:
         if not self.coloured:
             return np.asarray((columns.T * (self.scale * scale)).T)
         rows = np.multiply(columns.T, scale, order="C")
-        return np.asarray((from_cosines(rows) * self.scale).T)
+        return np.asarray((idct(rows, norm="ortho") * self.scale).T)
 
     @property
     def scale(self) -> FloatArray:
@@ -158,14 +158,14 @@ class Noise:
         if not len(self.starts):
             return np.zeros(len(rows))
         rows = rows[:, : len(self.variance)]
-        rows = rows if self.coloured else cosines(rows)
+        rows = rows if self.coloured else dct(rows, norm="ortho")
         energy = np.add.reduceat(rows**2, self.starts, axis=1)
         return np.asarray(np.einsum("km,mn,kn->k", energy, self.uncertainty, energy, optimize=True))
 
     def misfit(self, residual: FloatArray) -> float:
         """Return the mean square about the harmonics of a whitened residual: 1 for noise alone."""
         white = residual[: len(self.variance)]
-        white = white if self.coloured else cosines(white)
+        white = white if self.coloured else dct(white, norm="ortho")
         return float(np.mean(white[self.harmonics] ** 2)) if self.harmonics.any() else 1.0
 
     def log_variance_at(self, cosine: FloatArray) -> FloatArray:
@@ -267,7 +267,7 @@ def _with_spectrum(
     slow, fast = _smooth_spectra(count)
     smooth = [slow if red else Smooth(slow.columns, (0.0,)), fast]
     filled = count / max(float(np.sum(noise.weight > 0.0)), 1.0)
-    power = cosines(residual * noise.scale) ** 2 * filled
+    power = dct(residual * noise.scale, norm="ortho") ** 2 * filled
     found = log_variance(Squares(power, noise_only, starts, _SLOWEST_LINE), smooth)
     if found.constant > 0.5:
         width = np.diff(np.append(starts, count))
@@ -311,10 +311,10 @@ def _change_of_level(
     bins: int = min(_LEVEL_BINS, count // _FEWEST_IN_BIN)
     if bins < 4:
         return None, 0.0
-    white = cosines(residual * noise.scale) / np.sqrt(noise.variance)
+    white = dct(residual * noise.scale, norm="ortho") / np.sqrt(noise.variance)
     used = noise.weight > 0.0
     share = float(np.mean(noise_only))
-    square = from_cosines(white * noise_only) ** 2
+    square = idct(white * noise_only, norm="ortho") ** 2
     square = np.minimum(square / np.median(square[used]), _LARGEST_SQUARE)
     kept = square[used]
     independent = share * min(2.0 * float(np.mean(kept)) ** 2 / float(np.var(kept)), 1.0)

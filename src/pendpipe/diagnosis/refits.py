@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from scipy.special import chdtrc
 
-from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Detection, Lead
@@ -124,7 +124,7 @@ def _worth_refitting(detection: Detection, phase_lost: bool, most: int, wide: bo
 
 def _rank(lead: Lead) -> float:
     """Return what a score is worth with the noise as it is, as the refits are ranked later."""
-    local = float(chi2_beyond(lead.score, max(lead.effect.sizes, 1)))
+    local = float(chdtrc(max(lead.effect.sizes, 1), max(lead.score, 0.0)))
     return equivalent(local, lead.score) + lead.effect.prior
 
 

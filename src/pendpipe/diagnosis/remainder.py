@@ -15,11 +15,11 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
+from scipy.fft import dct
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.numerics import cosines
 from pendpipe.diagnosis.refine import Fit
 
 _INCOMPLETE: Final = 1.14
@@ -136,4 +136,4 @@ def by_cycle(
 
 
 def _powers(row: FloatArray) -> FloatArray:
-    return np.asarray(cosines(row) ** 2)
+    return np.asarray(dct(row, norm="ortho") ** 2)

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import betainc, chdtrc
 
-from pendpipe.analysis.distributions import beta_below, chi2_beyond
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, pulled
@@ -269,14 +269,12 @@ def local_p_values(
     Where the variance of the noise is uncertain, by v in its logarithm, as if it were estimated
     from 2/v squares: by Fisher's distribution instead of chi^2.
     """
-    found = np.empty_like(scores)
-    for width in np.unique(freedom).astype(int).tolist():
-        found[freedom == width] = chi2_beyond(scores[freedom == width], width)
+    found = np.asarray(chdtrc(freedom, np.maximum(scores, 0.0).T).T)
     if log_scale_variance is not None:
         unsure = log_scale_variance > _KNOWN
         squares = 2.0 / log_scale_variance[unsure]
         share = squares / (squares + scores[unsure])
-        found[unsure] = beta_below(0.5 * squares, 0.5 * freedom[unsure], share)
+        found[unsure] = betainc(0.5 * squares, 0.5 * freedom[unsure], share)
     return found
 
 

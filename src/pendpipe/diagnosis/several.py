@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from scipy.special import chdtrc
 
-from pendpipe.analysis.distributions import chi2_beyond
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
@@ -211,7 +211,7 @@ class _Answer:
     def _p_value(self, model: Together) -> float:
         """Return the global p-value of the largest score, and of what sharing costs."""
         chi2, freedom = self.joint.disagreement(model)
-        shared = float(chi2_beyond(chi2, max(freedom, 1)))
+        shared = float(chdtrc(max(freedom, 1), chi2))
         leads = self.joint.leads(model)
         scores = [self.joint.p_value(lead, lead.score) for lead in leads]
         return min(1.0, 2.0 * min([shared, *scores]))
@@ -282,7 +282,7 @@ class _Answer:
             name,
             values,
             gain,
-            float(chi2_beyond(gain, more)),
+            float(chdtrc(more, gain)),
             1.0,
             (),
             "record each of them once more, in another order",
@@ -332,7 +332,7 @@ class _Answer:
         alone = self.joint.chi2_alone(self.together, number)
         chi2 = max(self.together.chi2 - rest.chi2 - alone, 0.0)
         freedom = max(self.together.layout.shared - rest.layout.shared, 1)
-        return {"chi2": chi2, "dof": freedom, "p_value": float(chi2_beyond(chi2, freedom))}
+        return {"chi2": chi2, "dof": freedom, "p_value": float(chdtrc(freedom, chi2))}
 
     def _prediction(self, number: int, rest: Together) -> dict[str, Any] | None:
         """Predict a recording from the others; its start is fitted to its first quarter.

@@ -12,8 +12,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.local import residual_of
+from pendpipe.diagnosis.forensics.weighted_squares import tail_of_squares
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.numerics import tail_of_squares
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Location
 from pendpipe.diagnosis.scores import tangent_basis

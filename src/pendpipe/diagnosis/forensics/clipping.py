@@ -6,8 +6,8 @@ import math
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
-from pendpipe.analysis.distributions import log_normal_below
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
@@ -113,7 +113,7 @@ def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
     """Probability that no reading goes beyond, averaged over the common error."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
     shifted = (room[:, None] + common * nodes) / spread[:, None]
-    chance = np.exp(np.sum(log_normal_below(shifted), axis=0))
+    chance = np.exp(np.sum(log_ndtr(shifted), axis=0))
     return float(min(chance @ weights / weights.sum(), 1.0))
 
 

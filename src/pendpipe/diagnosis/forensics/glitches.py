@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from scipy.special import bdtrc
 
-from pendpipe.analysis.distributions import binomial_at_least
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
@@ -220,7 +220,7 @@ def _smallest_p_value(sorted_error: FloatArray, step: float) -> float:
             break  # not larger than noise
         tail = fit_tail(sorted_error, k, step=step)
         chance = float(tail.beyond(sorted_error[count - k]))
-        p_value = binomial_at_least(k, count, min(chance, 1.0))
+        p_value = float(bdtrc(k - 1, count, min(chance, 1.0)))
         share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
         best = min(p_value / share, best)
     return best

@@ -14,8 +14,8 @@ from pendpipe.diagnosis.forensics.codes import Coded, read_codes
 from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.lattice import rounding_moments, whole_readings
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
+from pendpipe.diagnosis.forensics.weighted_squares import tail_of_squares
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.numerics import tail_of_squares
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Location
 from pendpipe.estimate import Estimate

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import ndtr
 
-from pendpipe.analysis.distributions import normal_below
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
@@ -200,7 +200,7 @@ def noise_before_rounding(local: Local, step: float) -> float:
     best, most = 0.0, -np.inf
     for ratio in _NOISE_RATIOS:
         spread = ratio * np.sqrt(1.0 + extra)
-        chance = normal_below((left + 0.5) / spread) - normal_below((left - 0.5) / spread)
+        chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
         likelihood = float(np.sum(np.log(np.maximum(chance, 1e-12))))
         if likelihood > most:
             best, most = ratio, likelihood
@@ -225,7 +225,7 @@ def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, Fl
     grid = np.linspace(-0.5, 0.5, 65)
     reach = int(np.ceil(5.0 * ratio)) + 1
     codes = np.arange(-reach, reach + 1)
-    chance = normal_below((codes + 0.5 - grid[:, None]) / ratio) - normal_below(
+    chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(
         (codes - 0.5 - grid[:, None]) / ratio
     )
     error = codes - grid[:, None]

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.fft import dct, idct
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.numerics import cosines, from_cosines
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.unwrapped import unwrapped
 
@@ -103,7 +103,7 @@ def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
         return residual / math.sqrt(float(noise.variance[0]))
     count = len(residual)
     inverse = 1.0 / noise.variance
-    filtered = from_cosines(cosines(residual) * inverse)
+    filtered = idct(dct(residual, norm="ortho") * inverse, norm="ortho")
     # (S^-1)_jj = (2/n) sum of cos^2(pi k (2 j + 1)/(2 n))/S_k, from a sum of cosines.
     doubled = np.fft.rfft(inverse, n=2 * count).real
     odd = 2 * np.arange(count) + 1
@@ -125,7 +125,7 @@ def whitened_series(residual: FloatArray, noise: Noise) -> tuple[FloatArray, flo
     unit = 1.0 / math.sqrt(float(np.mean(inverse)))
     if not noise.coloured:
         return residual / unit, unit
-    return from_cosines(cosines(residual) * np.sqrt(inverse)), unit
+    return idct(dct(residual, norm="ortho") * np.sqrt(inverse), norm="ortho"), unit
 
 
 def local_residual(

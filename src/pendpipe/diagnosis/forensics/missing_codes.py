@@ -6,8 +6,8 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.special import gammainc, gammaincc, ndtr
 
-from pendpipe.analysis.distributions import normal_below, poisson_from, poisson_up_to
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
@@ -95,7 +95,7 @@ def _expected(position: FloatArray, first: int, size: int, spread: float) -> Flo
     reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
     # Expectation of a code: its probability about its middle, summed over the cells.
     offset = (np.arange(-reach, reach) + 0.5) / fine
-    kernel = normal_below((offset + 0.5) / spread) - normal_below((offset - 0.5) / spread)
+    kernel = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
     length = 2 ** math.ceil(math.log2(len(cells) + 2 * reach))
     smooth = np.fft.irfft(np.fft.rfft(cells, length) * np.fft.rfft(kernel, length), length)
     start = reach + fine // 2 - 1
@@ -107,8 +107,8 @@ def _chances(occupation: Occupation) -> FloatArray:
     tested = occupation.low > _FEWEST_EXPECTED
     found = occupation.found
     # P(N <= found) at the smallest expectation, P(N >= found) at the largest.
-    fewer = poisson_up_to(found, occupation.low)
-    more = poisson_from(found, occupation.high)
+    fewer = gammaincc(found + 1.0, occupation.low)
+    more = gammainc(found, occupation.high)
     chance = np.where(tested, 2.0 * np.minimum(fewer, more), 1.0)
     return np.asarray(np.minimum(chance, 1.0)) if tested.any() else np.zeros(0)
 
@@ -136,7 +136,7 @@ def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[tuple[int, float], 
         effective = len(coded.code) / max(1.0, _in_a_half(coded, run))
         excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
         worst = int(np.argmax(excess))
-        p_value = float(2.0 * normal_below(-excess[worst]))
+        p_value = float(2.0 * ndtr(-excess[worst]))
         if p_value < chance:
             best, chance = (bit, float(found[worst])), p_value
     return best, min(1.0, tried * chance)
@@ -290,7 +290,7 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
         odd = tested & ((found < low - 2.0 * np.sqrt(low)) | (found > high + 2.0 * np.sqrt(high)))
         chance = np.ones(period)
         if odd.any():
-            fewer, more = poisson_up_to(found[odd], low[odd]), poisson_from(found[odd], high[odd])
+            fewer, more = gammaincc(found[odd] + 1.0, low[odd]), gammainc(found[odd], high[odd])
             chance[odd] = 2.0 * np.minimum(fewer, more)
         at = int(np.argmin(chance))
         if chance[at] < best.p_value:

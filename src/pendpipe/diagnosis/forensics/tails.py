@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.special import gammaln, stdtr
 
-from pendpipe.analysis.distributions import each, student_beyond
 from pendpipe.arrays import FloatArray
 
 _INVERSE_NU: Final = (
@@ -61,7 +61,7 @@ class Tail:
         """Return P(|error| > size), for sizes above half a step; shape of `size`."""
         rounding, share = _rounding(self.step)
         ratio = (np.asarray(size)[..., None, None] - rounding[:, None]) / self.scale
-        return np.asarray(share @ student_beyond(self.freedom, ratio) @ self.weight)
+        return np.asarray(2.0 * share @ stdtr(self.freedom, -np.abs(ratio)) @ self.weight)
 
     @property
     def inverse_freedom(self) -> float:
@@ -147,8 +147,8 @@ def _rounding(step: float) -> tuple[FloatArray, FloatArray]:
 def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
     """Logarithm of Student's density at zero."""
     return np.asarray(
-        each(math.lgamma, 0.5 * (freedom + 1.0))
-        - each(math.lgamma, 0.5 * freedom)
+        gammaln(0.5 * (freedom + 1.0))
+        - gammaln(0.5 * freedom)
         - 0.5 * np.log(math.pi * freedom)
         - np.log(scale)
     )

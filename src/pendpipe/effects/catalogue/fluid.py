@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pendpipe.effects.effect import Parameter, Pendulum, Span, enters
 from pendpipe.effects.scan import (
@@ -44,6 +42,8 @@ def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray
     is a viscous friction and an added mass.
     """
     root = np.sqrt(_local_rate(motion))
+    from scipy.special import erfcx
+
     faded = erfcx(root * np.sqrt(since_release(motion, pendulum)))
     # x = Re(X), X = upwards r e^(i psi), and V = i omega X.
     swinging = motion.upwards * motion.amplitude * (motion.clock.cosine + 1j * motion.clock.sine)
@@ -101,33 +101,3 @@ def vortex_shedding(
     burst = np.exp(-phase_since_reversal(motion) / lasts)
     size = math.pi * pendulum.angular_frequency * loss / work
     return np.asarray(-size * motion.direction * above * burst)
-
-
-_TERMS: Final = 32
-"""For nine figures at least."""
-
-Complex = NDArray[np.complex128]
-
-
-def erfcx(z: Complex) -> Complex:
-    """Return e^(z^2) erfc(z) for Re z >= 0, as Weideman (1994) sums it.
-
-    With L = sqrt(N/sqrt 2) and Z = (L - z)/(L + z),
-    erfcx(z) = 2 p(Z)/(L + z)^2 + 1/(sqrt(pi) (L + z)), p a polynomial of N terms.
-    """
-    scale = np.sqrt(_TERMS / np.sqrt(2.0))
-    down = 1.0 / (scale + z)
-    found = 2.0 * np.polyval(_polynomial(), (scale - z) * down) * down**2
-    return np.asarray(found + down / np.sqrt(np.pi))
-
-
-@lru_cache(maxsize=1)
-def _polynomial() -> NDArray[np.float64]:
-    """Coefficients of p, the highest power first."""
-    half = 2 * _TERMS
-    scale = np.sqrt(_TERMS / np.sqrt(2.0))
-    theta = np.arange(-half + 1, half) * np.pi / half
-    t = scale * np.tan(0.5 * theta)
-    weight = np.append(0.0, np.exp(-(t**2)) * (scale**2 + t**2))
-    found = np.fft.fft(np.fft.fftshift(weight)).real / (2.0 * half)
-    return np.asarray(found[_TERMS:0:-1])

@@ -1,71 +1,14 @@
-"""Numerics that would otherwise need scipy, whose import takes as long as a whole fit.
-
-The cosine transform, and tails of weighted sums of squares.
-"""
+"""Tails of weighted sums of squares of normal numbers, for which scipy has no function."""
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from pendpipe.arrays import FloatArray
-
-_Complex = NDArray[np.complex128]
-
-
-def cosines(rows: FloatArray) -> FloatArray:
-    """Return c_k = sqrt((2 - [k = 0])/n) sum over j of x_j cos(pi k (2 j + 1)/(2 n)), last axis.
-
-    It is the Fourier transform of the even entries followed by the odd ones backwards, with
-    rotated phases (Makhoul 1980). Single precision stays single.
-    """
-    count = rows.shape[-1]
-    if count < 2:
-        return np.array(rows)
-    half = (count + 1) // 2
-    mixed = np.empty(rows.shape, dtype=rows.dtype)
-    mixed[..., :half] = rows[..., ::2]
-    mixed[..., half:] = rows[..., 1::2][..., ::-1]
-    turned = np.fft.rfft(mixed)
-    turned *= _turn(count).astype(turned.dtype)
-    found = mixed
-    lines = turned.shape[-1]
-    found[..., :lines] = turned.real
-    found[..., lines:] = -turned.imag[..., count - lines : 0 : -1]
-    return found
-
-
-def from_cosines(rows: FloatArray) -> FloatArray:
-    """Return the inverse of `cosines` (and its transpose), last axis."""
-    count = rows.shape[-1]
-    if count < 2:
-        return np.array(rows)
-    lines = count // 2 + 1
-    turned = np.empty((*rows.shape[:-1], lines), dtype=np.result_type(rows.dtype, np.complex64))
-    turned.real = rows[..., :lines]
-    turned.imag[..., 0] = 0.0
-    turned.imag[..., 1:] = -rows[..., : count - lines : -1]
-    turned /= _turn(count).astype(turned.dtype)
-    mixed = np.fft.irfft(turned, n=count)
-    half = (count + 1) // 2
-    found = np.empty(rows.shape, dtype=rows.dtype)
-    found[..., ::2] = mixed[..., :half]
-    found[..., 1::2] = mixed[..., half:][..., ::-1]
-    return found
-
-
-@lru_cache(maxsize=8)
-def _turn(count: int) -> _Complex:
-    """Return sqrt(2/n) e^(-i pi k/(2 n)), with the scale of the constant term."""
-    order = np.arange(count // 2 + 1)
-    turn = np.sqrt(2.0 / count) * np.exp(-0.5j * np.pi * order / count)
-    turn[0] = np.sqrt(1.0 / count)
-    return np.asarray(turn)
-
 
 _NEWTON_ROUNDS: Final = 60
 
@@ -104,7 +47,7 @@ def tail_of_squares(total: float, weight: FloatArray) -> float:
     v = tilt * math.sqrt(curvature)
     if abs(w) < 1e-6 or v / w <= 0.0:
         return 0.5
-    return _upper_tail(w + math.log(v / w) / w)
+    return float(ndtr(-w - math.log(v / w) / w))
 
 
 def _saddlepoint(total: float, weight: FloatArray) -> float:
@@ -132,8 +75,3 @@ def _saddlepoint(total: float, weight: FloatArray) -> float:
             return trial
         tilt = trial
     return tilt
-
-
-def _upper_tail(z: float) -> float:
-    """Return P(a standard normal number > z)."""
-    return 0.5 * math.erfc(z / math.sqrt(2.0))
