@@ -112,6 +112,11 @@ def test_a_hidden_cause_is_in_the_class(hidden: str, size: float) -> None:
     found = inside[hidden].fit.size(inside[hidden].position)
     assert abs(found.value - size) < 4.0 * found.sd
     assert len(answer.found) == 1
+    # Each other cause is excluded, and by more than the records tell the members apart.
+    assert not set(inside) & set(answer.excluded)
+    tried = {one.effect.identifier for one in candidates(design)}
+    assert set(inside) | set(answer.excluded) == tried
+    assert min(answer.excluded.values()) > 0.0
 
 
 def test_what_only_the_benchmark_separates_is_lost_without_it() -> None:
