@@ -419,3 +419,143 @@ def test_an_old_workbook_as_phyphox_writes_it(read_as: Callable[..., Recording])
     cells: list[list[str | float]] = [["Time (s)", "Tilt (deg)"]]
     cells += [[t, x] for t, x in zip(TIME.tolist(), DEGREES.tolist(), strict=True)]
     same(read_as(old_workbook(cells), "a.xls"))
+
+
+# --- how people and programs write tables ----------------------------------------------------
+
+
+def _sexagesimal(degrees: float) -> str:
+    seconds = round(3600 * abs(degrees))
+    whole, rest = divmod(seconds, 3600)
+    return f"{'-' if degrees < 0 else ''}{whole}°{rest // 60:02d}'{rest % 60:02d}\""
+
+
+def _octave(**columns: Floats) -> str:
+    head = "# Created by Octave 6.4.0, Mon May 06 11:02:01 2024 CEST <lab@pc>\n"
+    return head + "".join(
+        f"# name: {name}\n# type: matrix\n# rows: 3000\n# columns: 1\n"
+        + "".join(f" {x:.6f}\n" for x in values)
+        + "\n\n"
+        for name, values in columns.items()
+    )
+
+
+TABLES = {
+    "units in the cells": "t,angle\n"
+    + "".join(f"{t:.2f} s,{x:.3f} deg\n" for t, x in zip(TIME, DEGREES, strict=True)),
+    "signs of degrees and decimal commas in the cells": "Zeit;Auslenkung\n"
+    + "".join(f"{t:.2f} s;{x:.3f}°\n" for t, x in zip(TIME, DEGREES, strict=True)).replace(
+        ".", ","
+    ),
+    "degrees, minutes and seconds": "time,angle\n"
+    + "".join(f"{t:.2f},{_sexagesimal(x)}\n" for t, x in zip(TIME, DEGREES, strict=True)),
+    "a web page": "<!DOCTYPE html><html><head><title>run</title></head><body><table>"
+    "<tr><th>Time (s)</th><th>Angle (deg)</th></tr>\n"
+    + "".join(
+        f"<tr>\n <td>{t:.2f}</td><td>{x:.3f}</td></tr>" for t, x in zip(TIME, DEGREES, strict=True)
+    )
+    + "</table></body></html>",
+    "columns below one another": _octave(t=TIME, phi=ANGLE),
+    "statistics below the table": "Time (s),Angle (deg)\n"
+    + rows(TIME, DEGREES)
+    + "\nMean,-0.103\nStd. Dev.,9.12\nN,3000\n",
+    "numbers of the rows without a name": '"time" "angle"\n'
+    + "".join(f'"{n}" {t:.2f} {x:.5f}\n' for n, (t, x) in enumerate(zip(TIME, ANGLE, strict=True))),
+    "one column with a unit": "Sample rate: 50 Hz\nAngular position (deg)\n" + rows(DEGREES),
+}
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_angles_in_a_table_with(read_as: Callable[..., Recording], kind: str) -> None:
+    same(read_as(TABLES[kind], "a.txt"))
+
+
+@pytest.mark.parametrize(
+    ("head", "encoding"),
+    [
+        ("时间(s),角度(°)", "gb18030"),
+        ("時間[s],角度[deg]", "cp932"),
+        ("시간(s),각도(°)", "cp949"),
+        ("Время (с),Угол (град)", "cp1251"),
+        ("temps (s),élongation (°)", "cp1252"),
+    ],
+)
+def test_headers_in_the_encodings_of_older_programs(
+    read_as: Callable[..., Recording], head: str, encoding: str
+) -> None:
+    recording = read_as((head + "\n" + rows(TIME, DEGREES)).encode(encoding))
+    same(recording)
+    assert not recording.weak_guesses
+
+
+def test_runs_beside_one_another_may_share_their_time(read_as: Callable[..., Recording]) -> None:
+    head = "time (s),run1,run2\n"
+    recording = read_as(head + rows(TIME, DEGREES, 0.7 * DEGREES))
+    same(recording)
+    assert "'run1' (not run2)" in recording.weak_guesses[0]
+
+
+def test_the_newest_row_may_lie_beyond_midnight(read_as: Callable[..., Recording]) -> None:
+    clock = [(86370 + t) % 86400 for t in TIME.tolist()]
+    stamps = [f"{int(s // 3600):02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in clock]
+    lines = [f"{stamp},{x:.5f}" for stamp, x in zip(stamps, ANGLE, strict=True)]
+    same(read_as("time,angle (rad)\n" + "\n".join(lines[::-1]) + "\n"))
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_clock_of_few_bits_begins_again_at_zero(
+    read_as: Callable[..., Recording], bits: int
+) -> None:
+    ticks = (1e3 * TIME + 2**bits - 20_000) % 2**bits
+    head = "millis,angle (rad)\n"
+    same(read_as(head + "".join(f"{t:.0f},{x:.5f}\n" for t, x in zip(ticks, ANGLE, strict=True))))
+
+
+def test_the_rate_of_the_header_tells_what_a_clock_ticks(
+    read_as: Callable[..., Recording],
+) -> None:
+    head = "// Update Rate: 50.0Hz\nPacketCounter\tSampleTimeFine\tPitch (deg)\n"
+    ticks = [f"{900 + n}\t{400_000 + 200 * n}\t{x:.4f}\n" for n, x in enumerate(DEGREES)]
+    recording = read_as(head + "".join(ticks), "a.txt")
+    same(recording)
+    assert not recording.weak_guesses
+
+
+def test_of_a_phone_the_axis_is_read_that_swings_once_a_cycle(
+    read_as: Callable[..., Recording],
+) -> None:
+    """Along the string a phone is pulled twice in each cycle, and more than across it."""
+    along = 9.81 * np.cos(ANGLE) + LENGTH_M * RATE**2
+    across = 0.03 * ANGLE
+    head = "Time (s),acceleration x (m/s^2),acceleration y (m/s^2),acceleration z (m/s^2)\n"
+    recording = read_as(head + rows(TIME, STILL, along, across))
+    np.testing.assert_allclose(recording.values, across, atol=1e-5)
+
+
+def test_heights_above_the_floor_are_no_distances_from_a_pivot(
+    read_as: Callable[..., Recording],
+) -> None:
+    x, height = LENGTH_M * np.sin(ANGLE), 1.1 - LENGTH_M * np.cos(ANGLE)
+    recording = read_as("t (s),x (m),y (m)\n" + rows(TIME, x, height))
+    same(recording, x, "m")
+
+
+def test_a_position_whose_period_grows_as_an_angles_is_one(
+    read_as: Callable[..., Recording],
+) -> None:
+    """Robots publish joints so; a length of 0.6 m swings otherwise."""
+    same(read_as("time (s),position\n" + rows(TIME, ANGLE)))
+    assert read_as("time (s),position\n" + rows(TIME, LENGTH_M * np.sin(ANGLE))).unit == "m"
+
+
+def test_an_attribute_of_an_array_may_give_its_rate(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        angle = file.create_dataset("run/angle", data=ANGLE)
+        angle.attrs["sample_rate"], angle.attrs["units"] = RATE_HZ, "rad"
+    same(read(tmp_path / "a.h5"))
+
+
+def test_a_list_of_periods_is_refused_as_such(read_as: Callable[..., Recording]) -> None:
+    with pytest.raises(InputError, match="periods alone tell no loss"):
+        read_as("Time (s),GateState,Period (s)\n" + "".join(f"{2 * n},1,1.6\n" for n in range(60)))

@@ -14,7 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.samples import Swing, derivative_slope, swing_of
 from pendpipe.formats.table import Column, ReadOptions, Table
-from pendpipe.formats.words import Role, role_of, unit_of
+from pendpipe.formats.words import Role, plain, role_of, unit_of
 
 _WORTH: Final[Mapping[Role, float]] = {
     "angle": 6.0,
@@ -119,7 +119,18 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     if not table.columns:
         raise InputError(table.place, "there is no column of numbers", "give time and readings")
     roles = {column.number: meaning(column) for column in table.columns}
+    for column in table.columns:
+        # "run1" counts nothing where it swings.
+        if roles[column.number] == "index" and swing_of(column.values).clear:
+            roles[column.number] = "unknown"
     table = replace(table, columns=_whole_times(table.columns, roles))
+    table = replace(
+        table,
+        columns=tuple(
+            replace(c, values=_counted_on(c.values)) if roles[c.number] == "time" else c
+            for c in table.columns
+        ),
+    )
     own_clock = [column for column in table.columns if column.time_s is not None]
     time, counts = (None, False) if own_clock else _time(table, options, roles)
     channels = tuple(column for column in table.columns if column is not time)
@@ -146,10 +157,13 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         )
     if not readings and reading:
         names = listed([column.label for column in table.columns])
+        timed = any(plain(column.name).startswith("period") for column in table.columns)
         raise InputError(
             table.place,
             f"no column looks like the motion of a pendulum (found {names})",
-            "name it with --column (and its unit with --unit)",
+            "give the recording of the swing: periods alone tell no loss"
+            if timed
+            else "name it with --column (and its unit with --unit)",
         )
     if others:
         notes = (*notes, f"the first of several runs is read; choose with --column: {others}")
@@ -213,6 +227,18 @@ def _whole_times(columns: tuple[Column, ...], roles: Mapping[int, Role]) -> tupl
             one = replace(whole, values=whole.values + fraction, unit="s")
             return tuple(one if c is whole else c for c in columns if c is not part)
     return columns
+
+
+def _counted_on(values: FloatArray) -> FloatArray:
+    """Count on where a clock of 16 or 32 bits begins again at 0 (``micros()`` after 71 minutes)."""
+    steps = np.diff(values)
+    for turn in (2.0**16, 2.0**32):
+        over = steps < -0.5 * turn
+        if over.any() and values.max() < turn:
+            across = np.abs(steps[over] + turn).max()
+            if across < 10.0 * np.median(np.abs(steps)):
+                return np.asarray(values + turn * np.append(0, np.cumsum(over)))
+    return values
 
 
 def one_way(values: FloatArray) -> float:
@@ -295,7 +321,7 @@ def _of_one_run(
     if end is None:
         return channels, ""
     mine = [c for c in channels if time.number < c.number < end]
-    if not any(_WORTH[roles[c.number]] > 0.5 for c in mine):
+    if not any(_WORTH[roles[c.number]] > 0.5 and _moves(c) for c in mine):
         return channels, ""
     wanted = [c.number - time.number for c in mine]
     others = [c.label for c in channels if any(c.number - number in wanted for number in clocks)]
@@ -376,6 +402,11 @@ def _of_equals(
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
     if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
         return first, ""
+    for column, swing in zip(equals, decaying, strict=True):
+        # Height, and the pull along the string, go through two cycles in one of the swing.
+        ratio = swing.samples_per_cycle / (decaying[0].samples_per_cycle or np.inf)
+        if swing.clear and abs(ratio - 2.0) < 0.05:
+            return column, f", of which '{first[0].label}' has twice the frequency"
     largest = max(swings[c[0].number].amplitude for c in equals)
     for column in equals:
         if swings[column[0].number].amplitude >= largest / 3:
@@ -478,8 +509,10 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     angle = np.arctan2(x, np.abs(y))
     if np.std(radius) > 0.3 * np.std(x) or abs(np.median(angle)) > 0.4 or not swing_of(x).clear:
         return False
-    if named or not np.ptp(x**2) > 0.0 or not np.ptp(np.abs(y)) > 0.0:
+    if not np.ptp(x**2) > 0.0 or not np.ptp(np.abs(y)) > 0.0:
         return named
-    # On a circle y follows x squared; two columns without names must show it.
-    follows = np.corrcoef(x**2, np.abs(y))[0, 1] < -0.5 and np.std(radius) < 0.5 * np.std(y)
-    return bool(follows) and one_way(y) < 0.9
+    # On a circle y falls with x squared; two columns without names must show it.
+    follows = float(np.corrcoef(x**2, np.abs(y))[0, 1])
+    if named:
+        return follows < 0.5
+    return follows < -0.5 and bool(np.std(radius) < 0.5 * np.std(y)) and one_way(y) < 0.9

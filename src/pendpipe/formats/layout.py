@@ -14,6 +14,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.table import NotThisFormatError, ReadOptions
+from pendpipe.formats.words import unit_of
 
 _NAMES: Final = {
     "tab": "\t",
@@ -83,7 +84,10 @@ class Layout:
         cell = self.ungrouped(cell)
         if self.decimal == ",":
             cell = "x" if "." in cell else cell.replace(",", ".")
-        return _NUMBER.fullmatch(cell) is not None
+        if _NUMBER.fullmatch(cell) is not None:
+            return True
+        parts = _WITH_UNIT.fullmatch(cell)
+        return parts is not None and unit_of(parts[2]) is not None
 
     def kinds(self, cells: Iterable[str]) -> str:
         """Say what each cell is, by a letter: number, clock time or date, blank, text."""
@@ -332,7 +336,7 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     if min(days.values()) < 0:
         return None
     if seconds.max() < 86400:
-        seconds += 86400.0 * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -43200)
+        seconds -= 86400.0 * np.cumsum(np.rint(np.diff(seconds, prepend=seconds[0]) / 86400.0))
     return seconds
 
 

@@ -124,6 +124,9 @@ def _unit(
         return _Guess(_UNKNOWN, "(one of x, y, z) has no unit: analysed in its own", weak=True)
     if role == "length":
         if reach <= 2.0:
+            grown = _by_period(column, time_s, named=False)
+            if grown is not None and not grown.weak:
+                return grown
             return _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
         return _Guess(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
@@ -200,14 +203,10 @@ def _by_size(
                 _UNKNOWN, f"has no unit and swings by {reach:.4g}: analysed in its own", True
             )
         return _Guess(_DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True)
+    grown = _by_period(column, time_s, named=named)
+    if grown is not None:
+        return grown
     slope = follows_sine(time_s, column.values, 1.0)
-    if slope is not None and abs(slope - 1.0) < 0.35:
-        why = "is taken to be in radians (its period grows as such swings' does)"
-        # Of a pendulum 1 m long (2 s) metres look the same.
-        usual = float(np.median(periods(time_s, column.values)[0]))
-        if not named and abs(usual - 2.0) < 0.3:
-            return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", weak=True)
-        return _Guess(_RADIAN, why)
     if slope is not None and abs(slope) < 0.35 and reach > 0.35:
         # No pendulum of so many radians: a torsion pendulum, or another unit.
         odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
@@ -218,6 +217,19 @@ def _by_size(
             return _Guess(_RADIAN, f"{odd}: taken to be radians of a torsion pendulum", True)
         return _Guess(_UNKNOWN, f"{odd}: analysed in its own", weak=True)
     return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
+
+
+def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | None:
+    """Take for radians what is swung through ever faster, just as such an angle is."""
+    slope = follows_sine(time_s, column.values, 1.0)
+    if slope is None or abs(slope - 1.0) >= 0.35:
+        return None
+    why = "is taken to be in radians (its period grows as such swings' does)"
+    # Of a pendulum 1 m long (2 s) metres look the same.
+    usual = float(np.median(periods(time_s, column.values)[0]))
+    if not named and abs(usual - 2.0) < 0.3:
+        return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", weak=True)
+    return _Guess(_RADIAN, why)
 
 
 def _by_step(finite: FloatArray) -> _Guess | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import unescape
 from pathlib import Path
 from typing import Final
 
@@ -24,13 +25,15 @@ from pendpipe.formats.layout import (
     is_comment,
 )
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
-from pendpipe.formats.words import split_header, unit_of
+from pendpipe.formats.words import role_of, split_header, unit_of
 
 _CONTROLS: Final = bytes([*range(1, 9), *range(14, 27)])
 _BLANKS: Final = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{FIGURE SPACE}\N{THIN SPACE}"
 """What is typeset between thousands; without them whatever splits at blanks splits a number."""
 _WIDEST: Final = 64
 """Cells that a row may have, however narrow the others are; else at most four times theirs."""
+_EASTERN: Final = re.compile("时间|時間|角度|시간|각도|(?i:время|угол|отклонение)")
+"""Words of a header by which the encodings of the East are told from one another."""
 _LARGEST: Final = 512 << 20
 """Bytes of a table: ten million rows. Its lines and cells take some five times that."""
 _LONGEST_LINE: Final = 1 << 20
@@ -57,6 +60,9 @@ def decode(data: bytes) -> str:
     try:
         return _unified(data.decode("utf-8-sig"))
     except UnicodeDecodeError:
+        for encoding in ("gb18030", "big5", "cp932", "cp949", "cp1251"):
+            if _EASTERN.search(head.decode(encoding, errors="replace")):
+                return _unified(data.decode(encoding, errors="replace"))
         return _unified(data.decode("cp1252", errors="replace"))
 
 
@@ -81,9 +87,12 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
-    lines = text.split("\n")
+    lines = _without_tags(text).split("\n")
     _refuse_long(place, lines)
     for form_of in (
+        _without_labview_heads,
+        _side_by_side,
+        _without_minutes,
         _without_cassy_limits,
         _without_arrows,
         _without_brackets,
@@ -120,6 +129,64 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         metadata=header.metadata,
         notes=(layout.description, *header.notes, *notes, *cut),
     )
+
+
+def _without_tags(text: str) -> str:
+    """Make of the tables of a web page rows with tabs."""
+    if not re.match(r"\s*<(!doctype html|html|table|meta|div)\b", text[:200], re.I):
+        return text
+    text = re.sub(r"(?is)<(style|script|title)\b.*?</\1\s*>|\s*\n\s*", " ", text)
+    text = re.sub(
+        r"(?i)</t[dh]\s*>(?!\s*</tr)", "\t", re.sub(r"(?i)</tr\s*>|<br\s*/?>", "\n", text)
+    )
+    return unescape(re.sub(r"<[^>]*>", "", text))
+
+
+def _without_labview_heads(lines: list[str]) -> list[str]:
+    """Make of the two headers that LabVIEW writes (.lvm) remarks and one row of names."""
+    ends = [row for row, line in enumerate(lines[:100]) if line.startswith("***End_of_Header***")]
+    if not ends or not lines[0].startswith("LabVIEW Measurement"):
+        return lines
+    at = ends[-1] + 1
+    told = {line.split("\t")[0]: line.split("\t")[1:] for line in lines[:at]}
+    units = ["s", *told.get("Y_Unit_Label", [])]
+    names = [name for name in lines[at].split("\t") if name not in ("Comment", "")]
+    head = [f"{n} ({u})" if u else n for n, u in zip(names, [*units, *names], strict=False)]
+    bare = told.get("X_Columns") == ["No"]  # then the rows begin with an empty cell
+    rows = [line[bare:].rstrip("\t") for line in lines[at + 1 :]]
+    return [*("# " + line for line in lines[:at]), "\t".join(head[bare:]), *rows]
+
+
+def _side_by_side(lines: list[str]) -> list[str]:
+    """Put columns that Octave saves below one another beside one another."""
+    if not lines[0].startswith("# Created by Octave"):
+        return lines
+    blocks = re.split(r"^# name: ", "\n".join(lines), flags=re.M)[1:]
+    columns = [
+        [b.split("\n", 1)[0], *re.findall(r"^ *([^#\s]+) *$", b.split("\n", 1)[-1], re.M)]
+        for b in blocks
+    ]
+    longest = max(map(len, columns), default=0)
+    columns = [column for column in columns if len(column) == longest]
+    if longest < 5:
+        return lines
+    return ["\t".join(row) for row in zip(*columns, strict=True)]
+
+
+def _without_minutes(lines: list[str]) -> list[str]:
+    """Turn degrees, minutes and seconds (``-12°05'30"``) into degrees."""
+    if not any(_MINUTES.search(line) for line in lines[:100]):
+        return lines
+    return [_MINUTES.sub(lambda m: f"{m[1]}{_degrees(m):.9g}°", line) for line in lines]
+
+
+_MINUTES: Final = re.compile(
+    r"([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’](?:\s?(\d{1,2}(?:\.\d+)?)\s?(?:\"\"?|″|''))?"
+)
+
+
+def _degrees(match: re.Match[str]) -> float:
+    return int(match[2]) + float(match[3]) / 60 + float(match[4] or 0) / 3600
 
 
 def _without_cassy_limits(lines: list[str]) -> list[str]:
@@ -314,6 +381,9 @@ def _rows(
         if line and not line.isspace()
     ]
     texts = [_text_of(line, layout) for _, line in kept]
+    # What a program prints below a table (mean, deviation, number) begins with its name.
+    last = max((at for at, (_, begins) in enumerate(texts) if not begins), default=len(texts))
+    texts[last + 1 :] = [(True, True)] * len(texts[last + 1 :])
     # A line that begins with a word, beside one of words alone, belongs to a header.
     remarks = [
         whole or (begins and any(text[0] for text in texts[max(0, at - 1) : at + 2]))
@@ -384,7 +454,7 @@ def _column(header: Header, place: int, values: FloatArray, found: Numbers | Non
 
 _RATE_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
-    r"|messrate|rate[\s_]*\(?hz|sampled at",
+    r"|messrate|rate[\s_]*\(?hz|sampled at|(update|output|data)[\s_]*rate",
     re.I,
 )
 _INTERVAL_WORD: Final = re.compile(
@@ -448,7 +518,7 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     own = [layout.split(line), layout.split(bare)]
     yield from (cells for cells in own if len(cells) == layout.width)
     told = ": " in bare  # a remark, unless the rows' own sign splits it
-    if layout.width > 1 and not told and not any(map(layout.is_number, layout.split(bare))):
+    if not told and not any(map(layout.is_number, layout.split(bare))):
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
         joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
         for cells in (
@@ -488,13 +558,17 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
             texts = [cell for cell in texts if not layout.is_number(cell)]
             if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
                 continue
-            if len(cells) < layout.width and not is_comment(line):
+            numbered = len(cells) == layout.width - 1 and len(texts) == len(cells) > 1
+            timed = numbered and role_of(split_header(cells[0])[0]) == "time"
+            if len(cells) < layout.width and not is_comment(line) and not timed:
                 continue
             if (candidates or layout.width < 4) and any(map(layout.is_number, cells)):
                 continue
             if _are_units(cells) and candidates and candidates[-1][0] == len(cells):
                 continue
-            if layout.width == 1 and (len(bare.split()) > 4 or "," in bare or ":" in bare):
+            words = len(bare.split())
+            titled = words > 4 or (words > 1 and not split_header(bare)[1])
+            if layout.width == 1 and (titled or "," in bare or ":" in bare):
                 continue
             candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
             break

@@ -95,6 +95,14 @@ def _from_column(
         filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
     _refuse_missing_times(table, column, filled)
     factor, note, weak = _unit(column, reading, options)
+    if weak and table.interval_s is not None:
+        # A clock without a unit ticks in some decimal part of a second.
+        factor = table.interval_s / float(np.median(np.abs(np.diff(column.values[filled]))))
+        factor, rate = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s
+        note, weak = (
+            f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz",
+            False,
+        )
     rows = np.flatnonzero(filled)
     base = TimeBase(column.values[rows] * factor, rows)
     if len(rows) < len(filled):

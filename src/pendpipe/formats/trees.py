@@ -194,6 +194,8 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
             path = name.replace("/", ".")
             tree[path] = node[()]
             unit = node.attrs.get("units", node.attrs.get("unit", ""))
+            rates = {key: node.attrs[key] for key in (*_RATES, *_INTERVALS) if key in node.attrs}
+            tree.update({f"{path}.{key}": value for key, value in rates.items()})
             units[path] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
 
     with h5py.File(io.BytesIO(data), "r") as file:
