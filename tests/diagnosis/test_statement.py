@@ -150,3 +150,36 @@ def test_lost_samples_are_reported_as_the_delay_of_later_readings() -> None:
     assert late.value == pytest.approx(3.0 * INTERVAL_S)
     assert late.unit == "s"
     assert effect.parameters["samples"].value == 3.0
+
+
+def test_the_likelier_cause_is_named_first() -> None:
+    """Where a rival is more probable than what was fitted, no name stands for itself."""
+    fitted = replace(
+        named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
+        probability=0.2,
+        indistinguishable=(("frequency-drift", 0.67), ("unnamed-restoring", 0.002)),
+    )
+    text = paragraph(fitted)
+    assert (
+        "Missing from the model: drifting frequency (67 %) or drifting clock (20 %), which this"
+        " recording alone cannot distinguish (fitted as drifting clock; rate = (1.66 ± 0.11)"
+        in text
+    )
+    assert text.count("drifting frequency") == 1
+
+
+def test_of_curves_that_describe_a_misfit_none_is_the_best_where_another_is_likelier() -> None:
+    curve = replace(
+        named("impulse"), probability=0.004, indistinguishable=(("unnamed-drive", 0.99),)
+    )
+    assert "any of these describes it: an unknown drive or impulse." in paragraph(curve)
+
+
+def test_what_a_test_has_counted_is_said_in_words_alone() -> None:
+    codes = named(
+        "missing-codes",
+        number=Estimate(0.0, 0.0, ""),
+        found=Estimate(0.0, 1.0, ""),
+        bit=Estimate(0.0, 0.0, ""),
+    )
+    assert "missing codes (probability 90 %)." in paragraph(codes)

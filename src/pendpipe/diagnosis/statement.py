@@ -146,21 +146,32 @@ def _has_a_name(effect: FoundEffect) -> bool:
 
 def _effect(effect: FoundEffect) -> str:
     """What one effect is, how sure that is, where it shows, and what would decide."""
+    sure = f"probability {_percent(effect.probability)}"
+    rivals = effect.indistinguishable
     if effect.kind == "parameter":
         lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
+    elif max((p for _, p in rivals), default=0.0) > effect.probability:
+        # The likeliest stands first, also where another was easier to fit.
+        all_ = [(effect.probability, effect.name), *((p, _rival(name)) for name, p in rivals)]
+        of = [
+            f"{name} ({_percent(p)})" for p, name in sorted(all_, reverse=True) if p > _IMPROBABLE
+        ]
+        missing = "Missing" if sum(p for p, _ in all_) > _PROBABLE else "Possibly missing"
+        text = f"{missing} from the model: {_listed(of, 'or')}"
+        lead = f"{text}, which this recording alone cannot distinguish"
+        sure, rivals = f"fitted as {effect.name}", ()
     else:
         missing = "Missing" if effect.probability > _PROBABLE else "Possibly missing"
         name = f"{missing} {_KINDS.get(effect.kind, 'from the model')}: {effect.name}"
         meaning = _MEANINGS.get(effect.identifier)
         lead = f"{name}, that is, {meaning}" if meaning else name
-    facts = [f"probability {_percent(effect.probability)}", *_numbers(effect)]
-    said = [f"{lead} ({'; '.join(facts)})."]
+    said = [f"{lead} ({'; '.join((sure, *_numbers(effect)))})."]
     if effect.location.summary:
         said.append(f"{_capital(effect.location.summary)}.")
     if effect.confirmed is not None:
         sure = "Confirmed" if effect.confirmed.p_value < _CONFIRMED else "Not confirmed"
         said.append(f"{sure} without the fit: {effect.confirmed.summary}.")
-    said.extend(_rivals(effect.indistinguishable))
+    said.extend(_rivals(rivals))
     if effect.probability <= _CERTAIN or any(p > _IMPROBABLE for _, p in effect.indistinguishable):
         said.append(_ended(f"What to measure next: {effect.discriminating_test}"))
     return " ".join(said)
@@ -170,20 +181,30 @@ def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
     """What describes the misfit, or the rest of it, without a name to rely on."""
     if not effects:
         return ""
+    first = effects[0]
     described = [
         f"{each.name} ({'; '.join(numbers)})" if (numbers := _numbers(each)) else each.name
         for each in effects
     ]
     what = "The rest of the misfit" if rest else "The misfit"
     text = f"{what} has no certain cause; it is described best by {_listed(described, 'and')}"
-    if len(effects) == 1 and effects[0].indistinguishable:
-        others = [_rival(name) for name, _ in effects[0].indistinguishable]
+    if len(effects) == 1 and first.indistinguishable:
+        others = [_rival(name) for name, _ in first.indistinguishable]
         text += f", and almost as well by {_listed(others, 'or')}"
+        if max(p for _, p in first.indistinguishable) > first.probability:
+            text = f"{what} has no certain cause; any of these describes it: "
+            text += _listed([*others, *described], "or")
     return f"{text}. " + _ended(f"What to measure next: {effects[0].discriminating_test}")
 
 
 def _numbers(effect: FoundEffect) -> list[str]:
-    return [f"{name} = {each}" for name, each in effect.parameters.items()]
+    """The parameters that the catalogue knows; what a test has counted, its sentence says."""
+    from pendpipe.effects.catalogue import CATALOGUE
+
+    known = {each.identifier: {p.name for p in each.parameters} for each in CATALOGUE}
+    wanted = known.get(effect.identifier, set(effect.parameters))
+    shown = {name: each for name, each in effect.parameters.items() if name in wanted}
+    return [f"{name} = {each}" for name, each in shown.items() if each.sd > 0.0]
 
 
 def _rivals(rivals: Sequence[tuple[str, float]]) -> list[str]:
