@@ -13,7 +13,7 @@ import compileall
 import sys
 from pathlib import Path
 
-from pendpipe.dynamics.kernel import SHIPPED, Kernel, shipped_name
+from pendpipe.dynamics.kernel import SHIPPED, Kernel, shipped
 
 
 def kernels() -> list[Kernel]:
@@ -39,9 +39,9 @@ def ship() -> None:
     """Put the machine code into the package, and take out what older sources left there."""
     for each in kernels():
         each.ship()
-    current = {shipped_name(each.file_name()) for each in kernels()}
+    current = [path for each in kernels() for path in shipped(each.file_name()).values()]
     for path in SHIPPED.glob("*.bin"):
-        if path.name not in current:
+        if path not in current:
             path.unlink()
 
 

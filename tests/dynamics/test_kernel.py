@@ -13,7 +13,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, machine_code
-from pendpipe.dynamics.kernel import SHIPPED, Kernel, Matrix, folders, kernel, shipped_name
+from pendpipe.dynamics.kernel import Kernel, Matrix, folders, kernel, shipped
 from pendpipe.dynamics.layout import ADDRESSES, FIELDS, counts, work_size
 from pendpipe.dynamics.march import march
 
@@ -60,7 +60,7 @@ def kept(tmp_path: Path) -> Path:
     """Return a folder with the engine's machine code, compiled if need be."""
     assert callable(march.machine_code)
     name = march.file_name()
-    for path in (*(folder / name for folder in folders()), SHIPPED / shipped_name(name)):
+    for path in (*(folder / name for folder in folders()), *shipped(name).values()):
         if path.exists():
             (tmp_path / name).write_bytes(path.read_bytes())
             return tmp_path
@@ -139,22 +139,24 @@ def test_damaged_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.Monke
 def test_shipped_code_runs_on_processors_that_can_and_is_left_alone_by_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not machine_code.can_be_portable():
+    """The faster code needs what not every processor can do; the other one runs on all of them."""
+    if not machine_code.processors():
         pytest.skip("no code is shipped for this processor")
     monkeypatch.setattr("pendpipe.dynamics.kernel.SHIPPED", tmp_path)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "empty"))
-    (tmp_path / "fill-older.bin").write_bytes(b"")
     fill.ship()
-    assert [path.name for path in tmp_path.iterdir()] == [shipped_name(fill.file_name())]
-    with monkeypatch.context() as without:
-        without.setattr("pendpipe.dynamics.numba_side.compiled", lambda _: pytest.fail("compiled"))
-        fill.ship()
-        table = np.zeros((1, 1))
-        assert anew(fill)(np.array([4.0]), table, 0.0, 0) == 1
-        assert table[0, 0] == pytest.approx(6.0, rel=1e-15)
-    path = tmp_path / shipped_name(fill.file_name())
-    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_features", dict)
-    assert machine_code.load(path) is None
+    fast, plain = shipped(fill.file_name()).values()
+    assert {*tmp_path.iterdir()} == {fast, plain}
+    monkeypatch.setattr("pendpipe.dynamics.numba_side.compiled", lambda _: pytest.fail("compiled"))
+    fill.ship()
+    assert machine_code.load(fast) is not None
+    features = machine_code.llvm.get_host_cpu_features()
+    plainest = type(features)(dict.fromkeys(features, False))
+    monkeypatch.setattr(machine_code.llvm, "get_host_cpu_features", lambda: plainest)
+    assert machine_code.load(fast) is None
+    table = np.zeros((1, 1))
+    assert anew(fill)(np.array([4.0]), table, 0.0, 0) == 1
+    assert table[0, 0] == pytest.approx(6.0, rel=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ class Kernel:
             for word in ((ctypes.c_void_p, *axes * [ctypes.c_int64]) if axes else (kind,))
         ]
         name = self.file_name()
-        for path in (*(folder / name for folder in folders()), SHIPPED / shipped_name(name)):
+        for path in (*(folder / name for folder in folders()), *shipped(name).values()):
             loaded = machine_code.load(path)
             if loaded is not None:
                 break
@@ -160,12 +160,12 @@ class Kernel:
         """Make the code for many machines, unless it is there."""
         from pendpipe.dynamics import machine_code, numba_side
 
-        path = SHIPPED / shipped_name(self.file_name())
-        if path.exists() or not machine_code.can_be_portable():
+        paths = {cpu: path for cpu, path in shipped(self.file_name()).items() if not path.exists()}
+        if not paths:
             return
         made = numba_side.compiled(self)
-        machine_code.keep(path, made.inspect_llvm(), made.native_name, portable=True)
-        self._remove_older(SHIPPED, path.name)
+        for processor, path in paths.items():
+            machine_code.keep(path, made.inspect_llvm(), made.native_name, processor)
 
     def _remove_older(self, folder: Path, name: str) -> None:
         """Remove the code of other sources."""
@@ -232,7 +232,9 @@ def _digest(text: bytes) -> str:
     return hashlib.blake2b(text, digest_size=8).hexdigest()
 
 
-def shipped_name(name: str) -> str:
-    """Return the name of the code for many machines that belongs to one for this machine."""
+def shipped(name: str) -> dict[str, Path]:
+    """Return where the code for other machines lies that belongs to one for this machine."""
+    from pendpipe.dynamics import machine_code
+
     stem, _, sources = name.rsplit("-", 2)
-    return f"{stem}-{sources}"
+    return {cpu: SHIPPED / f"{stem}-{cpu}-{sources}" for cpu in machine_code.processors()}

@@ -27,30 +27,33 @@ def platform() -> str:
     )
 
 
-PORTABLE = {"x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"))}
-"""By architecture: the processors for which code is shipped, and what they can do."""
+PORTABLE = {
+    "x86_64": {
+        "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
+        "x86-64": (),
+    }
+}
+"""By architecture: processors for which code is shipped, the fastest first; what they can do."""
 
 
-def can_be_portable() -> bool:
-    """Return whether code made here runs on other machines: on processors that PORTABLE names."""
-    return llvm.get_default_triple().partition("-")[0] in PORTABLE
+def processors() -> dict[str, tuple[str, ...]]:
+    """Return for which processors code made here can be shipped, and what they can do."""
+    return PORTABLE.get(llvm.get_default_triple().partition("-")[0], {})
 
 
-def _target_machine(portable: bool = False) -> Any:
-    """Return LLVM's idea of this machine, or of all those that `PORTABLE` names."""
+def _target_machine(processor: str = "") -> Any:
+    """Return LLVM's idea of a processor that `PORTABLE` names, or of this machine."""
     with contextlib.suppress(RuntimeError):  # newer versions have done it already, and warn
         llvm.initialize()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    if portable:
-        cpu, features = PORTABLE[llvm.get_default_triple().partition("-")[0]][0], ""
+    features = "" if processor else llvm.get_host_cpu_features().flatten()
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=cpu, features=features, opt=3, jit=True
+        cpu=processor or llvm.get_host_cpu_name(), features=features, opt=3, jit=True
     )
 
 
-def keep(path: Path, assembly: str, name: str, portable: bool = False) -> None:
+def keep(path: Path, assembly: str, name: str, processor: str = "") -> None:
     """Write the machine code of a module, with its function that will be called, to `path`."""
     module = llvm.parse_assembly(assembly)
     declared = [
@@ -58,23 +61,18 @@ def keep(path: Path, assembly: str, name: str, portable: bool = False) -> None:
         for function in module.functions
         if function.is_declaration and not function.name.startswith("llvm.")
     ]
-    code = _target_machine(portable).emit_object(module)
+    code = _target_machine(processor).emit_object(module)
     head = {
         "name": name,
         "needs": declared,
         "digest": hashlib.blake2b(code).hexdigest(),
         "triple": llvm.get_default_triple(),
-        "features": _portable_features() if portable else [],
+        "features": processors().get(processor, ()),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}")
     part.write_bytes(json.dumps(head).encode() + b"\n" + code)
     part.replace(path)
-
-
-def _portable_features() -> list[str]:
-    """Return what a processor must be able to do to run portable code."""
-    return list(PORTABLE[llvm.get_default_triple().partition("-")[0]][1])
 
 
 def load(path: Path) -> tuple[int, Any] | None:
