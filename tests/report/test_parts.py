@@ -119,6 +119,8 @@ def test_shares_of_the_budget_are_of_the_variance() -> None:
         ("large", 64),
         ("small", 36),
     ]
+    unknown = {"source": "hysteresis of one record", "relative_sd": None}
+    assert len(budget_rows({"budget": [*parts, unknown]})) == 2
 
 
 def test_findings_follow_the_numbers() -> None:

@@ -138,6 +138,47 @@ def test_simulated_records_are_consistent_and_a_refused_one_is_not_analysable(
     assert verdicts.count("consistent") >= records - 2
 
 
+HEAD = "record\tsource\tfluid\tbranch\tgeometry\tstart_s\ttemperature_c\n"
+
+
+def other(folder: Path, rows: str) -> Campaign:
+    """Another campaign of the same apparatus, run without the diagnoses of its records."""
+    campaign = Campaign(folder)
+    campaign.records.write_text(HEAD + rows, encoding="utf-8")
+    content = yaml.safe_load(campaign.configuration.read_text(encoding="utf-8"))
+    content["typical_record"] = rows.partition("\t")[0]
+    content["simulated"]["release"].pop("water-low-7")
+    campaign.configuration.write_text(yaml.safe_dump(content), encoding="utf-8")
+    wanted = (f"{campaign.results}/{name}" for name in ("campaign.json", "figures/drawn.json"))
+    campaign.snakemake("--rerun-incomplete", *wanted)  # an option between --configfile and files
+    return campaign
+
+
+def test_two_records_of_one_frequency_have_a_drag_factor_with_its_error(tmp_path: Path) -> None:
+    """Too few for a joint fit, and no exponent: what can be said has its error all the same."""
+    rows = (
+        "one\tsimulated\twater\thigh\thigh-4\t\t20.0\n" * 2
+        + "air\tsimulated\tair\tair\tair-07\t\t20\n"
+    )
+    campaign = other(tmp_path, rows.replace("one", "two", 1))
+    comparison = json.loads((campaign.results / "comparison.json").read_text())
+    factor = comparison["theory_factor"]
+    assert 0.0 < factor["sd"] < 0.1 * factor["value"]
+    budget = {part["source"]: part["relative_sd"] for part in comparison["budget"]}
+    assert 0.0 < budget["moment of inertia"] < 0.1
+    assert comparison["viscous_exponents"]["high"]["sd"] > 10.0
+
+
+def test_a_campaign_of_refused_records_ends_with_its_figures_places(tmp_path: Path) -> None:
+    source = "tests/workflow/small/no-decay.csv"
+    rows = f"water\t{source}\twater\thigh\thigh-4\t\t20\nair\t{source}\tair\tair\tair-07\t\t20\n"
+    campaign = other(tmp_path, rows)
+    drawn = json.loads((campaign.results / "figures/drawn.json").read_text())
+    assert "figures/fig09.svg" in drawn["files"]
+    assert "fig09" in drawn["left_out"]
+    assert campaign.summary()["theory_factor"] is None
+
+
 def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
     assert "Nothing to be done" in campaign.snakemake("-n")
 

@@ -77,8 +77,9 @@ def _slope(slope: float | None) -> str:
 
 
 def budget_rows(comparison: Comparison) -> list[tuple[str, str, float]]:
-    """Source, its relative standard deviation, and the share of the variance in percent."""
-    parts = comparison.get("budget") or []
+    """Source, its relative standard deviation, and the share of the known variance in percent."""
+    budget = comparison.get("budget") or []
+    parts = [part for part in budget if part["relative_sd"] is not None]
     total = sum(part["relative_sd"] ** 2 for part in parts) or 1.0
     rows = [
         (

@@ -16,6 +16,7 @@ from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, SharedEstimate, Surroundings
 from pendpipe.arguments import add, load
+from pendpipe.campaign.design import design_of
 from pendpipe.campaign.joint import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest
@@ -25,7 +26,7 @@ from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
 from pendpipe.provenance import code_version
-from pendpipe.stages.joint import campaign_data
+from pendpipe.stages.joint import campaign_data, placed
 from pendpipe.stages.results import RecordResult, read_results, record_files, sensor_file
 from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.stages.theory import branch_curves, record_theory
@@ -59,13 +60,14 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     results = read_results(campaign)
     separated = read_separation(separation)
     together = campaign_data(campaign, results)
-    spread = {} if together is None else inertia_sds(together[0])
+    rows = [result.record for result in placed(campaign, results)]
+    spread = inertia_sds(design_of(campaign, rows)) if rows else {}
     found = _comparison(campaign, separated, spread)
     content = {
         "schema_version": 1,
         "title": campaign.configuration.title,
         "typical_record": campaign.configuration.typical_record,
-        "has_theory": found is not None,
+        "has_theory": campaign.configuration.apparatus is not None,
         "records": [_record(campaign, result, separated, found, spread) for result in results],
         "curves": _curves(campaign, separated),
         "hysteretic_coefficient": separated.benchmark,
@@ -109,7 +111,7 @@ def _comparison(
         inverse_k=float(separated.benchmark["inverse_sd"]),
         radius_m=apparatus.sphere.diameter_sd_m / 2,
         distance_m=apparatus.sphere.distance_sd_m,
-        relative_inertia=float(np.mean([spread[name].common for name in around if name in spread])),
+        relative_inertia=float(np.mean([spread[name].common for name in around])),
         temperature_k=warm[0],
         temperature_c=warm[1],
     )

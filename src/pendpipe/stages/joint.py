@@ -15,6 +15,17 @@ FEWEST_RECORDS = 3
 """With fewer there is nothing to compare: k and one effect are free."""
 
 
+def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordResult]:
+    """The usable records of the configured apparatus: those with a fluid and a geometry."""
+    if campaign.configuration.apparatus is None:
+        return []
+    return [
+        result
+        for result in results
+        if result.usable and result.record.fluid and campaign.geometry(result.record) is not None
+    ]
+
+
 def campaign_data(
     campaign: Campaign, results: Sequence[RecordResult]
 ) -> tuple[Design, Measured] | None:
@@ -23,13 +34,7 @@ def campaign_data(
     The joint fit compares with Eq. 16: it needs an apparatus, and three records, two of them in a
     fluid.
     """
-    if campaign.configuration.apparatus is None:
-        return None
-    used = [
-        result
-        for result in results
-        if result.usable and result.record.fluid and campaign.geometry(result.record) is not None
-    ]
+    used = placed(campaign, results)
     if len(used) < FEWEST_RECORDS:
         return None
     design = design_of(campaign, [result.record for result in used])
