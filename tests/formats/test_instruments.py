@@ -461,6 +461,18 @@ TABLES = {
     + "\nMean,-0.103\nStd. Dev.,9.12\nN,3000\n",
     "numbers of the rows without a name": '"time" "angle"\n'
     + "".join(f'"{n}" {t:.2f} {x:.5f}\n' for n, (t, x) in enumerate(zip(TIME, ANGLE, strict=True))),
+    "an error behind every number": "t (s),theta (deg)\n"
+    + "".join(f"{t:.2f} ± 0.01,{x:.3f} ± 0.05\n" for t, x in zip(TIME, DEGREES, strict=True)),
+    "numbers as NumPy shows them": "t (s), theta (rad)\n"
+    + "".join(
+        f"np.float64({t:.2f}), np.float64({x:.5f})\n" for t, x in zip(TIME, ANGLE, strict=True)
+    ),
+    "all rows in one line": "data = ["
+    + ", ".join(f"({t:.2f}, {x:.5f})" for t, x in zip(TIME, ANGLE, strict=True))
+    + "]\n",
+    "the brackets of MATLAB": "% run 3\nA = [\n"
+    + "".join(f"  {t:.2f} {x:.5f};\n" for t, x in zip(TIME, ANGLE, strict=True))
+    + "];\n",
     "one column with a unit": "Sample rate: 50 Hz\nAngular position (deg)\n" + rows(DEGREES),
 }
 
@@ -559,3 +571,15 @@ def test_an_attribute_of_an_array_may_give_its_rate(tmp_path: Path) -> None:
 def test_a_list_of_periods_is_refused_as_such(read_as: Callable[..., Recording]) -> None:
     with pytest.raises(InputError, match="periods alone tell no loss"):
         read_as("Time (s),GateState,Period (s)\n" + "".join(f"{2 * n},1,1.6\n" for n in range(60)))
+
+
+@pytest.mark.parametrize("mark", [-1, 0, 9999])
+def test_a_mark_far_from_the_swing_is_no_reading(
+    read_as: Callable[..., Recording], mark: int
+) -> None:
+    """Trackers write -1 where they lose the bob."""
+    pixels = 640.0 + 400.0 * np.sin(ANGLE)
+    lost = np.isin(np.arange(len(pixels)), (70, 500, 501, 2200))
+    recording = read_as("time_s,x_px\n" + rows(TIME, np.where(lost, mark, pixels)))
+    assert np.array_equal(recording.usable, ~lost)
+    np.testing.assert_allclose(recording.values[~lost], pixels[~lost], atol=1e-5)

@@ -207,8 +207,9 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     base = time_base(table, choice, options)
     found = converted(table, choice, base, options)
     values = found.values[base.rows]
-    quality = _quality(table, values, base)
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
+    values = _without_marks(values / found.factor, notes) * found.factor
+    quality = _quality(table, values, base)
     if quality is not None:
         notes.append(f"{np.sum(quality == MISSING)} row(s) without a reading, marked missing")
     drawn = made_up(base.time_s, values)
@@ -234,6 +235,19 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     check(table.place, recording)
     _check_scale(table.place, recording)
     return recording
+
+
+def _without_marks(values: FloatArray, notes: list[str]) -> FloatArray:
+    """Take ``-1``, ``-9999`` and their like, far from the swing, for lost readings."""
+    for mark in (-1.0, 0.0, 999.0, -999.0, 9999.0, -9999.0):
+        lost = values == mark
+        if not 0 < lost.sum() < 0.2 * len(values):
+            continue
+        low, high = np.nanmin(values[~lost]), np.nanmax(values[~lost])
+        if not low - (high - low) < mark < high + (high - low):
+            notes.append(f"{lost.sum()} reading(s) of {mark:g} far from the others: taken as lost")
+            values = np.where(lost, np.nan, values)
+    return values
 
 
 def _where(time_s: FloatArray, rows: BoolArray) -> str:

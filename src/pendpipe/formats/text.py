@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
@@ -92,7 +92,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     for form_of in (
         _without_labview_heads,
         _side_by_side,
-        _without_minutes,
+        _bare_cells,
         _without_cassy_limits,
         _without_arrows,
         _without_brackets,
@@ -173,20 +173,32 @@ def _side_by_side(lines: list[str]) -> list[str]:
     return ["\t".join(row) for row in zip(*columns, strict=True)]
 
 
-def _without_minutes(lines: list[str]) -> list[str]:
-    """Turn degrees, minutes and seconds (``-12°05'30"``) into degrees."""
-    if not any(_MINUTES.search(line) for line in lines[:100]):
-        return lines
-    return [_MINUTES.sub(lambda m: f"{m[1]}{_degrees(m):.9g}°", line) for line in lines]
+def _bare_cells(lines: list[str]) -> list[str]:
+    """Make ``-12°05'30"`` degrees; take off ``± 0.1``, ``np.float64()`` and a row's last ``;``."""
+    for found, put in _CLOTHED:
+        some = [line for line in lines[:100] if found.search(line)]
+        if len(some) > 0.5 * len([line for line in lines[:100] if line.strip()]):
+            lines = [found.sub(put, line) for line in lines]
+    return lines
 
 
-_MINUTES: Final = re.compile(
-    r"([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’](?:\s?(\d{1,2}(?:\.\d+)?)\s?(?:\"\"?|″|''))?"
+def _degrees(match: re.Match[str]) -> str:
+    size = int(match[2]) + float(match[3]) / 60 + float(match[4] or 0) / 3600
+    return f"{match[1]}{size:.9g}°"
+
+
+_CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
+    (
+        re.compile(
+            r"([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’]"
+            r"(?:\s?(\d{1,2}(?:\.\d+)?)\s?(?:\"\"?|″|''))?"
+        ),
+        _degrees,
+    ),
+    (re.compile(r"(?<=\d)\s*(?:±|\+/?-)\s*\d+(?:\.\d+|,\d+(?=[^,]*[;\t]|[^,]*$))?"), ""),
+    (re.compile(r"np\.float\d\d\(([^()]*)\)"), r"\1"),
+    (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
 )
-
-
-def _degrees(match: re.Match[str]) -> float:
-    return int(match[2]) + float(match[3]) / 60 + float(match[4] or 0) / 3600
 
 
 def _without_cassy_limits(lines: list[str]) -> list[str]:
@@ -227,6 +239,9 @@ def _without_arrows(lines: list[str]) -> list[str]:
 
 def _without_brackets(lines: list[str]) -> list[str]:
     """Take off the brackets of rows that a program printed as lists: ``[0.02, 0.43]``."""
+    if len(lines) < 5:  # all rows in one line
+        whole = re.sub(r"^\s*(\w+\s*=)?\s*\[\s*(?=[(\[])", "", "\n".join(lines))
+        lines = re.sub(r"(?<=[)\]])\s*,\s*(?=[(\[])", "\n", whole).split("\n")
     some = [line.strip() for line in lines[:100] if line.strip()]
     if sum(bool(_LISTED.fullmatch(line)) for line in some) < 0.9 * len(some):
         return lines
@@ -557,6 +572,8 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
             texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]
             texts = [cell for cell in texts if not layout.is_number(cell)]
             if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
+                continue
+            if bare.endswith(("[", "{", "(")):  # A = [
                 continue
             numbered = len(cells) == layout.width - 1 and len(texts) == len(cells) > 1
             timed = numbered and role_of(split_header(cells[0])[0]) == "time"

@@ -32,6 +32,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("angle", 1e-6, "rad", "µrad urad microrad microradian microradians"),
     ("angle", _DEGREE, "rad", "deg degs degree degrees ° º grad grado grados gradi degré degrés"),
     ("angle", _DEGREE, "rad", "degre graden stopnie grader град 度 degr dg altgrad graus grau"),
+    ("angle", _DEGREE, "rad", "stopni derece µοίρες stupně"),
     ("angle", pi / 200, "rad", "gon gons"),
     ("angle", _DEGREE / 60, "rad", "arcmin ' ′"),
     ("angle", _DEGREE / 3600, "rad", "arcsec ″"),
@@ -59,6 +60,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("own", 1.0, "rad/s", "rad/s rad/sec rads/s radian/s radians/s s-1 1/s rad.s-1 rads-1 s^-1"),
     ("own", _DEGREE, "rad/s", "deg/s °/s degrees/s deg/sec degree/s grad/s dps º/s"),
     ("own", 1.0, "rad/s^2", "rad/s2 rad/s^2 rad/s/s"),
+    ("own", _DEGREE * 1e-3, "rad/s", "mdps mdeg/s"),
     ("own", _DEGREE, "rad/s^2", "deg/s2 deg/s^2 °/s2 °/s^2 deg/s/s"),
     ("own", 1.0, "m/s", "m/s m/sec ms-1 m.s-1"),
     ("own", 1e-2, "m/s", "cm/s"),
@@ -181,8 +183,8 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         "velocity",
         r"angular (velocity|speed|rate)|winkelgeschw\w*|gyro\w*|omega\d?|ω\d?|\w*theta_?dot"
         r"|th_?dot|\w*phi_?dot|\w*alpha_?dot|d\s?theta|dphi|dth|vitesse angulaire"
-        r"|velocidad angular|velocit[aà] angolare|hoeksnelheid|w[xyz]?|rotation rate|\w*velocity"
-        r"|\w*velocities|vel\w*|v(x|y|z)?|speed|\w*geschw\w*|vitesse|velocidad|velocit[aà]"
+        r"|velocidad angular|velocit[aà] angolare|hoeksnelheid|w[xyz]?|g[xyz]|rotation rate"
+        r"|\w*velocity|\w*velocities|vel\w*|v(x|y|z)?|speed|\w*geschw\w*|vitesse|velocidad|velocit[aà]"
         r"|snelheid|\w*dot|derivative|\w*ableitung|deriv\w*|d\w+/dt|скорость|速度",
     ),
     (
