@@ -146,7 +146,7 @@ def _has_a_name(effect: FoundEffect) -> bool:
 
 def _effect(effect: FoundEffect) -> str:
     """What one effect is, how sure that is, where it shows, and what would decide."""
-    sure = f"probability {_percent(effect.probability)}"
+    facts = [f"probability {_percent(effect.probability)}", *_numbers(effect)]
     rivals = effect.indistinguishable
     if effect.kind == "parameter":
         lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
@@ -159,13 +159,13 @@ def _effect(effect: FoundEffect) -> str:
         missing = "Missing" if sum(p for p, _ in all_) > _PROBABLE else "Possibly missing"
         text = f"{missing} from the model: {_listed(of, 'or')}"
         lead = f"{text}, which this recording alone cannot distinguish"
-        sure, rivals = f"fitted as {effect.name}", ()
+        facts, rivals = [], ()
     else:
         missing = "Missing" if effect.probability > _PROBABLE else "Possibly missing"
         name = f"{missing} {_KINDS.get(effect.kind, 'from the model')}: {effect.name}"
         meaning = _MEANINGS.get(effect.identifier)
         lead = f"{name}, that is, {meaning}" if meaning else name
-    said = [f"{lead} ({'; '.join((sure, *_numbers(effect)))})."]
+    said = [f"{lead} ({'; '.join(facts)})." if facts else f"{lead}."]
     if effect.location.summary:
         said.append(f"{_capital(effect.location.summary)}.")
     if effect.confirmed is not None:
@@ -324,7 +324,7 @@ def _percent(share: float) -> str:
 
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
-    return f"{float(f'{ratio:.2g}'):.0f}" if ratio > 9.95 else f"{ratio:.2g}"
+    return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
 
 
 def _rival(identifier: str) -> str:

@@ -143,7 +143,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         picked = tuple(find(table, table.columns, part) for part in _parts(table, options))
         return Choice(time, counts, picked, channels, roles=roles)
     if options.channel is not None:
-        picked = (_channel(table, channels, options.channel),)
+        picked = (find(table, channels, options.channel, range(1, len(channels) + 1)),)
         return Choice(time, counts, picked, channels, roles=roles)
     mine, others = _of_one_run(channels, time, roles)
     readings, notes, weak = _readings(mine, time, roles)
@@ -170,18 +170,20 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     return Choice(time, counts, readings, channels, notes, weak, roles)
 
 
-def find(table: Table, columns: Sequence[Column], key: str) -> Column:
-    """Find a column by its name (in any case) or its number in the file."""
-    exact = [column for column in columns if column.name == key]
-    alike = [column for column in columns if column.name.lower() == key.lower()]
-    if exact or alike:
-        return (exact or alike)[0]
-    if key.isdigit():
-        for column in columns:
-            if column.number == int(key):
+def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[int] = ()) -> Column:
+    """Find a column by its name (in any case), or by its number: in the file, or as given."""
+    names = [f"{n} {c.label}" for n, c in zip(numbers, columns, strict=False)]
+    names = names or [column.label for column in columns]
+    numbers = numbers or [column.number for column in columns]
+    for exact in (
+        lambda column, _: column.name == key,
+        lambda column, _: column.name.lower() == key.lower(),
+        lambda _, number: str(number) == key,
+    ):
+        for column, number in zip(columns, numbers, strict=True):
+            if exact(column, number):
                 return column
-    names = listed([column.label for column in columns])
-    raise InputError(table.place, f"there is no column '{key}'", f"choose from: {names}")
+    raise InputError(table.place, f"there is no column '{key}'", f"choose from: {listed(names)}")
 
 
 def _only_falls(values: FloatArray) -> bool:
@@ -201,17 +203,6 @@ def _parts(table: Table, options: ReadOptions) -> list[str]:
     if len(parts) != 2:
         raise InputError("--column", f"'{key}' names {len(parts)} columns", "give one, or x,y")
     return parts
-
-
-def _channel(table: Table, channels: Sequence[Column], key: str) -> Column:
-    """Find a channel by name, or by its number among those that ``inspect`` lists."""
-    for column in channels:
-        if column.name.lower() == key.lower():
-            return column
-    if key.isdigit() and 1 <= int(key) <= len(channels):
-        return channels[int(key) - 1]
-    names = listed([f"{i} {column.label}" for i, column in enumerate(channels, start=1)])
-    raise InputError(table.place, f"there is no channel '{key}'", f"choose from: {names}")
 
 
 def _whole_times(columns: tuple[Column, ...], roles: Mapping[int, Role]) -> tuple[Column, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 import sys
 from collections.abc import Callable, Iterator
@@ -359,17 +360,9 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
 
 def _header(data: bytes) -> list[str]:
     """Find the first line that is no remark, split at commas."""
-    at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
-    while at < len(data):
-        end = data.find(b"\n", at)
-        line = data[at : len(data) if end < 0 else end].strip()
-        if line and not line.startswith(b"#"):
-            text = line[:4096].decode("utf-8", errors="replace")
-            return [name.strip() for name in text.split(",")]
-        if end < 0:
-            break
-        at = end + 1
-    return []
+    first = re.search(rb"(?:^|\n)[ \t]*([^#\s][^\n]{0,4095})", data.removeprefix(b"\xef\xbb\xbf"))
+    text = first[1].decode("utf-8", errors="replace") if first else ""
+    return [name.strip() for name in text.split(",")]
 
 
 def table_of_plain(place: Path, recording: Recording) -> Table:

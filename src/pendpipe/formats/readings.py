@@ -10,7 +10,13 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice
-from pendpipe.formats.samples import derivative_slope, follows_sine, periods, resolution
+from pendpipe.formats.samples import (
+    derivative_slope,
+    follows_sine,
+    periods,
+    resolution,
+    same_motion,
+)
 from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Unit, unit_of
 from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
@@ -283,8 +289,9 @@ def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | 
         if other is column or unit is None or len(other.values) != len(column.values):
             continue
         if unit.kind == "angle":
-            ratio = _ratio(column.values, other.values)
-            scale = unit.factor * ratio if ratio is not None else None
+            good = np.isfinite(column.values) & np.isfinite(other.values)
+            ratio = same_motion(column.values[good], other.values[good], 0.99) if good.any() else 0
+            scale = unit.factor * ratio if ratio else None
         elif unit.name == "rad/s":
             slope = derivative_slope(time_s, column.values, other.values)
             scale = unit.factor * abs(slope) if slope is not None else None
@@ -294,20 +301,6 @@ def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | 
             if scale is not None and abs(scale / guess.factor - 1.0) < 0.25:
                 return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
     return None
-
-
-def _ratio(one: FloatArray, other: FloatArray) -> float | None:
-    """How many times `one` `other` is, where they are the same motion; ``None`` else."""
-    good = np.isfinite(one) & np.isfinite(other)
-    one, other = one[good], other[good]
-    if len(one) < 8 or max(np.abs(one).max(), np.abs(other).max()) > 1e100:
-        return None
-    one, other = one - one.mean(), other - other.mean()
-    both = float(one @ one) * float(other @ other)
-    product = float(one @ other)
-    if not both > 0.0 or product < 0.99 * np.sqrt(both):
-        return None
-    return product / float(one @ one)
 
 
 def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:

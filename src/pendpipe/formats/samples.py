@@ -204,14 +204,17 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.
     kernel = np.array([0.25, 0.5, 0.25])
     rate, other = np.convolve(rate, kernel, "valid"), np.convolve(other, kernel, "valid")
-    rate, other = rate - rate.mean(), other - other.mean()
-    if not max(np.abs(rate).max(), np.abs(other).max()) < 1e70:
+    return same_motion(rate, other, 0.9)
+
+
+def same_motion(one: FloatArray, other: FloatArray, least: float) -> float | None:
+    """How many times `one` `other` is; ``None`` where they correlate less than `least`."""
+    one, other = one - one.mean(), other - other.mean()
+    if not max(np.abs(one).max(), np.abs(other).max()) < 1e70:
         return None
-    both = float(rate @ rate) * float(other @ other)
-    if not 0.0 < both < _ABSURD:
-        return None
-    product = float(rate @ other)
-    return product / float(rate @ rate) if abs(product) > 0.9 * np.sqrt(both) else None
+    both = float(one @ one) * float(other @ other)
+    product = float(one @ other)
+    return product / float(one @ one) if abs(product) > least * np.sqrt(both) > 0.0 else None
 
 
 @dataclass(frozen=True)

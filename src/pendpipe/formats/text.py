@@ -92,10 +92,9 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     for form_of in (
         _without_labview_heads,
         _side_by_side,
+        _in_rows,
         _bare_cells,
         _without_cassy_limits,
-        _without_arrows,
-        _without_brackets,
         _without_panel,
         _without_split_decimals,
         _upright,
@@ -174,7 +173,7 @@ def _side_by_side(lines: list[str]) -> list[str]:
 
 
 def _bare_cells(lines: list[str]) -> list[str]:
-    """Make ``-12°05'30"`` degrees; take off ``± 0.1``, ``np.float64()`` and a row's last ``;``."""
+    """Take off what programs and people put about numbers, where most lines have it."""
     for found, put in _CLOTHED:
         some = [line for line in lines[:100] if found.search(line)]
         if len(some) > 0.5 * len([line for line in lines[:100] if line.strip()]):
@@ -187,6 +186,12 @@ def _degrees(match: re.Match[str]) -> str:
     return f"{match[1]}{size:.9g}°"
 
 
+def _stamped(match: re.Match[str]) -> str:
+    sign = next((sign for sign in "\t;," if sign in match[3]), " ")
+    return (match[1] or match[2]).replace(" ", "T") + sign + match[3]
+
+
+_CLOCK: Final = r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
 _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
     (
         re.compile(
@@ -198,7 +203,12 @@ _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str
     (re.compile(r"(?<=\d)\s*(?:±|\+/?-)\s*\d+(?:\.\d+|,\d+(?=[^,]*[;\t]|[^,]*$))?"), ""),
     (re.compile(r"np\.float\d\d\(([^()]*)\)"), r"\1"),
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
+    (re.compile(rf"^\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*(.*)$"), _stamped),
+    (re.compile(r"^\s*[\[({]*([^\[\](){}]*\d[^\[\](){}]*)[\])}]+,?\s*$"), r"\1"),
 )
+"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); NumPy's types; rows that end in ``;``; the
+times that serial monitors put before each line (``12:03:04.512 ->``, ``[2024-05-01 12:03:04.512]``);
+rows printed as lists."""
 
 
 def _without_cassy_limits(lines: list[str]) -> list[str]:
@@ -214,41 +224,19 @@ def _without_cassy_limits(lines: list[str]) -> list[str]:
     return head + lines[50:]
 
 
-_CLOCK: Final = r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
-_ARROW: Final = re.compile(rf"\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*")
 _LABELLED: Final = re.compile(
     r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;|]?\s*"
 )
 
 
-def _without_arrows(lines: list[str]) -> list[str]:
-    """Make a cell of the time that serial monitors put before each line.
-
-    As ``12:03:04.512 ->`` or ``[2024-05-01 12:03:04.512]``.
-    """
-    some = lines[:100]
-    marked = [line for line in some if _ARROW.match(line)]
-    if len(marked) < 0.5 * len(some) or not marked:
+def _in_rows(lines: list[str]) -> list[str]:
+    """Part a list that stands in one line."""
+    if len(lines) >= 5:
         return lines
-    sign = next((sign for sign in "\t;," if sign in marked[len(marked) // 2]), " ")
-    return [
-        _ARROW.sub(lambda match: (match[1] or match[2]).replace(" ", "T") + sign, line, count=1)
-        for line in lines
-    ]
+    whole = re.sub(r"^\s*(\w+\s*=)?\s*\[\s*(?=[(\[])", "", "\n".join(lines))
+    return re.sub(r"(?<=[)\]])\s*,\s*(?=[(\[])", "\n", whole).split("\n")
 
 
-def _without_brackets(lines: list[str]) -> list[str]:
-    """Take off the brackets of rows that a program printed as lists: ``[0.02, 0.43]``."""
-    if len(lines) < 5:  # all rows in one line
-        whole = re.sub(r"^\s*(\w+\s*=)?\s*\[\s*(?=[(\[])", "", "\n".join(lines))
-        lines = re.sub(r"(?<=[)\]])\s*,\s*(?=[(\[])", "\n", whole).split("\n")
-    some = [line.strip() for line in lines[:100] if line.strip()]
-    if sum(bool(_LISTED.fullmatch(line)) for line in some) < 0.9 * len(some):
-        return lines
-    return [line.strip("[](){}, \t") for line in lines]
-
-
-_LISTED: Final = re.compile(r"[\[({][^\[\](){}]*\d[^\[\](){}]*[\])}],?")
 _PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
 
 
