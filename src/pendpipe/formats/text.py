@@ -206,8 +206,8 @@ _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str
     (re.compile(rf"^\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*(.*)$"), _stamped),
     (re.compile(r"^\s*[\[({]*([^\[\](){}]*\d[^\[\](){}]*)[\])}]+,?\s*$"), r"\1"),
 )
-"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); NumPy's types; rows that end in ``;``; the
-times that serial monitors put before each line (``12:03:04.512 ->``, ``[2024-05-01 12:03:04.512]``);
+"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); NumPy's types; rows that end in ``;``;
+times that serial monitors put before each line (``12:03:04.5 ->``, ``[2024-05-01 12:03:04.5]``);
 rows printed as lists."""
 
 
