@@ -182,10 +182,7 @@ def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
     if not effects:
         return ""
     first = effects[0]
-    described = [
-        f"{each.name} ({'; '.join(numbers)})" if (numbers := _numbers(each)) else each.name
-        for each in effects
-    ]
+    described = [each.name for each in effects]
     what = "The rest of the misfit" if rest else "The misfit"
     text = f"{what} has no certain cause; it is described best by {_listed(described, 'and')}"
     if len(effects) == 1 and first.indistinguishable:
