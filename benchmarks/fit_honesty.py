@@ -3,8 +3,10 @@
     python -m benchmarks.fit_honesty [NAME ...]
 
 A row a recording, fitted without options: the loss of the fitted law over that of the turning
-points at a large, a middle and a small amplitude, the light and the exit status. With names, only
-the recordings whose path holds one of them.
+points at a large, a middle and a small amplitude, the light, the exit status, and by how many of
+their errors a, b, c and f differ at most from those of the same model in `pendpipe diagnose`: Eq. 8
+alone, or with sin x alone where that is all that is missing. With names, only the recordings whose
+path holds one of them.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any, Final
 
 from pendpipe.cli import main as pendpipe
 
@@ -72,7 +75,10 @@ WORST = 0.10
 """Part of the decrement by which no green law may be off."""
 
 
-def fitted(path: Path) -> tuple[int, dict[str, object] | None, str]:
+NUMBERS: Final = ("a", "b", "c", "frequency")
+
+
+def fitted(path: Path) -> tuple[int, dict[str, Any] | None, str]:
     """Run the command; return its status, ``fit.json`` if there is one, and why it was refused."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "fit.json"
@@ -84,6 +90,21 @@ def fitted(path: Path) -> tuple[int, dict[str, object] | None, str]:
     return status, content, refusals[-1].replace(str(path), "it") if refusals else ""
 
 
+def apart(path: Path, content: dict[str, Any]) -> str:
+    """The largest difference between fit and diagnose, in errors; blank without a common model."""
+    words = io.StringIO()
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(words):
+        pendpipe(["diagnose", str(path), "--json"])
+    answer = json.loads(words.getvalue() or "{}")
+    missing = [effect["id"] for effect in answer.get("effects", [])]
+    sine = content["restoring"] == "sine"
+    model = answer.get("improved" if sine else "baseline")
+    if content["light"] == "red" or not model or (sine and missing != ["circular-error"]):
+        return ""
+    pairs = [(content["parameters"][name], model["parameters"][name]) for name in NUMBERS]
+    return f"{max(abs(one['value'] - two['value']) / (one['sd'] or 1.0) for one, two in pairs):.2g}"
+
+
 def main() -> None:
     """Print the table."""
     wanted = [each for each in sys.argv[1:] if each != "fit_honesty"]
@@ -91,15 +112,18 @@ def main() -> None:
     if not RECORDINGS.is_dir():
         print("not run: the recordings are not beside this clone")
         return
-    print("| recording | torque | method | fitted over seen, large to small | light | status | s |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| recording | torque | method | fitted over seen, large to small | light | status |"
+        " beside diagnose, errors | s |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     off = []
     for name in names:
         begun = time.process_time()
         status, content, reason = fitted(RECORDINGS / name)
         spent = time.process_time() - begun
         if content is None:
-            print(f"| {name} | | | {reason} | | {status} | {spent:.1f} |", flush=True)
+            print(f"| {name} | | | {reason} | | {status} | | {spent:.1f} |", flush=True)
             continue
         checks = content["decrement_check"]
         ratios = ", ".join(
@@ -108,7 +132,7 @@ def main() -> None:
         )
         print(
             f"| {name} | {content['restoring']} | {content['method']} | {ratios} |"
-            f" {content['light']} | {status} | {spent:.1f} |",
+            f" {content['light']} | {status} | {apart(RECORDINGS / name, content)} | {spent:.1f} |",
             flush=True,
         )
         if content["light"] == "green":
