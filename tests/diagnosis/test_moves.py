@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -146,11 +148,11 @@ def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
     assert [step.winner.identifier for step in state.steps] == ["sensor-quadratic"]
 
 
-def tone_at(frequency_hz: float) -> Fit:
-    wave = 4e-4 * np.cos(2.0 * np.pi * frequency_hz * TIME_S)
+def tone_at(frequency_hz: float, size: float = 4e-4) -> Fit:
+    wave = size * np.cos(2.0 * np.pi * frequency_hz * TIME_S)
     data, noise = prepared(other_engine(TRUTH) + wave + white(5))
     model = Model(TIME_S, INTERVAL_S, (by_identifier("tone-pickup"),))
-    return refine(model, data, noise, np.append(TRUTH, [4e-4, 0.0, frequency_hz]))
+    return refine(model, data, noise, np.append(TRUTH, [size, 0.0, frequency_hz]))
 
 
 @pytest.mark.parametrize(("order", "apart"), [(3.4, True), (2.6, True), (2.0, False), (3.0, False)])
@@ -167,10 +169,34 @@ def test_a_line_off_the_harmonics_counts_against_the_noise(
     """Whatever else is left: here three numbers of a hundred standard deviations."""
     fit = tone_at(order * FREQUENCY_HZ)
     (tone,) = fit.model.effects
-    gain = lines(fit) if against_noise else 100.0
-    worth = Scale(fit.chi2 + lines(fit), 1e4, 3.0).worth(fit.chi2 + gain, fit, tone)
+    taken = sum(lines(fit).values())
+    gain = taken if against_noise else 100.0
+    worth = Scale(fit.chi2 + taken, 1e4, 3.0).worth(fit.chi2 + gain, fit, tone)
     assert worth == pytest.approx(gain if against_noise else 0.01, rel=1e-2)
     assert (gain > 1000.0) == against_noise
+
+
+def test_lines_that_nearly_cancel_take_little() -> None:
+    """A tone of one unit, told as one of 21 and a second mode of -20 that lasts as long."""
+    fit = tone_at(3.4 * FREQUENCY_HZ)
+    (alone,) = lines(fit).values()
+    bare, tone = fit.value[: len(TRUTH)], fit.value[len(TRUTH) :]
+    lasting = [*(-20.0 * tone[:2]), 1.0001 * tone[2], 100.0 * TIME_S[-1]]
+    value = np.concatenate([bare, 21.0 * tone[:2], tone[2:], lasting])
+    names = (by_identifier("tone-pickup"), by_identifier("second-mode"))
+    data, noise = prepared(other_engine(TRUTH))
+    both = refine(Model(TIME_S, INTERVAL_S, names), data, noise, value, rounds=0)
+    assert sum(lines(both).values()) < alone
+
+
+def test_a_line_that_takes_up_misfit_is_no_better_for_it() -> None:
+    """The credit of a line is what it takes in the best set."""
+    fit = tone_at(3.4 * FREQUENCY_HZ)
+    larger = tone_at(3.4 * FREQUENCY_HZ, 8e-4)
+    scale = Scale(fit.chi2 + sum(lines(fit).values()), 1e4, 3.0, lines(fit))
+    assert sum(lines(larger).values()) > 3.0 * sum(lines(fit).values())
+    worse = replace(larger, evaluation=replace(larger.evaluation, residual=100.0 * larger.residual))
+    assert scale.lost_by(worse) > scale.lost_by(fit)
 
 
 def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -59,19 +59,24 @@ class Scale:
         The chi^2 that small differences are counted in.
     numbers
         The independent numbers m of what it leaves; inf where that is noise alone.
+    lines
+        What each line off the harmonics takes in the best set: in a worse one it takes up misfit as
+        well, which is no credit to it.
     """
 
     least: float
     unit: float = 1.0
     numbers: float = math.inf
+    lines: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, best: Fit, data: Data, noise: Noise) -> Scale:
         """Return the scale that a set's best model gives."""
-        rest, least = remainder_of(best, data, noise), best.chi2 + lines(best)
+        rest, taken = remainder_of(best, data, noise), lines(best)
+        least = best.chi2 + sum(taken.values())
         if not rest.systematic:
-            return cls(least)
-        return cls(least, 1.0 + rest.excess / rest.numbers, rest.numbers)
+            return cls(least, lines=taken)
+        return cls(least, 1.0 + rest.excess / rest.numbers, rest.numbers, taken)
 
     @property
     def clean(self) -> bool:
@@ -87,7 +92,7 @@ class Scale:
 
     def lost_by(self, fit: Fit, credit: float = 0.0) -> float:
         """Return what a set of effects is worse than the best."""
-        apart = lines(fit)
+        apart = sum(min(taken, self.lines.get(key, taken)) for key, taken in lines(fit).items())
         return self.lost(fit.chi2 - credit + apart) - apart
 
     def within(self, lost: float) -> float:
@@ -98,26 +103,29 @@ class Scale:
 
     def worth(self, before: float, fit: Fit, effect: Effect) -> float:
         """Return what the fall of chi^2 from `before` by an effect of a fit is worth."""
-        own, apart = line(fit, effect), lines(fit)
-        return self.lost(before + apart - own) - self.lost(fit.chi2 + apart) + own
+        others = lines(fit)
+        own = others.pop(effect.key, 0.0)
+        apart = sum(others.values())
+        return self.lost(before + apart) - self.lost(fit.chi2 + apart + own) + own
 
 
-def line(fit: Fit, effect: Effect) -> float:
-    """Return the chi^2 that a line off the harmonics takes; 0 of all else.
+def lines(fit: Fit) -> dict[str, float]:
+    """Return the chi^2 that each line off the harmonics takes, by its effect's key.
 
-    No misfit of the motion makes such a line, and it is orthogonal to what is left: its chi^2
-    counts against the noise.
+    No misfit of the motion makes such a line, so that its chi^2 counts against the noise. It is
+    what the rest of the model cannot take: two lines that nearly cancel take little, however
+    large each is.
     """
-    if not off_harmonics(fit, effect):
-        return 0.0
-    first = next(place.start for other, place in fit.model.places() if other is effect)
-    sizes = slice(first, first + effect.sizes)
-    return float(np.sum((fit.jacobian[:, sizes] @ fit.value[sizes]) ** 2))
-
-
-def lines(fit: Fit) -> float:
-    """Return the chi^2 that all lines off the harmonics take."""
-    return sum(line(fit, effect) for effect in fit.model.effects)
+    found = {}
+    for effect, place in fit.model.places():
+        if off_harmonics(fit, effect):
+            sizes = slice(place.start, place.start + effect.sizes)
+            rest = fit.jacobian[:, [k for k in fit.free if not place.start <= k < place.stop]]
+            rest = rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300)
+            taken = fit.jacobian[:, sizes] @ fit.value[sizes]
+            taken = taken - rest @ np.linalg.lstsq(rest, taken, rcond=1e-11)[0]
+            found[effect.key] = float(taken @ taken)
+    return found
 
 
 @dataclass(frozen=True)
