@@ -151,7 +151,7 @@ def _effect(effect: FoundEffect) -> str:
     if effect.kind == "parameter":
         lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
     elif max((p for _, p in rivals), default=0.0) > effect.probability:
-        # The likeliest stands first, also where another was easier to fit.
+        # The most probable stands first, also where another was easier to fit.
         all_ = [(effect.probability, effect.name), *((p, _rival(name)) for name, p in rivals)]
         of = [
             f"{name} ({_percent(p)})" for p, name in sorted(all_, reverse=True) if p > _IMPROBABLE
