@@ -356,15 +356,16 @@ def diagnose(
     """
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
+        from pendpipe.files import distinct_names
 
         if fixed:
             raise InputError("fixed", "nothing is held in several recordings", "leave it out")
         if not isinstance(recording, Mapping):
-            names = [
-                f"recording {number}" if isinstance(each, Recording) else str(each)
+            files = [
+                f"recording {number}" if isinstance(each, Recording) else each
                 for number, each in enumerate(recording, 1)
             ]
-            recording = dict(zip(names, recording, strict=True))
+            recording = dict(zip(distinct_names(files), recording, strict=True))
         return diagnose_several(
             [_motion(each, volts_per_radian) for each in recording.values()],
             list(recording),

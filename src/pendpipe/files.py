@@ -9,7 +9,7 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
@@ -164,3 +164,16 @@ def without_folders(text: str) -> str:
     'run 7.csv, line 3: no number'
     """
     return _PATH.sub(lambda found: PurePath(found.group().replace("\\", "/")).name, text)
+
+
+def distinct_names(files: Sequence[str | Path]) -> list[str]:
+    """Return what tells files apart: their paths without the folders and the name they share.
+
+    >>> distinct_names(["runs/a/decay.csv", "runs/b/decay.csv"])
+    ['a', 'b']
+    """
+    rows = [Path(file).parts for file in files]
+    for end, rest in ((0, slice(1, None)), (-1, slice(None, -1))):
+        while min(map(len, rows)) > 1 and len({row[end] for row in rows}) == 1:
+            rows = [row[rest] for row in rows]
+    return ["/".join(row) for row in rows]

@@ -156,22 +156,24 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
 def _diagnose_several(arguments: argparse.Namespace) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
+    from pendpipe.files import distinct_names
 
-    for name in ("fix", "turning_points", "record"):
-        if getattr(arguments, name):
-            option = f"--{name.replace('_', '-')}"
+    for single in ("fix", "turning_points", "record"):
+        if getattr(arguments, single):
+            option = f"--{single.replace('_', '-')}"
             raise InputError(option, "it is for one recording", "give one FILE, or leave it out")
     recordings, made, given = {}, [], arguments.calibration
     if len(given) not in (0, 1, len(arguments.files)):
         raise InputError("--calibration", f"{len(given)} are given", "give one, or one for each")
-    for number, file in enumerate(arguments.files):
+    names = distinct_names(arguments.files)
+    for number, (file, name) in enumerate(zip(arguments.files, names, strict=True)):
         if Path(file).with_name("refused.json").exists():
             print(f"{file}: refused, and left out", file=sys.stderr)
             continue
         arguments.file = file
         arguments.calibration = given[number % len(given)] if given else None
-        recordings[file], provenance = read_motion(arguments)
-        made.append({"name": file, **provenance})
+        recordings[name], provenance = read_motion(arguments)
+        made.append({"name": name, **provenance})
     if len(recordings) < 2:
         return _not_analysable(arguments, "fewer than two recordings can be used", {})
     joint = diagnose_several(

@@ -11,6 +11,7 @@ effect is added, or a value that the recordings contradict each other in is no l
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -32,7 +33,7 @@ from pendpipe.diagnosis.evidence import (
 )
 from pendpipe.diagnosis.gauss_newton import GaussNewton
 from pendpipe.diagnosis.moves import CHOICE, FURTHER
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.refits import NEAR
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.scores import whitened
@@ -201,17 +202,18 @@ class Joint:
             own = (*member.extras, *effects)
             for effect in own:
                 model = model.adding(effect)
-            value = self._start(near.alone[number] if near else found.named, own)
-            try:
-                fit = refine(model, found.data, found.noise, value, held=_held(found))
-                if near:
-                    value = self._start(near.fits[number], own)
-                    steps = GaussNewton(model, found.data, found.noise)
-                    there.append(replace(fit, evaluation=steps.evaluate_within_bounds(value)))
-            except (NoMotionError, np.linalg.LinAlgError):
+            bases = [*([near.alone[number]] if near else []), found.named, found.baseline]
+            starts = [self._start(base, own) for base in bases]
+            fit = best_fit(model, found.data, found.noise, starts, held=_held(found))
+            if fit is None:
                 return None
             alone.append(fit)
-        return self.joined(alone, effects, released, there)
+            if near:
+                value = self._start(near.fits[number], own)
+                steps = GaussNewton(model, found.data, found.noise)
+                with suppress(NoMotionError):
+                    there.append(replace(fit, evaluation=steps.evaluate_within_bounds(value)))
+        return self.joined(alone, effects, released, there if len(there) == len(alone) else ())
 
     def _start(self, base: Fit, effects: Sequence[Effect]) -> FloatArray:
         """Return a model's values: those of a fit, and where it lacks an effect its own start."""
