@@ -583,3 +583,16 @@ def test_a_mark_far_from_the_swing_is_no_reading(
     recording = read_as("time_s,x_px\n" + rows(TIME, np.where(lost, mark, pixels)))
     assert np.array_equal(recording.usable, ~lost)
     np.testing.assert_allclose(recording.values[~lost], pixels[~lost], atol=1e-5)
+
+
+def test_axes_of_a_sensor_are_no_position(read_as: Callable[..., Recording]) -> None:
+    """An accelerometer shows gravity on one axis: that is no distance from a pivot."""
+    across, along = 300.0 * np.sin(ANGLE), np.full(len(ANGLE), -1000.0) + 1e3 * STILL
+    recording = read_as("Time (s),x,y,z\n" + rows(TIME, across, along, 1e3 * STILL, form=".0f"))
+    np.testing.assert_array_equal(recording.values, np.rint(across))
+    assert recording.weak_guesses
+
+
+@pytest.mark.parametrize(("head", "unit"), [("s_m", "m"), ("Skalenteile", "divisions")])
+def test_a_name_may_hold_the_unit(read_as: Callable[..., Recording], head: str, unit: str) -> None:
+    same(read_as(f"t (s),{head}\n" + rows(TIME, ANGLE)), unit=unit)

@@ -456,7 +456,9 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     if not pairs and len(silent) >= 2:
         pairs = [(silent[0], silent[1])]
     for x, y in pairs:
-        if _on_a_circle(x.values, y.values, named=bool(x.name)):
+        # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
+        sensed = "z" in named and not x.unit
+        if not sensed and _on_a_circle(x.values, y.values, named=bool(x.name)):
             return x, y
     return None
 

@@ -70,6 +70,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("own", 9.80665e-3, "m/s^2", "mg"),
     ("own", 1.0, "pixels", "px pix pixel pixels píxeles"),
     ("own", 1.0, "counts", "count counts tick ticks steps lsb digits bit bits adu"),
+    ("own", 1.0, "divisions", "skalenteile skt div divisions"),
     ("own", 1.0, "px/s", "px/s"),
     ("own", 1.0, "lx", "lx lux"),
     ("own", 1.0, "T", "t tesla"),
@@ -148,7 +149,7 @@ def split_header(text: str) -> tuple[str, str]:
         unit = unit_of(split[2])
         # One letter after an underscore is as likely an axis or an index as a unit.
         bare = pattern is _SUFFIX and len(split[2]) == 1 and split[2] not in "sV°"
-        if split[2] == "m" and re.fullmatch(r"(?i)x|y|z|pos|position|displacement", split[1]):
+        if split[2] == "m" and re.fullmatch(r"(?i)s|x|y|z|pos|position|displacement", split[1]):
             bare = False
         if unit is not None and not bare:
             return split[1].strip(), split[2].strip()
