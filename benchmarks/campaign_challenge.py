@@ -72,19 +72,31 @@ class Generator:
         self.weights = sorted(self.own["weights"])
         clamps = sorted({item for name in self.names for item in places[name]["weights_m"].items()})
         self.places = np.array([place for _, place in clamps])
-        self.on = np.array([
+        self.on = np.array(
             [
-                clamps.index((each, places[name]["weights_m"][each]))
-                if each in places[name]["weights_m"] else -1
-                for each in self.weights
+                [
+                    clamps.index((each, places[name]["weights_m"][each]))
+                    if each in places[name]["weights_m"]
+                    else -1
+                    for each in self.weights
+                ]
+                for name in self.names
             ]
-            for name in self.names
-        ])  # fmt: skip
+        )
         self.nuisances = [
-            "coefficient", *(f"clamp {number}" for number in range(len(clamps))), "zero",
-            *(f"mass {each}" for each in self.weights), "rod", "rod length", "sphere", "radius",
-            "lever", "kelvin", "air", "ratio",
-        ]  # fmt: skip
+            "coefficient",
+            *(f"clamp {number}" for number in range(len(clamps))),
+            "zero",
+            *(f"mass {each}" for each in self.weights),
+            "rod",
+            "rod length",
+            "sphere",
+            "radius",
+            "lever",
+            "kelvin",
+            "air",
+            "ratio",
+        ]
         self.at = {name: number for number, name in enumerate([*self.nuisances, *CAUSES])}
         self.free = np.array([name == "coefficient" for name in self.nuisances])
 

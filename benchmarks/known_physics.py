@@ -75,9 +75,13 @@ class Answers:
     def said(self) -> str:
         """All words that were printed, those of the reader too."""
         return " ".join(
-            [*self.content.get("warnings", []), self.content.get("statement", ""),
-             self.diagnosis.get("said", ""), self.fit.get("said", "")]
-        )  # fmt: skip
+            [
+                *self.content.get("warnings", []),
+                self.content.get("statement", ""),
+                self.diagnosis.get("said", ""),
+                self.fit.get("said", ""),
+            ]
+        )
 
     def between(self, name: str, low: float = -np.inf, high: float = np.inf) -> bool:
         """Whether an interval of 95 % lies between two values."""
@@ -142,7 +146,7 @@ TESTS: Final[dict[str, Callable[[Answers], bool]]] = {
     "offset": lambda it: it.between("offset", low=0) or it.between("offset", high=0),
     "gap": lambda it: re.search(r"\bgaps?\b|missing|dropped", it.said) is not None,
     "cut": lambda it: bool(it.fit.get("content", {}).get("cuts")) or it.diagnosis["status"] == 2,
-}  # fmt: skip
+}
 """Items that are no name of the catalogue."""
 
 

@@ -83,9 +83,15 @@ def test_di154rs_stop_is_repeated_while_data_flow(script: Any) -> None:
 def test_di154rs_takes_9600_baud_for_what_4800_cannot_carry(script: Any) -> None:
     quiet = [(b"\0L", b"L"), (b"\x00", b"\x00"), (b"\0M", b"M"), (b"\x00", b"\x00")]
     line = script(
-        (b"\0B", b"B"), (b"\x04", b"\x04"), (b"\0C", b"C"), (b"\x01", b"\x01"), *quiet,
-        *STOP_154, (b"\0B", b"B"), (b"\x01", b"\x01"),
-    )  # fmt: skip
+        (b"\0B", b"B"),
+        (b"\x04", b"\x04"),
+        (b"\0C", b"C"),
+        (b"\x01", b"\x01"),
+        *quiet,
+        *STOP_154,
+        (b"\0B", b"B"),
+        (b"\x01", b"\x01"),
+    )
     driver = DI154RS(line, FAST)
     assert driver.configure([1], 480.0).rate_hz == 480.0
     driver.stop()

@@ -43,9 +43,10 @@ def test_the_noise_is_reached_when_the_decay_has_come_down_to_it(noise_counts: f
     counts = np.rint(counts + noise.normal(0.0, noise_counts, len(counts))).astype(np.int16)
     watch = NoiseWatch(rate_hz)
     ended_s = next(
-        t for t in np.arange(10.0, 4000.0, 10.0)
+        t
+        for t in np.arange(10.0, 4000.0, 10.0)
         if watch.feed(counts[round((t - 10) * rate_hz) : round(t * rate_hz)])
-    )  # fmt: skip
+    )
     sd = math.hypot(noise_counts, 1 / math.sqrt(12.0))
     assert ended_s == pytest.approx(tau_s * math.log(amplitude / (2 * sd)), abs=80.0)
 

@@ -44,22 +44,30 @@ def water_records(
         ball = physics.Sphere(0.0358, RADIUS, DISTANCE, submerged=True)
         motion = physics.swing([rod, ball, *weights_of(branch)], WATER)
         quality = physics.viscous_quality_factor(
-            motion.moment_of_inertia_kg_m2, motion.angular_frequency_per_s, RADIUS, DISTANCE,
-            WATER.viscosity_pa_s, WATER.density_kg_per_m3, history,
-        )  # fmt: skip
+            motion.moment_of_inertia_kg_m2,
+            motion.angular_frequency_per_s,
+            RADIUS,
+            DISTANCE,
+            WATER.viscosity_pa_s,
+            WATER.density_kg_per_m3,
+            history,
+        )
         f = motion.frequency_hz
         rates = np.pi * f * (drag_factor / quality + 1.0 / (K * f**2))
         for n, (frequency, rate) in enumerate(zip(f, rates, strict=True)):
             noise = 0.0 if random is None else RELATIVE_SD * rate * random.standard_normal()
             records.append(
                 MeasuredRecord(
-                    f"{branch}-{n}", "water", branch, Estimate(float(frequency), 0.0, "Hz"),
+                    f"{branch}-{n}",
+                    "water",
+                    branch,
+                    Estimate(float(frequency), 0.0, "Hz"),
                     Estimate(0.45, 0.01, "1/(rad s)"),
                     Estimate(float(rate + noise), float(RELATIVE_SD * rate), "1/s"),
                     Estimate(1.4e-6, 1e-7, "rad/s"),
                     Estimate(float(motion.moment_of_inertia_kg_m2[n]), 0.0, "kg m^2"),
                 )
-            )  # fmt: skip
+            )
     return records
 
 
@@ -68,12 +76,20 @@ def air_records(seed: int) -> list[MeasuredRecord]:
     nothing = Estimate(0.0, 0.0, "")
     return [
         MeasuredRecord(
-            f"air-{n}", "air", "air", Estimate(float(f), 0.0, "Hz"), nothing,
-            Estimate(float(np.pi / (K * f) * (1 + 0.01 * random.standard_normal())),
-                     float(np.pi / (K * f) * 0.01), "1/s"), nothing,
+            f"air-{n}",
+            "air",
+            "air",
+            Estimate(float(f), 0.0, "Hz"),
+            nothing,
+            Estimate(
+                float(np.pi / (K * f) * (1 + 0.01 * random.standard_normal())),
+                float(np.pi / (K * f) * 0.01),
+                "1/s",
+            ),
+            nothing,
         )
         for n, f in enumerate(np.geomspace(1 / 15.0, 0.5, 12))
-    ]  # fmt: skip
+    ]
 
 
 def campaign(records: list[MeasuredRecord], errors: SharedErrors | None = None) -> Comparison:
@@ -144,12 +160,17 @@ def test_slope_and_curvature_of_an_exact_branch(exponent: float, curvature: floa
     quality = 150.0 * np.exp(exponent * u + 0.5 * curvature * u**2)
     records = [
         MeasuredRecord(
-            f"r{n}", "water", "b", Estimate(float(g), 0.0, "Hz"), Estimate(0.0, 0.0, ""),
+            f"r{n}",
+            "water",
+            "b",
+            Estimate(float(g), 0.0, "Hz"),
+            Estimate(0.0, 0.0, ""),
             Estimate(float(np.pi * g * (1 / q + 1 / (K * g**2))), 1e-6, "1/s"),
-            Estimate(0.0, 0.0, ""), Estimate(0.1, 0.0, "kg m^2"),
+            Estimate(0.0, 0.0, ""),
+            Estimate(0.1, 0.0, "kg m^2"),
         )
         for n, (g, q) in enumerate(zip(f, quality, strict=True))
-    ]  # fmt: skip
+    ]
     found = campaign(records).exponents["b"]
     # About a symmetric range the parabola leaves the straight line's slope alone.
     assert found.exponent.value == pytest.approx(exponent, abs=1e-9)
@@ -189,9 +210,14 @@ def test_shared_errors_move_the_factor_as_eq16_says() -> None:
     records = water_records(seed=1)
     bare = campaign(records).theory_factor
     errors = SharedErrors(
-        inverse_k=20.0 / K**2, radius_m=2.5e-5, distance_m=5e-4, relative_inertia=0.004,
-        relative_viscosity=0.01, relative_density=1e-4, temperature_k=0.5,
-    )  # fmt: skip
+        inverse_k=20.0 / K**2,
+        radius_m=2.5e-5,
+        distance_m=5e-4,
+        relative_inertia=0.004,
+        relative_viscosity=0.01,
+        relative_density=1e-4,
+        temperature_k=0.5,
+    )
     found = campaign(records, errors)
     factor = found.theory_factor
     value = factor.estimate.value

@@ -26,11 +26,17 @@ def table(
     side = 1.0 - 2.0 * (number % 2)
     noise = 0.0 if seed is None else sd * np.random.default_rng(seed).standard_normal(len(time_s))
     return TurningPoints(
-        half_cycle=number, time_s=time_s, time_sd_s=sd / (OMEGA * amplitudes),
-        angle_rad=side * amplitudes + noise, angle_sd_rad=np.full(len(time_s), sd),
-        level_rad=np.zeros(len(time_s)), level_sd_rad=0.1 * sd, noise_rms_rad=7.0 * sd,
-        start_s=float(time_s[0]) - 0.1, samples=30000,
-    )  # fmt: skip
+        half_cycle=number,
+        time_s=time_s,
+        time_sd_s=sd / (OMEGA * amplitudes),
+        angle_rad=side * amplitudes + noise,
+        angle_sd_rad=np.full(len(time_s), sd),
+        level_rad=np.zeros(len(time_s)),
+        level_sd_rad=0.1 * sd,
+        noise_rms_rad=7.0 * sd,
+        start_s=float(time_s[0]) - 0.1,
+        samples=30000,
+    )
 
 
 def engine_table(model: Eq8, count: int, sd: float, y0: float = 0.068) -> TurningPoints:
@@ -105,9 +111,11 @@ def test_the_period_is_lengthened_as_eq_8_says(model: Eq8, leading: float) -> No
 
 @settings(max_examples=40, deadline=None)
 @given(
-    quadratic=st.floats(0.0, 1.0), linear=st.floats(0.005, 0.05), coulomb=st.floats(0.0, 1e-5),
+    quadratic=st.floats(0.0, 1.0),
+    linear=st.floats(0.005, 0.05),
+    coulomb=st.floats(0.0, 1e-5),
     share=st.floats(0.0, 1.0),
-)  # fmt: skip
+)
 def test_the_frequency_is_eq_8s_and_not_the_shifted_one(
     quadratic: float, linear: float, coulomb: float, share: float
 ) -> None:
@@ -137,9 +145,13 @@ def test_the_level_error_does_not_reach_the_rates() -> None:
     points = table(time, exact, 1e-5)
     error = 5e-6
     shifted = TurningPoints(
-        **{**points.__dict__, "angle_rad": points.angle_rad - error * points.level_coupling,
-           "level_rad": points.level_rad + error, "level_sd_rad": error}
-    )  # fmt: skip
+        **{
+            **points.__dict__,
+            "angle_rad": points.angle_rad - error * points.level_coupling,
+            "level_rad": points.level_rad + error,
+            "level_sd_rad": error,
+        }
+    )
     result = fit_points(shifted)
     for name, rate in zip("abc", REGIMES["all"], strict=True):
         estimate = result.parameters[name]

@@ -32,10 +32,13 @@ def test_a_bounded_step_is_the_lowest_allowed_point(root, gradient) -> None:  # 
     bounds = Bounds(np.array([-0.3, -0.1, 0.0, -np.inf]), np.array([np.inf, 0.2, np.inf, np.inf]))
     step = bounded_step(normal, gradient, bounds)
     found = minimize(
-        lambda d: 0.5 * d @ normal @ d - gradient @ d, np.array([0.0, 0.0, 0.0, 0.0]),
-        jac=lambda d: normal @ d - gradient, bounds=list(zip(*bounds, strict=True)),
-        method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-9},
-    )  # fmt: skip
+        lambda d: 0.5 * d @ normal @ d - gradient @ d,
+        np.array([0.0, 0.0, 0.0, 0.0]),
+        jac=lambda d: normal @ d - gradient,
+        bounds=list(zip(*bounds, strict=True)),
+        method="L-BFGS-B",
+        options={"ftol": 1e-15, "gtol": 1e-9},
+    )
     assert np.all((bounds.lower <= step) & (step <= bounds.upper))
     assert 0.5 * step @ normal @ step - gradient @ step <= found.fun + 1e-7
 

@@ -47,9 +47,12 @@ print(len(points) > 30, "numba" in sys.modules, "scipy" in sys.modules)
 def test_a_new_process_measures_and_fits_without_numba(code: str) -> None:
     exec(code, {})  # what it needs is compiled and kept
     run = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        [sys.executable, "-c", code],
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert run.stdout.split() == ["True", "False", "False"]
 
 

@@ -30,7 +30,7 @@ def record(
         quadratic=Estimate(0.45, 0.01, "1/(rad s)", (0.43, 0.47)),
         linear=Estimate(rate, sd, "1/s"),
         coulomb=Estimate(1.4e-6, 1e-7, "rad/s"),
-    )  # fmt: skip
+    )
 
 
 def air_records(

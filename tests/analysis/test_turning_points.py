@@ -88,9 +88,14 @@ def test_precision_is_that_of_every_reading_used() -> None:
     offset=st.floats(-0.1, 0.1),
 )
 def test_without_noise_only_the_shape_is_left_open(
-    quality: float, quadratic: float, coulomb: float, share: float,
-    frequency: float, phase: float, offset: float,
-) -> None:  # fmt: skip
+    quality: float,
+    quadratic: float,
+    coulomb: float,
+    share: float,
+    frequency: float,
+    phase: float,
+    offset: float,
+) -> None:
     """Errors of (losses/omega)^2 of the amplitude at most, whatever the mixture."""
     omega = 2.0 * math.pi * frequency
     b = 0.5 * omega / quality
@@ -232,9 +237,14 @@ def test_circular_error(amplitude: float, allowed: float) -> None:
     b = 0.02
     run = scipy_integrate.solve_ivp(
         lambda _, z: [z[1], -2.0 * b * z[1] - OMEGA**2 * np.sin(z[0])],
-        (0.0, 40.0), [amplitude, 0.0], rtol=1e-11, atol=1e-12, dense_output=True,
-        events=lambda _, z: z[1], method="DOP853",
-    )  # fmt: skip
+        (0.0, 40.0),
+        [amplitude, 0.0],
+        rtol=1e-11,
+        atol=1e-12,
+        dense_output=True,
+        events=lambda _, z: z[1],
+        method="DOP853",
+    )
     time = np.arange(8000) * 0.005
     noise = 1e-4 * np.random.default_rng(2).standard_normal(8000)
     points = find_turning_points(Recording(time, run.sol(time)[0] + noise, "angle_rad"))

@@ -191,7 +191,11 @@ def test_on_a_null_every_name_is_false_and_near_names_are_no_error_outside() -> 
     null = kept([("second-mode", 0.3, [])], part="null", hidden=[], present={})
     assert scores.judge(null, names)["false"] == ["second-mode"]
     outside = kept(
-        [("drag-form", 0.9, [])], part="outside", hidden=["wind"], present={}, outside="wind",
+        [("drag-form", 0.9, [])],
+        part="outside",
+        hidden=["wind"],
+        present={},
+        outside="wind",
         near=["drag-form"],
-    )  # fmt: skip
+    )
     assert not scores.judge(outside, names)["confident"]

@@ -62,17 +62,42 @@ def diagnosis(folder: Path) -> dict[str, Any]:
 
 
 TOP = {
-    "schema_version", "baseline", "noise_rms_rad", "verdict", "p_value", "effects", "improved",
-    "held_out", "unexplained", "statement", "figures", "provenance",
-}  # fmt: skip
+    "schema_version",
+    "baseline",
+    "noise_rms_rad",
+    "verdict",
+    "p_value",
+    "effects",
+    "improved",
+    "held_out",
+    "unexplained",
+    "statement",
+    "figures",
+    "provenance",
+}
 MODEL = {"parameters", "residual_rms_rad", "chi2_per_dof"}
 EFFECT = {
-    "id", "name", "kind", "equation", "parameters", "delta_chi2", "p_value_global", "probability",
-    "indistinguishable_from", "deciding_measurement", "location",
-}  # fmt: skip
+    "id",
+    "name",
+    "kind",
+    "equation",
+    "parameters",
+    "delta_chi2",
+    "p_value_global",
+    "probability",
+    "indistinguishable_from",
+    "deciding_measurement",
+    "location",
+}
 LOCATION = {
-    "summary", "time_s", "amplitude_rad", "phase_rad", "frequency_hz", "harmonics", "adc_codes",
-}  # fmt: skip
+    "summary",
+    "time_s",
+    "amplitude_rad",
+    "phase_rad",
+    "frequency_hz",
+    "harmonics",
+    "adc_codes",
+}
 
 
 def check_contract(content: dict[str, Any]) -> None:
@@ -82,8 +107,11 @@ def check_contract(content: dict[str, Any]) -> None:
     assert set(content["baseline"]) == MODEL | {"name"}
     assert set(content["improved"]) == MODEL
     assert set(content["held_out"]) == {
-        "log_density_before", "log_density_after", "gain", "gain_sd",
-    }  # fmt: skip
+        "log_density_before",
+        "log_density_after",
+        "gain",
+        "gain_sd",
+    }
     assert set(content["unexplained"]) == {"residual_rms_rad", "p_value"}
     assert isinstance(content["statement"], str)
     for model in (content["baseline"], content["improved"]):
@@ -138,8 +166,12 @@ def test_circular_error_is_named_and_the_fit_improves_to_the_noise(
     frequency = content["improved"]["parameters"]["frequency"]
     assert abs(frequency["value"] - FREQUENCY_HZ) < 5 * frequency["sd"]
     assert content["figures"] == [
-        "decay.svg", "residual_map.svg", "residual_spectrum.svg", "damping.svg", "frequency.svg",
-    ]  # fmt: skip
+        "decay.svg",
+        "residual_map.svg",
+        "residual_spectrum.svg",
+        "damping.svg",
+        "frequency.svg",
+    ]
     assert {path.name for path in tmp_path.glob("*.svg")} == set(content["figures"])
 
 
@@ -186,10 +218,15 @@ def test_a_file_that_is_not_there_leaves_nothing(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("words", [
-    ["--fix", "mass=1"], ["--fix", "a=-1"], ["--fix", "a=0.01", "--fix", "a=0.02"],
-    ["--baseline", "viscous", "--fix", "c=1e-4"],
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--fix", "mass=1"],
+        ["--fix", "a=-1"],
+        ["--fix", "a=0.01", "--fix", "a=0.02"],
+        ["--baseline", "viscous", "--fix", "c=1e-4"],
+    ],
+)
 def test_a_parameter_that_cannot_be_held_is_a_usage_fault(
     linear: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

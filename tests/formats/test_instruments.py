@@ -268,9 +268,13 @@ def test_remarks_with_a_number_are_no_names(read_as: Callable[..., Recording]) -
 def oscilloscopes() -> dict[str, str]:
     volts = 2.5 * ANGLE
     tektronix = [
-        "Record Length,3.0e+03,Points", "Sample Interval,2.0e-02,s", "Source,CH1,",
-        "Vertical Units,V,", "Horizontal Units,s,", "Model Number,TDS2014C,",
-    ]  # fmt: skip
+        "Record Length,3.0e+03,Points",
+        "Sample Interval,2.0e-02,s",
+        "Source,CH1,",
+        "Vertical Units,V,",
+        "Horizontal Units,s,",
+        "Model Number,TDS2014C,",
+    ]
     right = rows(TIME - 30, volts).splitlines()
     left = tektronix + [",,"] * (len(right) - len(tektronix))
     return {
@@ -407,8 +411,23 @@ def old_workbook(cells: list[list[str | float]]) -> bytes:
     root = entry("Root Entry", 5, 1, 0xFFFFFFFE, 0)
     folder = root + entry("Workbook", 2, 0xFFFFFFFF, 0, len(stream)) + b"\0" * 256
     header = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 16
-    header += struct.pack("<HHHHH6xIIIIIIIII", 0x3E, 3, 0xFFFE, 9, 6, 0, fats, sectors, 0, 4096,
-                          0xFFFFFFFE, 0, 0xFFFFFFFE, 0)  # fmt: skip
+    header += struct.pack(
+        "<HHHHH6xIIIIIIIII",
+        0x3E,
+        3,
+        0xFFFE,
+        9,
+        6,
+        0,
+        fats,
+        sectors,
+        0,
+        4096,
+        0xFFFFFFFE,
+        0,
+        0xFFFFFFFE,
+        0,
+    )
     places = [*range(sectors + 1, sectors + 1 + fats)]
     header += struct.pack("<109I", *places, *[0xFFFFFFFF] * (109 - fats))
     return header + stream + folder + struct.pack(f"<{len(chain)}I", *chain)

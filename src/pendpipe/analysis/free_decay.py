@@ -519,9 +519,14 @@ def _beating(
         for mode in modes
     )
     cuts = stretches(
-        time, values, start, stop, quiet=2.0 * least, window_s=half_period,
+        time,
+        values,
+        start,
+        stop,
+        quiet=2.0 * least,
+        window_s=half_period,
         before="moved by hand before release",
-    )  # fmt: skip
+    )
     return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
 
 

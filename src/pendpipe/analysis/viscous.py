@@ -146,13 +146,22 @@ def viscous_losses(
         )
         if around is None or inertia is None:
             continue
-        rows.append((
-            split.measured.frequency.value, inertia.value, split.viscous_rate.value,
-            split.viscous_rate_sd_own, inertia.sd / inertia.value,
-            split.measured.linear.value - split.viscous_rate.value,
-            split.viscous_rate_per_inverse_k, around.radius_m, around.distance_m,
-            around.viscosity_pa_s, around.density_kg_per_m3, split.measured.record,
-        ))  # fmt: skip
+        rows.append(
+            (
+                split.measured.frequency.value,
+                inertia.value,
+                split.viscous_rate.value,
+                split.viscous_rate_sd_own,
+                inertia.sd / inertia.value,
+                split.measured.linear.value - split.viscous_rate.value,
+                split.viscous_rate_per_inverse_k,
+                around.radius_m,
+                around.distance_m,
+                around.viscosity_pa_s,
+                around.density_kg_per_m3,
+                split.measured.record,
+            )
+        )
     rows.sort(key=lambda row: row[0])
     columns = np.array([row[:-1] for row in rows], dtype=np.float64).reshape(len(rows), 11).T
     return ViscousLosses(tuple(row[-1] for row in rows), *columns)

@@ -136,12 +136,14 @@ class Design:
         ]
         found += [
             Nuisance("zero of the scale", "m", own.scale_zero_sd_m),
-            *(Nuisance(f"mass of {name}", "kg", own.weights[name].mass_sd_kg)
-              for name in self.weights),
+            *(
+                Nuisance(f"mass of {name}", "kg", own.weights[name].mass_sd_kg)
+                for name in self.weights
+            ),
             Nuisance("mass of the rod", "kg", own.rod.mass_sd_kg),
             Nuisance("length of the rod", "m", own.rod.length_sd_m),
             Nuisance("exponent of the loss torque", "", law.inertia_exponent_sd),
-        ]  # fmt: skip
+        ]
         if sphere is not None and any(run.sphere for run in self.runs):
             found += [
                 Nuisance("mass of the sphere", "kg", sphere.mass_sd_kg),
@@ -184,10 +186,12 @@ class Design:
     @cached_property
     def _clamp_index(self) -> Any:
         index = {clamp: number for number, clamp in enumerate(self.clamps)}
-        return np.array([
-            [index.get((name, run.weights_m.get(name, math.nan)), -1) for name in self.weights]
-            for run in self.runs
-        ])  # fmt: skip
+        return np.array(
+            [
+                [index.get((name, run.weights_m.get(name, math.nan)), -1) for name in self.weights]
+                for run in self.runs
+            ]
+        )
 
     @cached_property
     def mounted(self) -> FloatArray:

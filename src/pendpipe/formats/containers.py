@@ -251,13 +251,20 @@ def _of_tracker(place: Path, root: ET.Element) -> Iterator[tuple[str, str, Float
 
     The image's y points down; origin, scale and tilt of the axes are those of the frame.
     """
-    marks = [_frames(track, "PointMass$FrameData") for track in root.iter("object")
-             if track.get("class", "").endswith("tracker.PointMass")]  # fmt: skip
+    marks = [
+        _frames(track, "PointMass$FrameData")
+        for track in root.iter("object")
+        if track.get("class", "").endswith("tracker.PointMass")
+    ]
     marks = [mark for mark in marks if mark]
     axes = next(
-        (_frames(each, "ImageCoordSystem$FrameData") for each in root.iter("object")
-         if each.get("class", "").endswith("ImageCoordSystem")), {}
-    )  # fmt: skip
+        (
+            _frames(each, "ImageCoordSystem$FrameData")
+            for each in root.iter("object")
+            if each.get("class", "").endswith("ImageCoordSystem")
+        ),
+        {},
+    )
     if not marks:
         raise InputError(place, "the project has no point mass", "export its data as text")
     mass = max(marks, key=len)

@@ -21,8 +21,12 @@ from pendpipe.arrays import AnyArray
 from pendpipe.formats.table import NotThisFormatError
 
 _STORED: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"} | {
-    12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4"
-}  # fmt: skip
+    12: "i8",
+    13: "u8",
+    16: "u1",
+    17: "u2",
+    18: "u4",
+}
 _MATRIX, _COMPRESSED = 14, 15
 _CELL, _STRUCT, _CHARACTERS = 1, 2, 4
 _NUMERIC: Final = range(6, 16)

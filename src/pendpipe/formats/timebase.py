@@ -18,8 +18,12 @@ _EPOCH: Final = 3e8
 """Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
 _LATEST: Final = 1e10
 """Seconds since 1970 that no recording has reached: the unit in the header is wrong."""
-_EPOCHS: Final = ((3e17, 1e-9, "nanoseconds"), (3e14, 1e-6, "microseconds"),
-                  (3e11, 1e-3, "milliseconds"), (_EPOCH, 1.0, "seconds"))  # fmt: skip
+_EPOCHS: Final = (
+    (3e17, 1e-9, "nanoseconds"),
+    (3e14, 1e-6, "microseconds"),
+    (3e11, 1e-3, "milliseconds"),
+    (_EPOCH, 1.0, "seconds"),
+)
 _LONGEST_S: Final = 300.0
 """Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
 _SHORTEST_S: Final = 5e-4

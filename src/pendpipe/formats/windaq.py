@@ -25,17 +25,35 @@ from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptio
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {
-    "channels": (0, "<u2"), "one": (2, "<u2"), "table": (4, "u1"), "entry": (5, "u1"),
-    "size": (6, "<i2"), "data_bytes": (8, "<u4"), "event_bytes": (12, "<u4"),
-    "annotation_bytes": (16, "<u2"), "screen": (18, "(3,)<i2"), "windows": (24, "(4,)u1"),
-    "interval_s": (28, "<f8"), "opened": (36, "<i4"), "closed": (40, "<i4"),
-    "compression": (44, "<i4"), "next_write": (56, "<u4"), "shown": (64, "(4,)u1"),
-    "order": (68, "(32,)u1"), "flags": (100, "<u2"),
-}  # fmt: skip
+    "channels": (0, "<u2"),
+    "one": (2, "<u2"),
+    "table": (4, "u1"),
+    "entry": (5, "u1"),
+    "size": (6, "<i2"),
+    "data_bytes": (8, "<u4"),
+    "event_bytes": (12, "<u4"),
+    "annotation_bytes": (16, "<u2"),
+    "screen": (18, "(3,)<i2"),
+    "windows": (24, "(4,)u1"),
+    "interval_s": (28, "<f8"),
+    "opened": (36, "<i4"),
+    "closed": (40, "<i4"),
+    "compression": (44, "<i4"),
+    "next_write": (56, "<u4"),
+    "shown": (64, "(4,)u1"),
+    "order": (68, "(32,)u1"),
+    "flags": (100, "<u2"),
+}
 _ENTRY_FIELDS: Final = {
-    "scale": (0, "<f4"), "offset": (4, "<f4"), "slope": (8, "<f8"), "intercept": (16, "<f8"),
-    "unit": (24, "S6"), "divisor": (31, "u1"), "number": (32, "u1"), "gain": (33, "u1"),
-}  # fmt: skip
+    "scale": (0, "<f4"),
+    "offset": (4, "<f4"),
+    "slope": (8, "<f8"),
+    "intercept": (16, "<f8"),
+    "unit": (24, "S6"),
+    "divisor": (31, "u1"),
+    "number": (32, "u1"),
+    "gain": (33, "u1"),
+}
 _MARK: Final = b"\x01\x80"
 _HEADER_BYTES, _TABLE, _ENTRY = 1156, 110, 36
 _SIZES: Final = (_HEADER_BYTES, 1536, 5296)

@@ -157,9 +157,17 @@ def split_header(text: str) -> tuple[str, str]:
 
 
 Role = Literal[
-    "time", "index", "angle", "length", "volts", "signal", "velocity", "acceleration",
-    "none", "unknown",
-]  # fmt: skip
+    "time",
+    "index",
+    "angle",
+    "length",
+    "volts",
+    "signal",
+    "velocity",
+    "acceleration",
+    "none",
+    "unknown",
+]
 """What a column holds. A ``signal`` is light, force, field; ``none`` is a drive, a model, an
 uncertainty, a temperature: nothing that a free pendulum's motion is read from."""
 
@@ -177,9 +185,12 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         r"|ampiezza|amplitud|einhüllende|envelope|phase|phasen\w*|fase|func|window|smooth\w*"
         r"|filter(ed)?|covariance|correlation|tg ?f|magnitude|betrag|absolute(?! (ang|pos|win))",
     ),
-    ("acceleration", r"acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
-                     r"|\w*beschleunigung|accelerazione"
-                     r"|aceleraci[oó]n|accélération|\w*_?ddot|ускорение|加速度|alpha_?dd"),
+    (
+        "acceleration",
+        r"acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
+        r"|\w*beschleunigung|accelerazione"
+        r"|aceleraci[oó]n|accélération|\w*_?ddot|ускорение|加速度|alpha_?dd",
+    ),
     (
         "velocity",
         r"angular (velocity|speed|rate)|winkelgeschw\w*|gyro\w*|omega\d?|ω\d?|\w*theta_?dot"
@@ -228,7 +239,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         r"|hoogte|uitwijking|verplaatsing|ultrasonic|sonar|laser|lvdt|range|level|déplacement|r"
         r"|length|s",
     ),
-)  # fmt: skip
+)
 _PATTERNS: Final = tuple(
     (role, re.compile(rf"(?<![^\W_])(?:{words})(?![^\W_'])")) for role, words in _WORDS
 )

@@ -65,10 +65,16 @@ VENDOR: Final = 0x0683
 """The vendor's USB number."""
 _DI245: Final = 0x2450
 _OF_WINDAQ: Final = {
-    0x1100: "DI-1100", 0x1110: "DI-1110", 0x1120: "DI-1120", 0x2008: "DI-2008",
-    0x2108: "DI-2108", 0x2109: "DI-2108-P", 0x4108: "DI-4108", 0x4208: "DI-4208",
+    0x1100: "DI-1100",
+    0x1110: "DI-1110",
+    0x1120: "DI-1120",
+    0x2008: "DI-2008",
+    0x2108: "DI-2108",
+    0x2109: "DI-2108-P",
+    0x4108: "DI-4108",
+    0x4208: "DI-4208",
     0x4718: "DI-4718B",
-}  # fmt: skip
+}
 """Product numbers in the mode for WinDaq (LibUSB)."""
 _CDC: Final = (
     "hold its button within 5 s of the green blinking until it is red: blinking yellow is the"

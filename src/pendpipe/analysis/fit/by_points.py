@@ -73,9 +73,13 @@ def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
 
 
 def period_excess(
-    amplitude: FloatArray | float, angular_frequency: float, a: float, b: float, c: float,
+    amplitude: FloatArray | float,
+    angular_frequency: float,
+    a: float,
+    b: float,
+    c: float,
     share: float,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Relative lengthening of a half period by the losses of Eq. 8, to second order.
 
     ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2
@@ -101,9 +105,12 @@ def period_excess(
 
 
 def phases(
-    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
-    angular_frequency: float, restoring: Restoring,
-) -> FloatArray:  # fmt: skip
+    points: TurningPoints,
+    amplitude: FloatArray,
+    losses: tuple[float, float, float, float],
+    angular_frequency: float,
+    restoring: Restoring,
+) -> FloatArray:
     """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
     excess = period_excess(amplitude, angular_frequency, *losses)
     lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
@@ -111,9 +118,16 @@ def phases(
 
 
 def fit_period(
-    points: TurningPoints, amplitude: FloatArray, a: float, b: float, c: float,
-    *, share: float | None = None, held: float | None = None, restoring: Restoring = "linear",
-) -> Period:  # fmt: skip
+    points: TurningPoints,
+    amplitude: FloatArray,
+    a: float,
+    b: float,
+    c: float,
+    *,
+    share: float | None = None,
+    held: float | None = None,
+    restoring: Restoring = "linear",
+) -> Period:
     """Fit a straight line to the times, in half cycles lengthened by the losses (and by sin x).
 
     Turning points cannot tell how b divides into hysteretic and viscous: the middle is
@@ -153,9 +167,13 @@ def fit_period(
 
 
 def _line(
-    points: TurningPoints, amplitude: FloatArray, losses: tuple[float, float, float, float],
-    omega: float, held: float | None, restoring: Restoring,
-) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    points: TurningPoints,
+    amplitude: FloatArray,
+    losses: tuple[float, float, float, float],
+    omega: float,
+    held: float | None,
+    restoring: Restoring,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Angular frequency and first time for one share; their covariance; residuals in s."""
     weight = 1.0 / points.time_sd_s**2
     reference = float(points.time_s[0])

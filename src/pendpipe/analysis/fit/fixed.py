@@ -10,9 +10,15 @@ from pendpipe.analysis.fit.result import Baseline
 from pendpipe.errors import InputError
 
 NAMES: Final = (
-    "a", "b", "c", "frequency", "amplitude", "offset",
-    "quality_factor_hysteretic", "quality_factor_viscous",
-)  # fmt: skip
+    "a",
+    "b",
+    "c",
+    "frequency",
+    "amplitude",
+    "offset",
+    "quality_factor_hysteretic",
+    "quality_factor_viscous",
+)
 _NOT_VISCOUS: Final = ("a", "c", "quality_factor_hysteretic")
 """What Eq. 3 lacks: its only loss is viscous."""
 _POSITIVE: Final = ("frequency", "amplitude", "quality_factor_hysteretic", "quality_factor_viscous")
@@ -59,9 +65,10 @@ def check_fixed(fixed: Mapping[str, float], baseline: Baseline) -> None:
             raise InputError(f"--fix {word}", f"{name} can't be {value:g}", "give a possible value")
         if baseline == "viscous" and name in _NOT_VISCOUS:
             raise InputError(
-                f"--fix {word}", f"the viscous baseline (Eq. 3) has no {name}",
+                f"--fix {word}",
+                f"the viscous baseline (Eq. 3) has no {name}",
                 "leave it out, or use --baseline eq8",
-            )  # fmt: skip
+            )
     quality_factors = [name for name in fixed if name.startswith("quality_factor")]
     if "b" in fixed and quality_factors:
         raise InputError(

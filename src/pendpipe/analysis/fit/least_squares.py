@@ -120,9 +120,13 @@ def _first_met(
 
 
 def exchanged(
-    on: dict[int, float], free: Sequence[int], step: FloatArray, normal: FloatArray,
-    gradient: FloatArray, bounds: Bounds,
-) -> bool:  # fmt: skip
+    on: dict[int, float],
+    free: Sequence[int],
+    step: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    bounds: Bounds,
+) -> bool:
     """Let go what leaves its bound by itself, or put at its bound what is farthest beyond it.
 
     Parameters
@@ -333,9 +337,14 @@ def intervals95(
 
 
 def _profiled_end(
-    value: FloatArray, normal: FloatArray, gradient: FloatArray, bounds: Bounds, index: int,
-    held: Sequence[int], reach: float,
-) -> float:  # fmt: skip
+    value: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    bounds: Bounds,
+    index: int,
+    held: Sequence[int],
+    reach: float,
+) -> float:
     """One end of an interval that a bound takes part in, at most `reach` away.
 
     The end is found as if nothing were bounded; what then lies beyond its bound is put there, and

@@ -174,9 +174,14 @@ def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:
     rates = found.value[:3]
     period = fit_period(part, found.amplitude, *rates.tolist(), share=0.5, restoring=restoring)
     return LawStart(
-        restoring, rates, period.angular_frequency, float(part.angle_rad[0]), period.time_s,
-        float(np.mean(points.level_rad)), float(np.max(np.abs(period.late_rad))),
-    )  # fmt: skip
+        restoring,
+        rates,
+        period.angular_frequency,
+        float(part.angle_rad[0]),
+        period.time_s,
+        float(np.mean(points.level_rad)),
+        float(np.max(np.abs(period.late_rad))),
+    )
 
 
 def sine_coefficient(points: TurningPoints) -> Coefficient:
@@ -325,9 +330,13 @@ def _sure_part(
 
 
 def _release(
-    points: TurningPoints, values: tuple[float, float, float, float], share: float,
-    period: Period, *, at_first: bool,
-) -> tuple[float, float, int]:  # fmt: skip
+    points: TurningPoints,
+    values: tuple[float, float, float, float],
+    share: float,
+    period: Period,
+    *,
+    at_first: bool,
+) -> tuple[float, float, int]:
     """Angle and time of the release, and half cycles from it to the first turning point."""
     a, b, c, y0 = values
     omega, first_s = period.angular_frequency, period.time_s

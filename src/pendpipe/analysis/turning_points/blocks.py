@@ -56,9 +56,12 @@ def in_blocks(
     half_period = 0.5 / tracked.apparent_frequency_hz
     if samples.time_s[-1] - tracked.time_s[-1] < 16.0 * half_period:
         return replace(
-            tracked, stop_s=float(samples.time_s[-1]), samples=len(samples), wanders=True,
+            tracked,
+            stop_s=float(samples.time_s[-1]),
+            samples=len(samples),
+            wanders=True,
             notes=(*tracked.notes, _PIECEWISE),
-        )  # fmt: skip
+        )
     return _joined([tracked, *_pieces(samples, measure_block, block, tracked)], samples)
 
 

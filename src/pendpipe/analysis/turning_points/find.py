@@ -308,9 +308,13 @@ def _losses(
 
 
 def _shaped(
-    samples: Samples, places: Places, amplitude: FloatArray, rates: FloatArray, level: float,
+    samples: Samples,
+    places: Places,
+    amplitude: FloatArray,
+    rates: FloatArray,
+    level: float,
     stride: int,
-) -> tuple[Places, Measured, FloatArray]:  # fmt: skip
+) -> tuple[Places, Measured, FloatArray]:
     """Measure again with the shape that the losses, and odd harmonics, give the half cycles."""
     shape = half_cycle_shape(amplitude, places.angular_frequency, rates)
     measured = measure(samples, places, level, shape, stride=stride, amplitude=amplitude)

@@ -32,9 +32,13 @@ _CIRCULAR: Final = 1.0 / 192.0
 
 
 def odd_harmonics(
-    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    samples: Samples,
+    places: Places,
+    level: float,
+    shape: FloatArray,
+    measured: Measured,
     open_error: FloatArray,
-) -> tuple[FloatArray, Measured, Places]:  # fmt: skip
+) -> tuple[FloatArray, Measured, Places]:
     """Add odd harmonics to the shape where the readings ask for them.
 
     Where even these don't fit (beyond 1.5 rad, where the period changes from one half
@@ -83,9 +87,13 @@ def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
 
 
 def _narrowed(
-    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    samples: Samples,
+    places: Places,
+    level: float,
+    shape: FloatArray,
+    measured: Measured,
     noise: FloatArray,
-) -> tuple[FloatArray, Measured, Places]:  # fmt: skip
+) -> tuple[FloatArray, Measured, Places]:
     """Replace the half cycles that no shape fits by fits of their middle halves."""
     bare = shape.copy()
     bare[:, 4:] = 0.0
@@ -104,20 +112,26 @@ def _narrowed(
     enlarged = np.maximum(_ratio(middle, noise), 1.0)
     information, score = _level_of_peaks(places, middle, enlarged)
     single = middle._replace(
-        amplitude=middle.peak[:, 0], variance=middle.peak[:, 1] * enlarged,
-        coupling=middle.peak[:, 2], harmonics=measured.harmonics,
-        coverage=measured.coverage, information=information, score=score,
+        amplitude=middle.peak[:, 0],
+        variance=middle.peak[:, 1] * enlarged,
+        coupling=middle.peak[:, 2],
+        harmonics=measured.harmonics,
+        coverage=measured.coverage,
+        information=information,
+        score=score,
         single=np.ones(len(poor), dtype=bool),
         residual_square=own_square(middle) + score**2 / np.maximum(information, 1e-300),
-    )  # fmt: skip
+    )
     chosen = [
         np.where(poor.reshape(-1, *[1] * (new.ndim - 1)), new, old)
         for new, old in zip(single, measured, strict=True)
     ]
     centre = np.where(poor, moved.centre_s, places.centre_s)
     return (
-        np.where(poor[:, None], bare, shape), Measured(*chosen), places._replace(centre_s=centre),
-    )  # fmt: skip
+        np.where(poor[:, None], bare, shape),
+        Measured(*chosen),
+        places._replace(centre_s=centre),
+    )
 
 
 def _level_of_peaks(
@@ -135,9 +149,13 @@ def _level_of_peaks(
 
 
 def _even_misfit(
-    samples: Samples, places: Places, level: float, shape: FloatArray, measured: Measured,
+    samples: Samples,
+    places: Places,
+    level: float,
+    shape: FloatArray,
+    measured: Measured,
     noise: FloatArray,
-) -> BoolArray:  # fmt: skip
+) -> BoolArray:
     """Which half cycles would be fitted better with even terms of their own.
 
     Odd terms (of the unknown share of b) do no harm to the amplitude and are not asked for.

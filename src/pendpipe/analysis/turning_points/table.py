@@ -17,11 +17,21 @@ from pendpipe.files import replaced
 from pendpipe.recording import whole_lines
 
 COLUMNS: Final = (
-    "half_cycle", "time_s", "time_sd_s", "angle_rad", "angle_sd_rad", "level_rad",
-)  # fmt: skip
+    "half_cycle",
+    "time_s",
+    "time_sd_s",
+    "angle_rad",
+    "angle_sd_rad",
+    "level_rad",
+)
 _NUMBERS: Final = (
-    "level_sd_rad", "level_coupling", "noise_rms_rad", "step_rad", "start_s", "stop_s",
-)  # fmt: skip
+    "level_sd_rad",
+    "level_coupling",
+    "noise_rms_rad",
+    "step_rad",
+    "start_s",
+    "stop_s",
+)
 
 
 class Cut(NamedTuple):
