@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.table import NotThisFormatError, ReadOptions
+from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions
 from pendpipe.formats.words import unit_of
 
 _NAMES: Final = {
@@ -254,27 +254,8 @@ _WITH_UNIT: Final = re.compile(
 """``12.3°``; but ``5.9E-01`` is a number, not 5.9 of the unit E-01."""
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """One column of cells as numbers.
-
-    Parameters
-    ----------
-    values
-        Shape (n,); NaN where a cell is empty or no number.
-    fault
-        Row and text of the first cell that is neither empty nor a number.
-    unit
-        What stands behind every number (``12.3°``); ``""`` where nothing does.
-    """
-
-    values: FloatArray
-    fault: tuple[int, str] | None = None
-    unit: str = ""
-
-
-def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
-    """Turn one column into numbers."""
+def column_of_numbers(cells: Sequence[str], layout: Layout, column: Column) -> Column:
+    """Fill a column from its cells; a unit behind every number (``12.3°``) is its own."""
     cells = [layout.ungrouped(cell) for cell in cells]
     if layout.decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]
@@ -292,7 +273,7 @@ def column_of_numbers(cells: Sequence[str], layout: Layout) -> Numbers:
             values[row] = float(cells[row].lower().replace("d", "e"))
         except ValueError:
             fault = fault or (row, cells[row])
-    return Numbers(values, fault, unit)
+    return replace(column, values=values, fault=fault, unit=column.unit or unit)
 
 
 _CLOCK: Final = re.compile(
@@ -346,12 +327,10 @@ def _days(date: tuple[str | None, ...], slashed: bool) -> int:
 
     if not any(date):
         return 0
-    if date[0]:
-        year, month, day = (int(part or 0) for part in date[:3])
-    else:
-        day, month, year = (int(part or 0) for part in date[3:])
-        if month > 12 or (slashed and day <= 12):
-            day, month = month, day
+    parts = [int(part or 0) for part in date]
+    year, month, day = parts[:3] if date[0] else parts[:2:-1]
+    if not date[0] and (month > 12 or (slashed and day <= 12)):
+        day, month = month, day
     try:
         return max(-1, dt.date(year, month, day).toordinal() - 719163)
     except ValueError:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import stat
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib import import_module
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +29,7 @@ from pendpipe.formats.samples import (
     sample_rate,
 )
 from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
-from pendpipe.formats.timebase import TimeBase, time_base
+from pendpipe.formats.timebase import TimeBase, refuse_text, time_base
 from pendpipe.formats.words import role_of, split_header, unit_of
 from pendpipe.recording import (
     GOOD,
@@ -61,30 +62,20 @@ _BY_LIBRARIES: Final = ("file of arrays", "zip archive")
 
 Reader = Callable[[Path, bytes, ReadOptions], Table]
 
+READERS: Final = (
+    ("WinDaq", "windaq.read_table"),
+    ("file of arrays", "trees.read_table"),
+    ("zip archive", "containers.read_table"),
+    ("XML", "containers.read_project"),
+    ("WinDaq CSV", "dataq_text.read_export"),
+    ("DI-149 capture", "dataq_text.read_capture"),
+    ("text table", "text.read_table"),
+)
+"""In the order in which they are tried, each imported in its turn.
 
-def readers() -> Iterator[tuple[str, Reader]]:
-    """Give the readers in the order in which they are tried, each imported in its turn.
-
-    A new format is a module with `read_table` and a line here. A reader raises
-    `NotThisFormatError` where the file is none of its own.
-    """
-    from pendpipe.formats import windaq
-
-    yield "WinDaq", windaq.read_table
-    from pendpipe.formats import trees
-
-    yield "file of arrays", trees.read_table
-    from pendpipe.formats import containers
-
-    yield "zip archive", containers.read_table
-    yield "XML", containers.read_project
-    from pendpipe.formats import dataq_text
-
-    yield "WinDaq CSV", dataq_text.read_export
-    yield "DI-149 capture", dataq_text.read_capture
-    from pendpipe.formats import text
-
-    yield "text table", text.read_table
+A new format is a module with `read_table` and a line here. A reader raises `NotThisFormatError`
+where the file is none of its own.
+"""
 
 
 def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
@@ -178,7 +169,8 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
         if data.startswith(mark):
             raise InputError(place, f"this is {what}", remedy)
     reason: NotThisFormatError | None = None
-    for name, reader in readers():
+    for name, (module, _, function) in ((name, where.partition(".")) for name, where in READERS):
+        reader: Reader = getattr(import_module(f"pendpipe.formats.{module}"), function)
         try:
             return reader(place, data, options)
         except NotThisFormatError as fault:
@@ -204,7 +196,8 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
 def recording_of(table: Table, options: ReadOptions) -> Recording:
     """Choose the columns of a table and turn them into a recording."""
     choice = choose(table, options)
-    _refuse_text(table, choice)
+    for column in choice.readings:
+        refuse_text(table, column, "correct the row, or leave it blank")
     base = time_base(table, choice, options)
     found = converted(table, choice, base, options)
     values = found.values[base.rows]
@@ -268,15 +261,6 @@ def converted(table: Table, choice: Choice, base: TimeBase, options: ReadOptions
     time_s = np.full(rows, np.nan)
     time_s[base.rows] = base.time_s
     return readings(table, choice, options, time_s)
-
-
-def _refuse_text(table: Table, choice: Choice) -> None:
-    for column in choice.readings:
-        if column.fault is not None:
-            row, text = column.fault
-            raise InputError(
-                table.where(row), f"'{text}' is no number", "correct the row, or leave it blank"
-            )
 
 
 def _quality(table: Table, values: FloatArray, base: TimeBase) -> ByteArray | None:

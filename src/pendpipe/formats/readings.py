@@ -125,9 +125,11 @@ def _unit(
     if role == "volts":
         return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
     names = {other.name.lower() for other in choice.channels if not other.unit}
-    if role == "length" and {"x", "y", "z"} <= names:
-        # A phone's sensor: of a position it knows nothing.
-        return _Guess(_UNKNOWN, "(one of x, y, z) has no unit: analysed in its own", weak=True)
+    # A phone's sensor: of a position it knows nothing.
+    sensed = role == "length" and {"x", "y", "z"} <= names
+    if sensed or role in ("velocity", "acceleration", "signal"):
+        what = "one of x, y, z" if sensed else role
+        return _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", weak=True)
     if role == "length":
         if reach <= 2.0:
             grown = _by_period(column, time_s, named=False)
@@ -137,8 +139,6 @@ def _unit(
         return _Guess(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
         )
-    if role in ("velocity", "acceleration", "signal"):
-        return _Guess(_UNKNOWN, f"({role}) has no unit: analysed in its own", weak=True)
     return _angle_unit(table, choice, column, time_s)
 
 

@@ -16,7 +16,6 @@ from pendpipe.errors import InputError
 from pendpipe.formats.layout import (
     COMMENT,
     Layout,
-    Numbers,
     all_numbers,
     column_of_clock_times,
     column_of_numbers,
@@ -430,29 +429,22 @@ def _columns(
             f"{place}, line {numbers[row]}", f"{width} cells in a row", "correct or drop the row"
         )
     columns = []
-    for column in range(width):
-        texts = [row[column] if column < len(row) else "" for row in cells]
-        found = column_of_numbers(texts, layout)
-        if np.isfinite(found.values).any():
-            columns.append(_column(header, column, found.values, found))
-            continue
-        clock = column_of_clock_times(texts)
-        if clock is not None:
-            name = header.names[column] if column < len(header.names) else ""
-            columns.append(Column(name or "time", "s", clock, column + 1))
+    for place_of in range(width):
+        texts = [row[place_of] if place_of < len(row) else "" for row in cells]
+        column = column_of_numbers(texts, layout, _column(header, place_of, np.empty(0)))
+        if not np.isfinite(column.values).any():
+            clock = column_of_clock_times(texts)
+            if clock is None:
+                continue
+            column = Column(column.name or "time", "s", clock, column.number)
+        columns.append(column)
     return columns
 
 
-def _column(header: Header, place: int, values: FloatArray, found: Numbers | None = None) -> Column:
+def _column(header: Header, place: int, values: FloatArray) -> Column:
     known = place < len(header.names)
-    unit = header.units[place] if known else ""
-    return Column(
-        name=header.names[place] if known else "",
-        unit=unit or (found.unit if found is not None else ""),
-        values=np.ascontiguousarray(values),
-        number=place + 1,
-        fault=found.fault if found is not None else None,
-    )
+    name, unit = (header.names[place], header.units[place]) if known else ("", "")
+    return Column(name, unit, np.ascontiguousarray(values), place + 1)
 
 
 _RATE_WORD: Final = re.compile(

@@ -118,10 +118,15 @@ def _from_column(
     return _in_order(table, choice, base, factor)
 
 
-def _refuse_missing_times(table: Table, column: Column, rows: BoolArray) -> None:
+def refuse_text(table: Table, column: Column, remedy: str) -> None:
+    """Refuse a column by the first of its cells that should be a number and is not."""
     if column.fault is not None:
         row, text = column.fault
-        raise InputError(table.where(row), f"'{text}' is no number", "correct or drop the row")
+        raise InputError(table.where(row), f"'{text}' is no number", remedy)
+
+
+def _refuse_missing_times(table: Table, column: Column, rows: BoolArray) -> None:
+    refuse_text(table, column, "correct or drop the row")
     bad = np.flatnonzero(~np.isfinite(column.values) & rows)
     if bad.size:
         raise InputError(

@@ -176,10 +176,6 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     return table_of_tree(place, tree_of_version_4(data), "matlab-v4", options)
 
 
-def _of_matlab(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
-    return table_of_tree(place, tree_of(data), form, options)
-
-
 def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
     """Read the data sets of all groups, with the units among their attributes."""
     import h5py
@@ -259,6 +255,6 @@ _FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
         _of_numpy,
     ),
     ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
-    ("matlab-v5", is_matlab, _of_matlab),
+    ("matlab-v5", is_matlab, lambda p, d, f, o: table_of_tree(p, tree_of(d), f, o)),
     ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),
 )
