@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import time
 import wave
 from collections.abc import Callable
 from pathlib import Path
@@ -615,3 +616,16 @@ def test_axes_of_a_sensor_are_no_position(read_as: Callable[..., Recording]) -> 
 @pytest.mark.parametrize(("head", "unit"), [("s_m", "m"), ("Skalenteile", "divisions")])
 def test_a_name_may_hold_the_unit(read_as: Callable[..., Recording], head: str, unit: str) -> None:
     same(read_as(f"t (s),{head}\n" + rows(TIME, ANGLE)), unit=unit)
+
+
+@pytest.mark.parametrize(
+    "endless", ["<table>" + "<" * 900_000, "1" * 900_000, "(1" * 400_000, "1 ± 1,5" * 120_000]
+)
+def test_signs_without_end_are_refused_at_once(
+    read_as: Callable[..., Recording], endless: str
+) -> None:
+    """A pattern that ran on from each of them would take hours."""
+    began = time.process_time()
+    with pytest.raises(InputError):
+        read_as(endless, "a.txt")
+    assert time.process_time() - began < 5.0

@@ -133,11 +133,10 @@ def _without_tags(text: str) -> str:
     """Make of the tables of a web page rows with tabs."""
     if not re.match(r"\s*<(!doctype html|html|table|meta|div)\b", text[:200], re.I):
         return text
-    text = re.sub(r"(?is)<(style|script|title)\b.*?</\1\s*>|\s*\n\s*", " ", text)
-    text = re.sub(
-        r"(?i)</t[dh]\s*>(?!\s*</tr)", "\t", re.sub(r"(?i)</tr\s*>|<br\s*/?>", "\n", text)
-    )
-    return unescape(re.sub(r"<[^>]*>", "", text))
+    # (No pattern here runs on over the next sign, or a hostile page would take hours.)
+    text = re.sub(r"(?i)<(style|script|title)\b[^<]*", "", " ".join(text.split()))
+    text = re.sub(r"(?i)</tr ?>|<br ?/? ?>", "\n", text)
+    return unescape(re.sub(r"<[^<>]*>", "", re.sub(r"(?i)</t[dh] ?>(?! ?\n)", "\t", text)))
 
 
 def _without_labview_heads(lines: list[str]) -> list[str]:
@@ -194,7 +193,7 @@ _CLOCK: Final = r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
 _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
     (
         re.compile(
-            r"([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’]"
+            r"(?<![\d.])([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’]"
             r"(?:\s?(\d{1,2}(?:\.\d+)?)\s?(?:\"\"?|″|''))?"
         ),
         _degrees,
@@ -203,7 +202,7 @@ _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str
     (re.compile(r"np\.float\d\d\(([^()]*)\)"), r"\1"),
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
     (re.compile(rf"^\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*(.*)$"), _stamped),
-    (re.compile(r"^\s*[\[({]*([^\[\](){}]*\d[^\[\](){}]*)[\])}]+,?\s*$"), r"\1"),
+    (re.compile(r"^\s*[\[({]+([^\[\](){}]*)[\])}]+,?\s*$"), r"\1"),
 )
 """Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); NumPy's types; rows that end in ``;``;
 times that serial monitors put before each line (``12:03:04.5 ->``, ``[2024-05-01 12:03:04.5]``);
@@ -232,7 +231,7 @@ def _in_rows(lines: list[str]) -> list[str]:
     """Part a list that stands in one line."""
     if len(lines) >= 5:
         return lines
-    whole = re.sub(r"^\s*(\w+\s*=)?\s*\[\s*(?=[(\[])", "", "\n".join(lines))
+    whole = re.sub(r"^(\w+\s*=\s*)?\[\s*(?=[(\[])", "", "\n".join(lines).lstrip())
     return re.sub(r"(?<=[)\]])\s*,\s*(?=[(\[])", "\n", whole).split("\n")
 
 
