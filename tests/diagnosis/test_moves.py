@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 
 from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
@@ -24,6 +25,7 @@ from pendpipe.diagnosis.task import Task, applicable
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
 
 from .records import (
     FREQUENCY_HZ,
@@ -32,6 +34,7 @@ from .records import (
     TRUTH,
     VALUES,
     beginning_of,
+    classes_found,
     diagnosed,
     null_fit,
     other_engine,
@@ -207,7 +210,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
     state = State(fit, data, noise, [], TRUTH, fit.value)
     before = remainder_of(fit, data, noise)
-    assert describe(state, 1e-9)
+    assert describe(state, 1e-9, task_for(recording(data.values, 6)))
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
     after = remainder_of(state.fit, state.data, state.noise)
     assert after.excess < 0.2 * before.excess
@@ -216,8 +219,13 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
     state = State(fit, data, noise, [], TRUTH, fit.value)
-    assert not describe(state, 1e-9)
+    assert not describe(state, 1e-9, task_for(recording(data.values, 6)))
     assert state.fit is fit
+
+
+def task_for(record: Recording) -> Task:
+    forensics = Forensics(prepare_samples(record, "the test"), 0.01)
+    return Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent)
 
 
 def rivals_after(readings: FloatArray, seed: int) -> list[Rival]:
@@ -227,8 +235,7 @@ def rivals_after(readings: FloatArray, seed: int) -> list[Rival]:
     noise = first_noise(begun)
     fit = refine(begun.model, begun.data, noise, begun.value)
     state = State(fit, begun.data, noise, [], begun.value, fit.value)
-    forensics = Forensics(prepare_samples(record, "the test"), 0.01)
-    task = Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent)
+    task = task_for(record)
     effects: list[Effect] = applicable(CATALOGUE, fit, "eq8", "rad")
     state.now = detect(prepare(fit, begun.data, noise, effects), fit, seed=1)
     lead = next(each for each in state.now.leads if each.effect.identifier == "unnamed-restoring")
@@ -247,3 +254,22 @@ def test_a_step_and_a_tone_go_before_a_curve() -> None:
 def test_a_law_outside_the_catalogue_stays_a_curve() -> None:
     found = rivals_after(pulled(), 3)
     assert [each.identifier for each in found] == ["unnamed-restoring"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rolling_shutter_is_no_second_mode(seed: int) -> None:
+    """A row that lies x higher is read kappa x later: a second harmonic that falls as A^2."""
+    finer = np.arange(-0.2, TIME_S[-1] + 0.2, 0.2 * INTERVAL_S)
+    angle = CubicSpline(finer, other_engine(TRUTH, finer) - TRUTH[7])
+    late_s = -0.008 * angle(TIME_S)
+    outcome = diagnose_recording(recording(angle(TIME_S + late_s) + TRUTH[7], seed))
+    (found,) = outcome.diagnosis.effects
+    assert found.identifier == "rolling-shutter"
+    kappa = found.parameters["kappa"]
+    assert abs(kappa.value + 0.008) < 4.0 * kappa.sd
+
+
+def test_a_rare_name_is_not_asked_where_another_leads() -> None:
+    outcome = diagnosed("sensor-quadratic")
+    rare = {effect.identifier for effect in CATALOGUE if effect.rare}
+    assert not rare & set.union(*classes_found(outcome))

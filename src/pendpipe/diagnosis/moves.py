@@ -17,9 +17,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Detection, Lead, detect, prepare
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
+from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -55,9 +57,11 @@ class Proposed(NamedTuple):
 
 def price(steps: Sequence[Step]) -> float:
     """Return the charges of a set of effects, with the price of each further name."""
-    names = sum(_is_further(step) for step in steps)
-    chosen = CHOICE * min(names, 1) + FURTHER * max(names - 1, 0)
-    return chosen + sum(step.winner.charge for step in steps)
+    return _chosen(sum(map(_is_further, steps))) + sum(step.winner.charge for step in steps)
+
+
+def _chosen(names: int) -> float:
+    return CHOICE * min(names, 1) + FURTHER * max(names - 1, 0)
 
 
 def _is_further(step: Step) -> bool:
@@ -129,7 +133,8 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         bare = _without(state, replaced)
         if bare is None:
             continue
-        fits = [fit for curve in _curves(bare, state) if (fit := _with_curve(bare, curve, state))]
+        curves = [(curve, np.zeros(curve.count)) for curve in _curves(bare, state)]
+        fits = [fit for pair in curves if (fit := _with(bare, *pair, state))]
         if not fits:
             continue
         scale = Scale.of(min((*fits, state.fit), key=lambda fit: fit.chi2), state.data, state.noise)
@@ -158,24 +163,49 @@ def _without(state: State, steps: Sequence[Step]) -> Fit | None:
     return best_fit(model, state.data, state.noise, [value, bare], held=state.held)
 
 
-def describe(state: State, p_value: float) -> bool:
-    """Add the curve that describes what is left best, if that lowers the score."""
-    curves = _curves(state.fit, state, in_time=True)
-    fits = [fit for curve in curves if (fit := _with_curve(state.fit, curve, state))]
+def describe(state: State, p_value: float, task: Task) -> bool:
+    """Add what describes best what is left, a curve or a rare name, if that lowers the score."""
+    curves = [(curve, np.zeros(curve.count)) for curve in _curves(state.fit, state, in_time=True)]
+    fits = [fit for pair in curves if (fit := _with(state.fit, *pair, state))]
     if not fits:
         return False
     scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
     rivals = ranked([_rival(state.fit, fit, scale) for fit in fits])
     if rivals[0].evidence <= CHOICE:
         return False
+    rivals = prefer_rare(state, rivals, task)
     state.steps.append(Step(tuple(rivals), p_value, state.fit))
     state.settle(rivals[0].fit)
     return True
 
 
+def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:
+    """Put a rare name before a leading curve, or a tone at a harmonic, if its score is smaller.
+
+    Rare names are not scanned for: they look much like others, which would then be in doubt more
+    often. They are asked where what leads only describes what they would explain.
+    """
+    leader, before = rivals[0], state.fit
+    tone = leader.lead.effect.spectral and not off_harmonics(leader.fit, leader.lead.effect)
+    if not (leader.drawn or tone):
+        return list(rivals)
+    rare = applicable(task.catalogue, before, task.baseline, state.data.unit, rare=True)
+    fits = [fit for each in rare if (fit := _with(before, each, np.zeros(each.count), state))]
+    if not fits:
+        return list(rivals)
+    lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)
+    scale = Scale.of(lowest, state.data, state.noise)
+    others = [each.again(each.fit, before.chi2, scale) for each in rivals]
+    named = ranked([_rival(before, fit, scale) for fit in fits])
+    names = sum(map(_is_further, state.steps))
+    price = _chosen(names + 1) - _chosen(names) if leader.drawn else 0.0
+    if named[0].evidence - price <= others[0].evidence:
+        return list(rivals)
+    return [*named, *others]
+
+
 def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
-    curve: Effect = fit.model.effects[-1]
-    lead = Lead(curve, (), bare.chi2 - fit.chi2, 0.0)
+    lead = Lead(fit.model.effects[-1], (), bare.chi2 - fit.chi2, 0.0)
     return Rival.of(lead, fit, bare.chi2, scale, NO_SCAN)
 
 
@@ -188,11 +218,10 @@ def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 
 
-def _with_curve(bare: Fit, curve: Curve, state: State) -> Fit | None:
-    start = np.concatenate([bare.value, np.zeros(curve.count)])
-    model = bare.model.adding(curve)
+def _with(bare: Fit, effect: Effect, own: FloatArray, state: State) -> Fit | None:
+    model, start = bare.model.adding(effect), np.concatenate([bare.value, own])
     fit = best_fit(model, state.data, state.noise, [start], held=state.held)
-    return fit if fit and curve.believable(fit.value[len(bare.value) :]) else None
+    return fit if fit and effect.believable(fit.value[len(bare.value) :]) else None
 
 
 def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:

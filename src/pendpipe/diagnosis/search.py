@@ -19,7 +19,7 @@ from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
-from pendpipe.diagnosis.moves import describe, improve, prefer_two_names, price
+from pendpipe.diagnosis.moves import describe, improve, prefer_rare, prefer_two_names, price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
@@ -167,17 +167,20 @@ def _grow(state: State, task: Task) -> None:
 
 
 def _described(state: State, task: Task) -> Fit | None:
-    """Describe what the names leave by a curve; return the fit without it, if one was added."""
+    """Describe what the names leave by rare names and a curve; return the fit without the curve."""
+    task.scanned(state)
     remainder = remainder_of(state.fit, state.data, state.noise)
-    task.scanned(state)
-    if not remainder.systematic or _ends_with_curve(state):
-        return None
-    assert state.now is not None
-    named = replace(state.fit, error_scale=remainder.error_scale)
-    if not describe(state, state.now.p_value / CATALOGUE_SHARE):
-        return None
-    task.scanned(state)
-    return named
+    while remainder.systematic and not _ends_with_curve(state):
+        assert state.now is not None
+        named = replace(state.fit, error_scale=remainder.error_scale)
+        if not describe(state, state.now.p_value / CATALOGUE_SHARE, task):
+            break
+        task.progress(f"describing what is left by {state.steps[-1].winner.name}")
+        task.scanned(state)
+        if _ends_with_curve(state):
+            return named
+        remainder = remainder_of(state.fit, state.data, state.noise)
+    return None
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:
@@ -229,6 +232,8 @@ def _add_one(state: State, task: Task) -> bool:
         rivals = prefer_parameters(state, rivals)
     if rivals and not gross:
         rivals = prefer_two_names(state, rivals, task)
+    if rivals:
+        rivals = prefer_rare(state, rivals, task)
     if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
         return False
     step = _first_that_predicts(state, rivals, p_value, progress)

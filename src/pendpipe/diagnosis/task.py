@@ -18,8 +18,10 @@ from pendpipe.effects.catalogue.sensor import SoftClipping
 from pendpipe.effects.curves import CURVES, Curve
 
 
-def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) -> list[Effect]:
-    """Return the effects that a baseline may lack, and curves for what has no name.
+def applicable(
+    catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str, *, rare: bool = False
+) -> list[Effect]:
+    """Return the effects that a baseline may lack, and curves for what has no name; or rare ones.
 
     What happens at an instant may happen twice: a second one is a copy, so that the model can
     tell their values apart.
@@ -31,12 +33,14 @@ def applicable(catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str) 
         copy(effect) if effect.identifier in used else effect
         for effect in catalogue
         if effect.has_signature
-        and not effect.rare
+        and effect.rare == rare
         and baseline not in effect.inside
         and (unit == "rad" or not effect.angular)
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]
+    if rare:
+        return named
     bent = SoftClipping()
     clipped = any(effect.key == bent.key for effect in fit.model.effects)
     return [*named, *([] if clipped else [bent]), *undrawn(CURVES, fit)]
