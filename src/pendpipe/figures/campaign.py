@@ -450,23 +450,27 @@ def draw_causes(path: Path) -> Figure:
     records = patterns["records"]
     frequency = np.array([record["frequency_hz"] for record in records])
     excess = np.array([record["excess"] for record in records])
-    order = np.argsort(frequency)
     span = max(1.6 * float(np.abs(excess).max()), 0.01)
+    names = list(dict.fromkeys(record["branch"] for record in records))
     for axes, within in ((left, True), (right, False)):
-        for name in dict.fromkeys(record["branch"] for record in records):
-            at = [number for number, record in enumerate(records) if record["branch"] == name]
+        shown = [cause for cause in patterns["causes"] if cause["in_class"] == within][:8]
+        for name in names:
+            # A line ends with its branch: the other one is another set of weights.
+            mine = [n for n, record in enumerate(records) if record["branch"] == name]
+            at = sorted(mine, key=frequency.__getitem__)
             look = branch(name)
-            sds = [records[number]["sd"] for number in at]
-            points = {"fmt": look.marker, "color": look.colour, "zorder": 3}
-            axes.errorbar(frequency[at], 100 * excess[at], 100 * np.array(sds), **points)
-        shown = [cause for cause in patterns["causes"] if cause["in_class"] == within]
-        for colour, cause in enumerate(shown[:8]):
-            curve_ = 100.0 * np.array(cause["excess"])[order]
-            axes.plot(frequency[order], curve_, color=f"C{colour}", label=cause["name"])
+            points = {"fmt": look.marker, "color": look.colour, "mfc": "none", "zorder": 3}
+            sds = [100.0 * records[number]["sd"] for number in at]
+            label = f"measured, {look.name}" if within else None
+            axes.errorbar(frequency[at], 100.0 * excess[at], sds, label=label, **points)
+            for colour, cause in enumerate(shown):
+                curve_ = 100.0 * np.array(cause["excess"])[at]
+                label = cause["name"] if name == names[0] else None
+                axes.plot(frequency[at], curve_, color=f"C{colour}", label=label)
         axes.set(xlabel="Frequency (Hz)", ylim=(-10.0 * span, 110.0 * span))
-        axes.set_title("not told apart" if within else "rejected by all records together")
+        axes.set_title("not told apart" if within else "rejected")
         if shown:
-            axes.legend(fontsize=7.0, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+            axes.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.16))
     left.set(ylabel="Viscous loss above Eq. 16 (%)")
     return figure
 
