@@ -50,13 +50,15 @@ def compact(value: float, unit: str) -> str:
 def pretty_unit(unit: str) -> str:
     """A unit of the result files as it is printed.
 
-    >>> pretty_unit("1/(rad s)"), pretty_unit("1/rad^2"), pretty_unit("m/s^2")
-    ('rad⁻¹ s⁻¹', 'rad⁻²', 'm/s²')
+    >>> pretty_unit("1/(rad s)"), pretty_unit("1/rad^2"), pretty_unit("m/s^2"), pretty_unit("1/1")
+    ('rad⁻¹ s⁻¹', 'rad⁻²', 'm/s²', '')
     """
     if unit.startswith("1/") and "sqrt" not in unit:
         parts = [part.partition("^") for part in unit[2:].strip("()").split()]
         return " ".join(
-            f"{of}⁻{'¹²³'[int(n) - 1 if n in '123' and n else 0]}" for of, _, n in parts
+            f"{of}⁻{'¹²³'[int(n) - 1 if n in '123' and n else 0]}"
+            for of, _, n in parts
+            if of != "1"
         )
     return "" if unit == "1" else unit.replace("^2", "²")
 
