@@ -230,10 +230,13 @@ def _real_sets() -> dict[str, tuple[dict[str, tuple[str, dict[str, Any]]], tuple
     """Return the pendulums: recordings with the options of reading, and what was changed."""
     eddy, water = "martin8ner-pohl-eddy/1.3_{}.csv", "vicber507-water/{}1.csv"
     runs = (1, 2, 3)
+    # A pendulum of length L has a ~ L^(1/2), c ~ L^(-3/2), and a b that follows its frequency:
+    # lengths share the effects alone.
+    lengths = ("a", "b", "c", "frequency")
     return {
         "eddy-current brake": (
             {f"{n} mA": (eddy.format(f"{n}mA"), {"start": 10}) for n in (100, 200)},
-            (),
+            ("b",),
         ),
         "two releases": ({n: (f"yfysiks-encoder/{n}.csv", {}) for n in ("data32", "data33")}, ()),
         "bob in air": (
@@ -246,11 +249,11 @@ def _real_sets() -> dict[str, tuple[dict[str, tuple[str, dict[str, Any]]], tuple
         ),
         "string pendulum": (
             {n: (f"jiarui-phy180/{n}.txt", {}) for n in ("8050", "8053", "8055")},
-            ("frequency",),
+            lengths,
         ),
         "four lengths": (
             {f"data2_{n}": (f"yfysiks-encoder/data2_{n}.csv", {}) for n in (12, 14, 20, 22)},
-            ("frequency",),
+            lengths,
         ),
     }
 

@@ -13,6 +13,9 @@ from scipy.integrate import solve_ivp
 
 import pendpipe as pp
 from pendpipe.cli import main
+from pendpipe.diagnosis import silent
+from pendpipe.diagnosis.joint import Joint
+from pendpipe.diagnosis.scores import whitened
 from pendpipe.diagnosis.several import JointOutcome
 from pendpipe.recording import Recording
 
@@ -87,6 +90,32 @@ def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_da
     assert "damping-drift" not in {name for name, _ in effect.indistinguishable}
     size = effect.parameters["d"]
     assert abs(size.value - 0.1) < 4.0 * size.sd
+
+
+@pytest.mark.parametrize("identifier", ["cubic-damping", "frequency-drift", "cubic-stiffness"])
+def test_score_over_all_recordings_is_what_one_dense_least_squares_gains(identifier: str) -> None:
+    searches = [outcome.search for outcome in together("cubic").outcomes]
+    joint = Joint(searches, baseline="eq8", level=0.01, same_sensor=False, own=(), progress=silent)
+    bare = joint.fitted((), ())
+    assert bare is not None
+    (lead,) = [each for each in joint.leads(bare) if each.effect.identifier == identifier]
+    rows, column, left = [], [], []
+    for number, (fit, slot) in enumerate(zip(bare.fits, bare.layout.slots, strict=True)):
+        columns, residual = joint.block(fit, number, number == 0)
+        part = np.zeros((len(columns), len(bare.values)))
+        part[:, slot] = columns
+        rows.append(part)
+        left.append(residual)
+        (change,) = whitened(fit, searches[number].noise, lead.effect, [lead.shape])
+        column.append(change[: len(columns)] / joint.members[number].scale)
+    # A value at its bound is held there; here a may be 0.
+    held = [k for k, key in enumerate(bare.layout.keys) if key == "a" and bare.values[k] == 0.0]
+    tangent = np.delete(np.concatenate(rows), held, axis=1)
+    tangent /= np.linalg.norm(tangent, axis=0)
+    added = np.concatenate(column)
+    rest = added - tangent @ np.linalg.lstsq(tangent, added, rcond=1e-12)[0]
+    gain = (added @ np.concatenate(left)) ** 2 / (rest @ rest)
+    assert lead.score == pytest.approx(gain, rel=1e-4)
 
 
 def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs() -> None:

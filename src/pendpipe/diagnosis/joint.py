@@ -204,6 +204,7 @@ class Joint:
                 model = model.adding(effect)
             bases = [*([near.alone[number]] if near else []), found.named, found.baseline]
             starts = [self._start(base, own) for base in bases]
+            starts.append(self._start(found.baseline, own, sizes=False))
             fit = best_fit(model, found.data, found.noise, starts, held=_held(found))
             if fit is None:
                 return None
@@ -215,13 +216,20 @@ class Joint:
                     there.append(replace(fit, evaluation=steps.evaluate_within_bounds(value)))
         return self.joined(alone, effects, released, there if len(there) == len(alone) else ())
 
-    def _start(self, base: Fit, effects: Sequence[Effect]) -> FloatArray:
-        """Return a model's values: those of a fit, and where it lacks an effect its own start."""
+    def _start(self, base: Fit, effects: Sequence[Effect], sizes: bool = True) -> FloatArray:
+        """Return a model's values: those of a fit, and where it lacks an effect its own start.
+
+        Without `sizes` such an effect starts at zero: with others gone, friction of its last
+        size may stop the motion.
+        """
         places = {other.key: place for other, place in base.model.places()}
         start = [base.value[: len(BASELINE)]]
         for effect in effects:
             place = places.get(effect.key)
-            start.append(base.value[place] if place else self._starts[effect.key])
+            value = base.value[place] if place else self._starts[effect.key].copy()
+            if place is None and not sizes and not effect.parameter_free:
+                value[: effect.sizes] = 0.0
+            start.append(value)
         return np.concatenate(start)
 
     def joined(
@@ -245,8 +253,8 @@ class Joint:
         here, values, triangle, chi2 = min(solutions, key=lambda each: each[-1])
         if np.isinf(chi2):
             # The recordings contradict each other so much that no motion is common to them.
-            here, chi2 = own, self._linear_chi2(own, layout, chosen)
-            values, triangle = self._solved(own, layout, chosen)
+            here = own
+            values, triangle, chi2 = self._solved(own, layout, chosen)
         return Together(
             tuple(effects),
             tuple(released),
@@ -270,7 +278,7 @@ class Joint:
         chi2 = self._chi2(here, chosen) if common else np.inf
         for _ in range(_ROUNDS):
             for damping in _DAMPINGS:
-                tried, triangle = self._solved(here, layout, chosen, values, damping)
+                tried, triangle, _ = self._solved(here, layout, chosen, values, damping)
                 there = self._moved(here, layout, tried, chosen)
                 if there is not None and self._chi2(there, chosen) <= chi2 + 1e-9:
                     break
@@ -333,10 +341,11 @@ class Joint:
         chosen: Sequence[int],
         near: FloatArray | None = None,
         damping: float = 0.0,
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, FloatArray, float]:
         """Return the best values of all for linear models about each recording's own values.
 
-        Damped as by Levenberg and Marquardt towards the values `near`.
+        And the root of their normal matrix, and chi^2 to first order. Damped as by Levenberg and
+        Marquardt towards the values `near`.
         """
         size = len(layout.keys)
         origin, low, high = _origin(fits, layout)
@@ -361,7 +370,7 @@ class Joint:
             matrix = np.concatenate([matrix, damping * np.eye(size)])
             target = np.concatenate([target, damping * (near - origin) * scale])
         step = bounded_least_squares(matrix, target, floor, ceiling)
-        return origin + step / scale, triangle
+        return origin + step / scale, triangle, float(np.sum((target - matrix @ step) ** 2))
 
     def _moved(
         self, fits: Sequence[Fit], layout: Layout, values: FloatArray, chosen: Sequence[int]
@@ -424,19 +433,6 @@ class Joint:
                 worth = _worth(abs(here.chi2 - there.chi2), abs(more)) - trials - FURTHER
                 words = f"{name} is shared" if again else f"{name} is not shared"
                 yield -worth if again else worth, words, there
-
-    def _linear_chi2(
-        self, fits: Sequence[Fit], layout: Layout, chosen: Sequence[int] | None = None
-    ) -> float:
-        """Return chi^2 of all, to first order about the recordings' own values."""
-        chosen = range(len(fits)) if chosen is None else chosen
-        values, _ = self._solved(fits, layout, chosen)
-        total = 0.0
-        for fit, number, slot in zip(fits, chosen, layout.slots, strict=True):
-            columns, residual = self.block(fit, number, number == chosen[0])
-            left = residual - columns @ (values[slot] - fit.value[list(fit.free)])
-            total += float(left @ left)
-        return total
 
     # Moves ----------------------------------------------------------------------------------
 
