@@ -10,11 +10,12 @@ from scipy.stats import chi2, kstest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values, tangent_basis
 from pendpipe.diagnosis.task import applicable
-from pendpipe.effects.catalogue import CATALOGUE
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 
 from .records import INTERVAL_S, TIME_S, TRUTH, other_engine, prepared
@@ -112,3 +113,16 @@ def test_local_p_values_of_noise_are_uniform_whatever_the_columns() -> None:
     assert several
     for row in (several[0], several[-1], bank.rows()["sensor-quadratic"][0]):
         assert kstest(local[row], "uniform").pvalue > 1e-3
+
+
+def test_the_strongest_tone_leads_where_no_p_value_is_above_zero() -> None:
+    """Two tones so strong that chance has no number for either: the larger one is the lead."""
+    data, noise = prepared(
+        other_engine(TRUTH)
+        + 8e-3 * np.cos(2.0 * np.pi * 2.3 * TIME_S)
+        + 2e-3 * np.cos(2.0 * np.pi * 0.2 * TIME_S)
+    )
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    tone = by_identifier("tone-pickup")
+    (lead,) = detect(prepare(fit, data, noise, [tone]), fit, seed=1).leads
+    assert lead.shape[0] == pytest.approx(2.3, abs=0.01)

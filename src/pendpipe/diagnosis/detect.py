@@ -160,12 +160,13 @@ def _tone_leads(scanner: Scanner, tones: Sequence[FloatArray]) -> list[Lead]:
             scanner.tones.scans, (None, *_DECAY_TIMES), tones, strict=False
         ):
             p_values = scan.p_values(scores)
-            index = int(np.argmin(p_values))
+            # Beyond 10^-308 all p-values are zero: there the scores decide.
+            index = int(np.lexsort((-scores, p_values))[0])
             score = float(scores[index])
             decay = math.inf if dying is None else dying * scanner.duration_s
             shape = effect.tone(float(scan.frequency_hz[index]), decay)
             if shape is not None:
                 local = Trials(0.5 * len(scores), 0.0).global_p_value(float(p_values[index]))
                 found.append(Lead(effect, tuple(shape), score, local))
-        leads += sorted(found, key=lambda lead: lead.p_value)[:1]
+        leads += sorted(found, key=lambda lead: (lead.p_value, -lead.score))[:1]
     return leads
