@@ -321,10 +321,6 @@ class Joint:
                 names[place] = [(effect.key, index) for index in range(effect.count)]
         return [names[index] for index in fit.free]
 
-    def names(self, fit: Fit, number: int, together: Together) -> list[tuple[int, object]]:
-        """Return the place of each of a recording's free values, and what it is among all."""
-        return list(enumerate(self._names(fit, number, together.effects, together.released)))
-
     def block(self, fit: Fit, number: int, first: bool) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian by the free values and the residual, over the scale of errors.
 

@@ -349,9 +349,9 @@ class _Answer:
         dense = scale * max(found.noise.rms_at(turns), found.noise.rms)
         columns = jacobian(fit.model, fit.value, fit.at)[:, free] / dense
         residual = found.data.residual(fit.at.reading) / dense
-        names = joint.names(fit, number, self.together)
-        mine = [here for here, key in names if key in rest.layout.keys]
-        theirs = [rest.layout.keys.index(key) for _, key in names if key in rest.layout.keys]
+        keys = [self.together.layout.keys[k] for k in self.together.layout.slots[number]]
+        mine = [here for here, key in enumerate(keys) if key in rest.layout.keys]
+        theirs = [rest.layout.keys.index(keys[here]) for here in mine]
         covariance = rest.covariance()[np.ix_(theirs, theirs)]
         sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         weights = np.linalg.pinv(covariance / np.outer(sd, sd), rcond=1e-10, hermitian=True)
