@@ -253,6 +253,20 @@ def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> No
         assert (tmp_path / f"{name}.svg").read_text().startswith("<svg")
 
 
+def test_what_snakemake_deletes_after_a_kill_is_no_damage(tmp_path: Path) -> None:
+    """It deletes the declared files of a killed job; made again, they are as undisturbed ones."""
+    from pendpipe.figures import OF_EVERY_DIAGNOSIS
+    from pendpipe.manifest import damages_of
+
+    refused = tmp_path / "refused.json"
+    refused.write_text(json.dumps({"record": "r", "stage": "acquire", "reason": "no decay"}))
+    words = ["--out", str(tmp_path / "diagnosis"), "--record", "r", "--refused", str(refused)]
+    assert cli.main(["diagnose", str(tmp_path / "none.csv"), *words]) == 0
+    for name in ("diagnosis.json", *(f"{name}.svg" for name in OF_EVERY_DIAGNOSIS)):
+        (tmp_path / "diagnosis" / name).unlink()
+    assert not damages_of(tmp_path, "diagnose")[1]
+
+
 def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:
     from pendpipe.diagnosis import diagnose_recording
     from pendpipe.recording import read_plain

@@ -183,12 +183,16 @@ def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
     assert "Nothing to be done" in campaign.snakemake("-n")
 
 
-def test_a_lost_result_is_made_again(campaign: Campaign) -> None:
+@pytest.mark.parametrize(
+    ("name", "stage"),
+    [("calibration.json", "calibrate"), ("diagnosis/damping.svg", "diagnose")],
+)
+def test_a_lost_result_is_made_again(campaign: Campaign, name: str, stage: str) -> None:
     """Even one that no job to be run declares: Snakemake alone would not miss it."""
-    path = campaign.results / "air-07/calibration.json"
+    path = campaign.results / "air-07" / name
     path.rename(path.with_name("lost"))
     try:
-        assert campaign.planned()["calibrate"] == 1
+        assert campaign.planned()[stage] == 1
     finally:
         path.with_name("lost").rename(path)
 

@@ -110,6 +110,8 @@ def pendulum_diagnoses():
 def of_every_record():
     """All results of all records."""
     names = ["recording.csv", "calibration.json", "turning_points.csv", "fit.json"]
+    if CAMPAIGN.configuration.diagnose.enabled:
+        names += [f"diagnosis/{Path(path).name}" for path in diagnosis_figures()]
     return [path for name in names for path in of_all_records(name)] + diagnoses()
 
 

@@ -117,10 +117,13 @@ def run(arguments: argparse.Namespace) -> int:
     inputs = [path for path in read if path is not None]
     with job(arguments.out.parent, "diagnose", inputs=inputs) as running:
         status = _diagnose(arguments, fixed)
-        running.outputs.append(arguments.out / FILE_NAME)
-        running.extras += sorted(
-            path for path in arguments.out.iterdir() if path.suffix in (".svg", ".png")
-        )
+        # What Snakemake declares it deletes after a kill, and sees missing by itself.
+        declared = {FILE_NAME, *(f"{name}.svg" for name in OF_EVERY_DIAGNOSIS)}
+        for path in sorted(arguments.out.iterdir()):
+            if path.name in declared:
+                running.outputs.append(path)
+            elif path.suffix in (".svg", ".png"):
+                running.extras.append(path)
     return status
 
 
