@@ -102,22 +102,16 @@ class Manifest:
     def damages(self, *, hash_all: bool = False) -> list[Damage]:
         """Compare the results with what was written.
 
-        A missing output is none, nor what is missing beside it: Snakemake sees it by itself, and
-        has deleted it where a job was killed. Only files whose length or time of change differs
-        are hashed, unless `hash_all`.
+        A missing output is none: Snakemake sees it by itself. Only files whose length or
+        time of change differs are hashed, unless `hash_all`.
         """
         if not self.path.is_file():
             return []
         since = None if hash_all else self.path.stat().st_mtime_ns
         found = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
-        runs_again = any(damage and damage.found == "missing" for damage in found)
-        extras = [_compare(self.home / name, made, since) for name, made in self.extras.items()]
-        return [
-            damage
-            for known, damages in ((True, found), (runs_again, extras))
-            for damage in damages
-            if damage and not (known and damage.found == "missing")
-        ]
+        found = [damage for damage in found if damage and damage.found != "missing"]
+        found += [_compare(self.home / name, made, since) for name, made in self.extras.items()]
+        return [damage for damage in found if damage]
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:

@@ -156,17 +156,3 @@ def test_a_stage_that_fails_leaves_no_claim_about_its_results(home: Path) -> Non
     with pytest.raises(ZeroDivisionError), manifest.job(home, "fit"):
         raise ZeroDivisionError
     assert read_json(home / "manifest/fit.json")["outputs"] == {}
-
-
-def test_what_a_killed_job_lost_is_no_damage(tmp_path: Path) -> None:
-    """Snakemake deletes all that it had written: the next run makes it, and remembers nothing."""
-    result, figure = tmp_path / "fit.json", tmp_path / "fit.svg"
-    with manifest.job(tmp_path, "fit") as running:
-        result.write_text('{"a": 1}\n')
-        figure.write_text("<svg/>\n")
-        running.outputs.append(result)
-        running.extras.append(figure)
-    figure.unlink()
-    assert noticed(tmp_path) == [f"{figure}: it is missing; a run sets it aside and makes it again"]
-    result.unlink()
-    assert noticed(tmp_path) == []
