@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from pendpipe import physics
 from pendpipe.analysis.compare import Comparison, compare
 from pendpipe.analysis.losses import MeasuredRecord
-from pendpipe.analysis.separate import fit_benchmark, known_benchmark, separate
+from pendpipe.analysis.separate import fit_benchmark, separate
 from pendpipe.analysis.viscous import SharedErrors, Surroundings
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
+
+from .benchmark import known_benchmark
 
 K = 3940.0
 WATER = physics.Fluid(1000.0, 1.0016e-3)

@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pendpipe.analysis.losses import MeasuredRecord, quality_of_rate
-from pendpipe.analysis.separate import fit_benchmark, known_benchmark, separate
+from pendpipe.analysis.separate import fit_benchmark, separate
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 from pendpipe.physics import without_hysteresis
+
+from .benchmark import known_benchmark
 
 AIR = np.geomspace(1 / 15.0, 0.5, 12)
 SDS = 1e-3 * np.geomspace(3.0, 0.3, 12)

@@ -16,7 +16,7 @@ from scipy.special import fdtrc, stdtrit
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate, chi_square_p_value, number
+from pendpipe.estimate import Estimate, chi_square_p_value
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,8 @@ class Calibration:
     chi2_p_value: float
     linearity: Linearity | None
 
-    @property
-    def residual_volts(self) -> FloatArray:
-        """Volts above the line, shape (n,)."""
-        return self.volts - self.offset.value - self.volts_per_radian.value * self.angle_rad
-
     def as_json(self) -> dict[str, Any]:
-        """Return the form in which it is kept on disk; `from_json` reads it."""
+        """Return the form in which it is kept on disk."""
         columns = zip(
             self.angle_rad.tolist(),
             self.volts.tolist(),
@@ -105,31 +100,6 @@ class Calibration:
             },
             "points": [dict(zip(names, row, strict=True)) for row in columns],
         }
-
-    @classmethod
-    def from_json(cls, content: dict[str, Any]) -> Calibration:
-        """Read what `as_json` has written (null stands for NaN)."""
-        points = content["points"]
-        curve = content["linear"]
-        return cls(
-            volts_per_radian=Estimate.from_json(content["volts_per_radian"]),
-            offset=Estimate.from_json(content["offset_volts"]),
-            covariance=number(content["covariance"]),
-            angle_rad=np.array([number(point["angle_rad"]) for point in points]),
-            volts=np.array([number(point["volts"]) for point in points]),
-            volts_sd=np.array([number(point["volts_sd"]) for point in points]),
-            angle_sd_rad=np.array([number(point["angle_sd_rad"]) for point in points]),
-            residual_sd_volts=number(content["residual_sd_volts"]),
-            chi2_p_value=number(content["chi2_p_value"]),
-            linearity=None
-            if curve is None
-            else Linearity(
-                Estimate.from_json(curve["quadratic"]),
-                Estimate.from_json(curve["cubic"]),
-                number(curve["p_value"]),
-                number(curve["largest_deviation"]),
-            ),
-        )
 
 
 FEWEST_POINTS = 3

@@ -53,23 +53,6 @@ class Benchmark:
     records: tuple[str, ...]
 
 
-def known_benchmark(coefficient_s2: float, sd_s2: float) -> Benchmark:
-    """Take k from elsewhere, where a campaign has no records in air."""
-    inverse = 1.0 / coefficient_s2
-    nan = float("nan")
-    return Benchmark(
-        coefficient=Estimate(coefficient_s2, sd_s2, "s^2"),
-        inverse=inverse,
-        inverse_sd=sd_s2 * inverse**2,
-        chi2=0.0,
-        degrees_of_freedom=0,
-        p_value=nan,
-        free_exponent=Estimate(nan, nan, ""),
-        exponent_p_value=nan,
-        records=(),
-    )
-
-
 def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
     """Fit k of ``Q_hys = k f^2`` to the records in air.
 

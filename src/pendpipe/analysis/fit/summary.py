@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.by_points import swing_phase
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.dynamics import Release, turning_points
 from pendpipe.estimate import Estimate
@@ -121,7 +122,7 @@ def gravity_line(
     if result.restoring == "linear":
         squares = [quality.amplitude_rad**2 for quality in qualities(result)]
         amplitude = math.sqrt(sum(squares) / len(squares))
-        factor = 1.0 / _arithmetic_geometric_mean(math.cos(0.5 * amplitude))
+        factor = float(swing_phase(np.full(2, amplitude), "sine")[0]) / math.pi
         omega *= factor
         corrected = f", finite-amplitude correction {100.0 * (factor**2 - 1.0):+.2g} % included"
     if length_m is not None:
@@ -130,13 +131,6 @@ def gravity_line(
         assert gravity is not None
         value, name, unit = gravity / omega**2, "length", "m"
     return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
-
-
-def _arithmetic_geometric_mean(one: float, other: float = 1.0) -> float:
-    """AGM(1, cos(y/2)) = pi/(2 K(sin(y/2))): the frequency at amplitude y over the small one."""
-    while abs(one - other) > 1e-15:
-        one, other = 0.5 * (one + other), math.sqrt(one * other)
-    return one
 
 
 def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
