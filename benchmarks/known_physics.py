@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.null_families import ROOT, code_digest
+from pendpipe.files import without_folders
 
 RECORDINGS: Final = ROOT.parent / "shared/recordings"
 TABLE: Final = Path(__file__).with_suffix(".tsv")
@@ -276,7 +277,7 @@ def judge(row: Mapping[str, str], kept: Mapping[str, Any]) -> dict[str, Any]:
         "by_hand": {each: is_found(each, answers) for each in items(row["by_hand"])},
         "wrong": [each["id"] for each in answers.effects if each["id"] in row["wrong"].split("/")],
         "answered": bool(answers.effects) or content.get("verdict") == "consistent",
-        "refused": "" if status in (0, 3) else refused,
+        "refused": "" if status in (0, 3) else without_folders(refused),
         "restoring": kept["fit"]["content"].get("restoring", "none"),
         "cpu_s": (kept["fit"]["cpu_s"], kept["diagnosis"]["cpu_s"]),
     }
