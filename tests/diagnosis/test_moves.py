@@ -267,6 +267,10 @@ def test_a_rolling_shutter_is_no_second_mode(seed: int) -> None:
     assert found.identifier == "rolling-shutter"
     kappa = found.parameters["kappa"]
     assert abs(kappa.value + 0.008) < 4.0 * kappa.sd
+    # What led without it is next: it may be added where the rare name predicts worse.
+    first, second = outcome.search.steps[0].rivals[:2]
+    assert first.lead.effect.rare
+    assert not second.lead.effect.rare
 
 
 def test_a_rare_name_is_not_asked_where_another_leads() -> None:

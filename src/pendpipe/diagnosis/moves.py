@@ -201,7 +201,7 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
     price = _chosen(names + 1) - _chosen(names) if leader.drawn else 0.0
     if named[0].evidence - price <= others[0].evidence:
         return list(rivals)
-    return [*named, *others]
+    return [named[0], *others, *named[1:]]
 
 
 def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
