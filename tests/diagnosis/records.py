@@ -163,7 +163,7 @@ class Magnet(Effect):
         return np.asarray(-pull * motion.angle / (1.0 + (motion.angle / width) ** 2) ** 2)
 
 
-def pulled() -> FloatArray:
+def pulled(pull_s2: float = 0.02, width_rad: float = 0.04) -> FloatArray:
     """Readings of a pendulum over a magnet, without noise."""
     model = Model(TIME_S, INTERVAL_S, (Magnet(),))
-    return model.reading(np.append(TRUTH, [0.02, 0.04]))
+    return model.reading(np.append(TRUTH, [pull_s2, width_rad]))

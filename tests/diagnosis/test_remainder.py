@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of
+from pendpipe.diagnosis.values import parameters_of
 from pendpipe.effects.model import Model
 
 from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, null_fit, other_engine, prepared, white
@@ -53,3 +55,15 @@ def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
     assert large.error_scale == pytest.approx(2.0 * small.error_scale, rel=0.2)
     assert small.error_scale > small.over_noise
     assert large.numbers < 30.0
+
+
+def test_a_misfit_widens_intervals_as_much_as_standard_deviations() -> None:
+    fit, found = left_by(1e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
+    narrow = parameters_of(fit, "rad")
+    wide = parameters_of(replace(fit, error_scale=found.error_scale), "rad")
+    assert found.error_scale > 5.0
+    for name in ("a", "b", "c"):
+        assert wide[name].sd == pytest.approx(found.error_scale * narrow[name].sd)
+        # A bound that another rate meets cuts a little of a wide interval.
+        ratio = np.ptp(wide[name].interval95) / np.ptp(narrow[name].interval95)
+        assert 0.8 * found.error_scale < ratio <= 1.001 * found.error_scale

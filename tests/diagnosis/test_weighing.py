@@ -14,7 +14,7 @@ from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.run import Outcome
-from pendpipe.diagnosis.weighing import weigh
+from pendpipe.diagnosis.weighing import law_of, weigh
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.curves import CURVES
@@ -26,6 +26,7 @@ from .records import (
     TIME_S,
     TRUTH,
     null_fit,
+    pulled,
     recording,
 )
 
@@ -100,3 +101,18 @@ def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
     name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
     drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)
     assert named > drawn
+
+
+def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
+    """A pull that no entry of the catalogue describes: a, b, c and f are those of Eq. 8 alone."""
+    outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3))
+    found, diagnosis = outcome.search, outcome.diagnosis
+    assert [step.winner.drawn for step in found.steps] == [True]
+    weighed = [weigh(found, outcome.beginning, step) for step in found.steps]
+    law = law_of(found, weighed)
+    assert law.model.effects == ()
+    assert law.chi2 > 2.0 * found.improved.chi2
+    assert law.error_scale > 1.0
+    for name in ("a", "b", "c", "frequency"):
+        alone, given = diagnosis.baseline.parameters[name], diagnosis.improved.parameters[name]
+        assert abs(given.value - alone.value) < 0.1 * given.sd

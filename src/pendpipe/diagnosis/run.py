@@ -28,7 +28,13 @@ from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.values import parameters_of
-from pendpipe.diagnosis.weighing import Weighed, effect_named, fault_named, swap_in_likelier
+from pendpipe.diagnosis.weighing import (
+    Weighed,
+    effect_named,
+    fault_named,
+    law_of,
+    swap_in_likelier,
+)
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -244,14 +250,15 @@ def diagnose_decay(
         # A part of b that is held bounds b here, and not in the fit.
         before = _as_fit_prints(before, part, points, baseline, "linear", place)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
-    after = before if same else _fitted_model(found.improved, found)
+    law = law_of(found, weighed)
+    after = before if same else _fitted_model(found.improved, found, law)
     if not fixed and [each.identifier for each in found.improved.model.effects] == [SINE]:
         after = _as_fit_prints(after, part, points, baseline, "sine", place)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")
     held = _held_out(found, beginning) if missing else None
-    swings = _small_swings(found)
+    swings = _small_swings(law, found)
     diagnosis = Diagnosis(
         baseline,
         before,
@@ -323,11 +330,11 @@ def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, .
     return tuple(each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0]))
 
 
-def _small_swings(found: Search) -> SmallSwings | None:
-    """Compare the frequency at small amplitudes with the named effects' model, without curves."""
-    if not remainder_of(found.named, found.data, found.noise).systematic:
+def _small_swings(law: Fit, found: Search) -> SmallSwings | None:
+    """Compare the frequency at small amplitudes with the law, where that leaves a misfit."""
+    if not remainder_of(law, found.data, found.noise).systematic:
         return None
-    swings = small_swings(found.named, found.data, found.noise)
+    swings = small_swings(law, found.data, found.noise)
     return swings if swings is not None and swings.significant else None
 
 
@@ -364,12 +371,13 @@ def _as_fit_prints(
     return own if fitted.light == "red" else replace(own, parameters=fitted.parameters)
 
 
-def _fitted_model(fit: Fit, found: Search) -> FittedModel:
+def _fitted_model(fit: Fit, found: Search, law: Fit | None = None) -> FittedModel:
+    """Return a fit's residual and parameters; those of its `law` where that is another fit."""
     data = found.data
     residual = data.residual(fit.at.reading)[data.weight > 0.0]
     dof = max(data.used - len(fit.free), 1)
     return FittedModel(
-        parameters_of(fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
+        parameters_of(law or fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
     )
 
 

@@ -89,8 +89,9 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     """Return 95 % intervals that are valid at a bound."""
     low, high = fit.model.bounds()
     held = [index for index in range(len(fit.value)) if index not in fit.free]
-    normal = fit.jacobian.T @ fit.jacobian
-    gradient = fit.jacobian.T @ fit.residual
+    # A misfit beyond the noise widens the intervals as it widens the standard deviations.
+    normal = fit.jacobian.T @ fit.jacobian / fit.error_scale**2
+    gradient = fit.jacobian.T @ fit.residual / fit.error_scale**2
     wanted = [index for index in (A, B, C) if index in fit.free]
     found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
     return dict(zip(wanted, found, strict=True))

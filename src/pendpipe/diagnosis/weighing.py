@@ -93,6 +93,25 @@ def beside(found: Search, effect: Effect) -> Search:
     return replace(found, improved=found.named, remainder=left)
 
 
+def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
+    """Return the fit with the names that are more probable, with their rivals, than not.
+
+    A curve without a name, or a doubtful name, would take from the values of a, b and c.
+    """
+    model, value = found.improved.model, found.improved.value
+    for step, each in zip(found.steps, weighed, strict=True):
+        if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5:
+            model, value = model.dropping(step.winner.lead.effect, value)
+    if model is found.improved.model:
+        return found.improved
+    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
+    starts = [value, bare]
+    if len(found.named.value) == len(value):
+        starts.append(found.named.value)
+    fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
+    return replace(fit, error_scale=remainder_of(fit, found.data, found.noise).error_scale)
+
+
 def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
