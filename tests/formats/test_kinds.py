@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import io
+import lzma
 import math
 import os
 import subprocess
@@ -10,6 +13,7 @@ import sys
 import zipfile
 from pathlib import Path
 
+import nptdms
 import numpy as np
 import openpyxl
 import pytest
@@ -478,7 +482,7 @@ def test_phyphox_as_zip_and_as_workbook(tmp_path: Path) -> None:
         (b"<?xml version='1.0'?><cassylab><a>", "a.labx", "the XML is damaged"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600, "a.xls", "can't be read"),
         (b"\x89HDF\r\n\x1a\n" + b"\0" * 600, "a.mat", "file of arrays can't be read"),
-        (b"TDSm" + b"\0" * 600, "a.tdms", "a TDMS file of LabVIEW.*export it"),
+        (b"TDSm" + b"\0" * 600, "a.tdms", "file of arrays can't be read"),
     ],
 )
 def test_what_can_not_be_read_is_refused_for_its_reason(
@@ -604,3 +608,157 @@ def test_times_before_zero_are_kept_and_named(tmp_path: Path) -> None:
     recording = read_text(tmp_path, "t (s),theta (rad)\n" + rows)
     assert recording.time_s[0] == TIME[0] - 100
     assert "the times begin at -100 s, before their zero" in recording.notes
+
+
+# --- long tables, rows with words, packed files --------------------------------------------
+
+
+def long_table(order: str) -> str:
+    theta = [f"{t:.4f},theta,{x:.6f}" for t, x in zip(TIME, ANGLE, strict=True)]
+    omega = [f"{t:.4f},omega,{x:.6f}" for t, x in zip(TIME, RATE, strict=True)]
+    rows = theta + omega if order == "one below the other" else zip(theta, omega, strict=True)
+    lines = [row if isinstance(row, str) else "\n".join(row) for row in rows]
+    return "time,variable,value\n" + "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("order", ["one below the other", "in turn"])
+def test_a_long_table_is_read_by_the_quantity_that_it_names(tmp_path: Path, order: str) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text(long_table(order))
+    assert inspect(path).chosen == "theta"
+    same(read(path))
+    np.testing.assert_allclose(read(path, ReadOptions(column="omega")).values, RATE, atol=1e-5)
+
+
+def test_runs_that_a_column_numbers_stand_side_by_side(tmp_path: Path) -> None:
+    runs = ((1, ANGLE), (2, 0.6 * ANGLE))
+    body = "".join(text(np.full(1500, n), TIME, x) for n, x in runs)
+    recording = read_text(tmp_path, "run,t_s,theta_rad\n" + body)
+    same(recording)
+    assert any("several runs" in note for note in recording.notes)
+
+
+def test_a_flag_beside_times_that_rise_makes_no_long_table(tmp_path: Path) -> None:
+    flags = "".join(
+        f"{t:.4f},{x:.6f},{'ok' if row % 7 else 'late'}\n"
+        for row, (t, x) in enumerate(zip(TIME, ANGLE, strict=True))
+    )
+    same(read_text(tmp_path, "t,theta_rad,flag\n" + flags))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "t={ms:.3f} ms, angle={deg:.4f} deg",
+        "t: {s:.5f} s | theta: {deg:.4f}°",
+        "2024-05-01 12:00:{s:09.6f} INFO sensor: angle = {deg:.4f} deg",
+        "{{{s:.5f}, {mathematica}}},",
+    ],
+)
+def test_rows_that_say_the_same_words_each_time(tmp_path: Path, row: str) -> None:
+    time, angle = TIME[:1450], ANGLE[:1450]
+    rows = [
+        row.format(s=t, ms=1e3 * t, deg=np.degrees(x), mathematica=f"{x:.6e}".replace("e", "*^"))
+        for t, x in zip(time, angle, strict=True)
+    ]
+    same(read_text(tmp_path, "ready\n" + "\n".join(rows) + "\n"), angle, time)
+
+
+@pytest.mark.parametrize("packed", ["gz", "bz2", "xz"])
+def test_a_packed_table_is_unpacked(tmp_path: Path, packed: str) -> None:
+    pack = {"gz": gzip.compress, "bz2": bz2.compress, "xz": lzma.compress}[packed]
+    content = pack(text(TIME, ANGLE, head="t_s,theta_rad\n").encode())
+    same(read_text(tmp_path, content, f"a.csv.{packed}"))
+    with pytest.raises(InputError, match=r"cut short|can't be unpacked"):
+        read_text(tmp_path, content[:-9], f"b.csv.{packed}")
+
+
+def test_a_packed_file_may_not_fill_the_memory(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="too large"):
+        read_text(tmp_path, gzip.compress(bytes(300 << 20), 1), "a.gz")
+
+
+def opendocument(rows: str) -> bytes:
+    held = io.BytesIO()
+    names = "xmlns:office='o' xmlns:table='t' xmlns:text='x'"
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        body = f"<table:table table:name='run'>{rows}</table:table>"
+        archive.writestr("content.xml", f"<office:body {names}>{body}</office:body>")
+    return held.getvalue()
+
+
+def cell(value: str, kind: str = "float") -> str:
+    of = f"office:value='{value}'" if kind == "float" else ""
+    return f"<table:table-cell {of}><text:p>{value[:5]}</text:p></table:table-cell>"
+
+
+def test_an_opendocument_table_with_its_empty_rest(tmp_path: Path) -> None:
+    empty = "<table:table-cell table:number-columns-repeated='{}'/>"
+    head = cell("t (s)", "text") + cell("Winkel (rad)", "text").replace("Winke", "Winkel (rad)")
+    rows = "".join(
+        f"<table:table-row>{cell(f'{t:.6f}')}{cell(f'{x:.6f}')}{empty.format(1000)}</table:table-row>"
+        for t, x in zip(TIME, ANGLE, strict=True)
+    )
+    rest = "<table:table-row table:number-rows-repeated='1000000'>" + empty.format(16384)
+    content = opendocument(
+        f"<table:table-row>{head}</table:table-row>{rows}{rest}</table:table-row>"
+    )
+    recording = read_text(tmp_path, content, "a.ods")
+    same(recording)
+    assert recording.unit == "rad"
+    hostile = opendocument("<table:table-row/>" * 3_000_000)
+    with pytest.raises(InputError, match="more than 600000 cells"):
+        read_text(tmp_path, hostile, "b.ods")
+
+
+def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:
+    told = {"wf_increment": 1.0 / 30.0, "wf_start_offset": 0.0, "unit_string": "deg"}
+    path = tmp_path / "a.tdms"
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject("log", "arm", np.degrees(ANGLE), told)])
+    recording = read(path)
+    same(recording)
+    assert recording.weak_guesses == ()
+
+
+def test_igor_origin_excel_and_seismographs_write_tables_of_their_own(tmp_path: Path) -> None:
+    column = "".join(f"\t{x:.6f}\n" for x in ANGLE)
+    scale = 'X SetScale/P x, 0, 0.0333333333, "s", phi; SetScale y, 0, 0, "rad", phi\n'
+    same(read_text(tmp_path, f"IGOR\nWAVES/D/O\tphi\nBEGIN\n{column}END\n{scale}", "a.itx"))
+    head = "Long Name\tTime\tAngle\nUnits\ts\trad\nComments\t\tPohl's wheel\n"
+    rows = "".join(
+        f"{n}\t{t:.5f}\t{x:.6f}\n" for n, (t, x) in enumerate(zip(TIME, ANGLE, strict=True))
+    )
+    same(read_text(tmp_path, head + rows, "b.dat"))
+    cells = "".join(
+        f"<Row><Cell><Data>{t:.5f}</Data></Cell><Cell><Data>{x:.6f}</Data></Cell></Row>"
+        for t, x in zip(TIME, ANGLE, strict=True)
+    )
+    named = "<Row><Cell><Data>t (s)</Data></Cell><Cell><Data>theta (rad)</Data></Cell></Row>"
+    office = "<?xml version='1.0'?>\n<?mso-application progid='Excel.Sheet'?>\n<Workbook><Table>"
+    same(read_text(tmp_path, f"{office}{named}{cells}</Table></Workbook>", "c.xls"))
+    counts = np.rint(1e6 * ANGLE).astype(int)
+    lines = "\n".join("\t".join(map(str, counts[n : n + 6])) for n in range(0, 1500, 6))
+    head = "TIMESERIES XX_A__BHZ_D, 1500 samples, 30 sps, 2024-05-01T22:00:00, SLIST, INTEGER, m\n"
+    same(read_text(tmp_path, head + lines + "\n", "d.txt"), counts.astype(float))
+
+
+def test_an_oscilloscopes_header_gives_the_volts_of_columns_without_a_name(tmp_path: Path) -> None:
+    volts = 0.04 * np.rint(ANGLE / 0.01)
+    head = "Format,1.0B\nMemory Length,1500\nTrigger Level,5.0E-02\nVertical Units,V\n"
+    head += "Vertical Scale,5.0E-01\nSampling Period,3.3333E-02\nMode,Detail\nWaveform Data,\n"
+    recording = read_text(tmp_path, head + text(TIME, volts))
+    same(recording, volts)
+    assert recording.unit == "V"
+    bare = read_text(tmp_path, text(TIME, volts), "bare.csv")
+    # A step of 0.04 is a turn over 9000 by chance: no encoder's.
+    assert any("no unit" in guess for guess in bare.weak_guesses)
+
+
+def test_labview_without_units_of_its_columns(tmp_path: Path) -> None:
+    head = "LabVIEW Measurement\t\nX_Columns\tOne\n***End_of_Header***\t\n\t\nDelta_X\t0.02\t0.02\n"
+    head += "***End_of_Header***\t\t\nX_Value\tVoltage_0\tVoltage_1\tComment\n"
+    assert (
+        read_text(tmp_path, head + text(TIME, ANGLE, 0.0 * ANGLE, sign="\t"), "a.lvm").unit == "V"
+    )

@@ -24,7 +24,7 @@ _WORTH: Final[Mapping[Role, float]] = {
     "signal": 1.0,
     "velocity": 0.8,
     "acceleration": 0.7,
-    "index": 0.5,
+    "index": -1.0,
     "time": -1.0,
     "none": -9.0,
 }
@@ -148,7 +148,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     mine, others = _of_one_run(channels, time, roles)
     readings, notes, weak = _readings(mine, time, roles)
     # What an instrument sampled by a clock of its own is no list.
-    falling = [c for c in readings or mine if c.time_s is None and _only_falls(c.values)]
+    told = readings or [c for c in mine if roles[c.number] != "index"]
+    falling = [c for c in told if c.time_s is None and _only_falls(c.values)]
     if reading and falling and len(falling) == len(readings or falling):
         raise InputError(
             table.place,
@@ -362,7 +363,7 @@ def _readings(
     equals = [entry[1] for entry in candidates if entry[0] == most]
     chosen, why = _of_equals(equals, swings)
     clock = time.values if time is not None else None
-    if len(chosen) == 1 and not why:
+    if len(chosen) == 1:
         chosen, why = _not_a_derivative(chosen[0], alive, clock, roles, why)
     labels = " and ".join(f"'{column.label}'" for column in chosen)
     others = [column.label for column in channels if column not in chosen]

@@ -26,6 +26,9 @@ _MOST_ROWS: Final = 1 << 20
 """What a sheet has, and no more."""
 _MOST_CELLS: Final = 600_000
 """150,000 rows of four columns; openpyxl takes 5 microseconds a cell."""
+_MOST_REPEATED: Final = 64
+"""Columns that one cell of an OpenDocument table may fill: it fills the empty rest of the row."""
+_Sheets = dict[str, list[list[Any]]]
 _OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 
 
@@ -40,26 +43,24 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         When it is one that can't be read, or holds no table.
     """
     if data.startswith(_OLD_EXCEL):
-        return _of_workbook(place, data, options)
+        return _of_sheets(place, _sheets_of_excel(data), options)
     if not data.startswith(b"PK"):
         raise NotThisFormatError("the file is no zip archive")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        parts = archive.infolist()
-        whole = sum(part.file_size for part in parts)
+        names = archive.namelist()
+        whole = sum(part.file_size for part in archive.infolist())
         if whole > most_unpacked(len(data)):
             raise ValueError(f"it unpacks to {whole >> 20} MB")
-        names = [part.filename for part in parts]
-        if not any(name.startswith("xl/") for name in names):
-            members = _tables(place, archive, names)
-    if any(name.startswith("xl/") for name in names):
-        return _of_workbook(place, data, options)
-    return _of_members(place, members, options)
+        if any(name.startswith("xl/") for name in names):
+            _refuse_too_many_cells(archive)
+            return _of_sheets(place, _sheets_of_excel(data), options)
+        if "content.xml" in names:
+            return _of_sheets(place, _sheets_of_opendocument(archive), options)
+        return _of_members(place, _tables(place, archive, names), options)
 
 
 def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str, bytes]:
     """Unpack the members that may hold samples; phyphox puts remarks into ``meta/``."""
-    if "content.xml" in names:
-        raise InputError(place, "this is an OpenDocument table", "save it as .xlsx or CSV")
     if any(name.lower().endswith((".cap", "main.xml")) for name in names) or any(
         re.match(r"data/.*\.tmp$", name) for name in names
     ):
@@ -92,31 +93,58 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
     return _noted(tables[best], f"'{best}' of the archive", [n for n in tables if n != best])
 
 
-def _of_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the sheet with most numbers as the text that it would export."""
+def _sheets_of_excel(data: bytes) -> _Sheets:
+    """Read all sheets of a workbook, .xls or .xlsx."""
     import warnings
 
     import pandas as pd
 
-    if not data.startswith(_OLD_EXCEL):
-        _refuse_too_many_cells(data)
     with warnings.catch_warnings(), redirect_stdout(io.StringIO()):  # xlrd prints
         warnings.simplefilter("ignore")
         sheets = pd.read_excel(
             io.BytesIO(data), None, header=None, dtype=object, na_filter=False, nrows=_MOST_ROWS
         )
+    return {str(title): sheet.to_numpy().tolist() for title, sheet in sheets.items()}
+
+
+def _sheets_of_opendocument(archive: zipfile.ZipFile) -> _Sheets:
+    """Read all sheets of an OpenDocument table, whose cells and rows say how often they repeat."""
+    sheets: _Sheets = {}
+    rows: list[list[Any]] = []
+    row: list[str] = []
+    cells = 0
+    for nodes, (_, node) in enumerate(ET.iterparse(archive.open("content.xml"))):
+        kind = node.tag.rpartition("}")[2]
+        if kind == "table-cell":
+            told = {name.rpartition("}")[2]: value for name, value in node.attrib.items()}
+            values = (told.get(name) for name in ("value", "date-value", "time-value"))
+            value = next(filter(None, values), " ".join("".join(node.itertext()).split()))
+            value = re.sub(r"^PT(\d+)H(\d+)M([\d.]+)S$", r"\1:\2:\3", value)
+            row += [value] * min(int(told.get("number-columns-repeated", 1)), _MOST_REPEATED)
+        elif kind == "table-row":
+            cells += len(row)
+            rows.append("\t".join(row).rstrip("\t").split("\t"))
+            row = []
+            node.clear()
+        elif kind == "table":
+            sheets[f"{len(sheets) + 1}"], rows = rows, []
+        if cells + nodes // 2 > _MOST_CELLS:
+            raise ValueError(f"it has more than {_MOST_CELLS} cells")
+    return sheets
+
+
+def _of_sheets(place: Path, sheets: _Sheets, options: ReadOptions) -> Table:
+    """Read the sheet with most numbers as the text that it would export."""
     numbers = {
-        title: sum(_is_number(cell) for row in sheet.to_numpy().tolist() for cell in row)
+        title: sum(_is_number(cell) for row in sheet for cell in row)
         for title, sheet in sheets.items()
     }
-    best = max(numbers, key=lambda title: numbers[title], default=None)
-    if best is None or not numbers[best]:
+    best = max(numbers, key=lambda title: numbers[title], default="")
+    if not numbers.get(best):
         raise InputError(place, "no sheet holds numbers", "give the workbook with the samples")
-    rows = sheets[best].to_numpy().tolist()
-    text = "\n".join("\t".join(map(_written, row)) for row in rows) + "\n"
-    plain = replace(options, delimiter="\t")
+    text = "\n".join("\t".join(map(_written, row)) for row in sheets[best]) + "\n"
     try:
-        table = table_of_text(place, text, plain, "excel")
+        table = table_of_text(place, text, replace(options, delimiter="\t"), "excel")
     except NotThisFormatError as reason:
         raise InputError(
             place, f"sheet '{best}': {reason}", "give time and angle as columns"
@@ -130,20 +158,19 @@ def _noted(table: Table, note: str, others: list[str], without: int = 0) -> Tabl
     return replace(table, notes=(note + left, *table.notes[without:]))
 
 
-def _refuse_too_many_cells(data: bytes) -> None:
+def _refuse_too_many_cells(archive: zipfile.ZipFile) -> None:
     """Count the cells of all sheets before openpyxl makes objects of them."""
     cells = 0
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        for name in archive.namelist():
-            if not re.match(r"xl/(worksheets/.*|sharedStrings)\.xml$", name):
-                continue
-            with archive.open(name) as sheet:
-                while chunk := sheet.read(1 << 20):
-                    cells += chunk.count(b"<c ") + chunk.count(b"<c>") + chunk.count(b"<si>")
-                    if cells > _MOST_CELLS:
-                        raise ValueError(f"it has more than {_MOST_CELLS} cells")
-                    if re.search(rb'<c [^>]*r="[A-Z]{3}|<row [^>]*r="\d{8}', chunk):
-                        raise ValueError("a cell stands beyond column ZZ, or beyond the last row")
+    for name in archive.namelist():
+        if not re.match(r"xl/(worksheets/.*|sharedStrings)\.xml$", name):
+            continue
+        with archive.open(name) as sheet:
+            while chunk := sheet.read(1 << 20):
+                cells += chunk.count(b"<c ") + chunk.count(b"<c>") + chunk.count(b"<si>")
+                if cells > _MOST_CELLS:
+                    raise ValueError(f"it has more than {_MOST_CELLS} cells")
+                if re.search(rb'<c [^>]*r="[A-Z]{3}|<row [^>]*r="\d{8}', chunk):
+                    raise ValueError("a cell stands beyond column ZZ, or beyond the last row")
 
 
 def _is_number(cell: Any) -> bool:

@@ -231,7 +231,9 @@ def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> boo
 
 def _is_row(cells: Sequence[str], layout: Layout) -> bool:
     kinds = layout.kinds(cells) if len(cells) == layout.width else ""
-    return "n" in kinds and 2 * kinds.count("t") <= len(kinds) - kinds.count("b")
+    filled = len(kinds) - kinds.count("b")
+    # "Record Length,2500" belongs to a header.
+    return "n" in kinds and 2 * kinds.count("t") <= filled and kinds not in ("tn", "nt")
 
 
 def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import bz2
+import lzma
 import re
 import stat
 import sys
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,6 +21,7 @@ import numpy as np
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
+from pendpipe.formats.matlab import most_unpacked
 from pendpipe.formats.readings import Readings, readings
 from pendpipe.formats.samples import (
     Gap,
@@ -46,16 +50,21 @@ _LARGEST: Final = 1 << 30
 """Bytes of a file; a day at 1 kHz is 1.7e8 of WinDaq's."""
 
 _OTHERS: Final = (
-    (b"TDSm", "a TDMS file of LabVIEW", "export it as text or .xlsx"),
     (b"%PDF", "a PDF", "give the table as CSV or .xlsx"),
     (b"\x89PNG", "a picture", "give the table as CSV or .xlsx"),
     (b"\xff\xd8\xff", "a picture", "give the table as CSV or .xlsx"),
-    (b"\x1f\x8b", "a file packed with gzip", "unpack it"),
+    (b"PAR1", "a Parquet file", "export its table as CSV"),
     (b"7z\xbc\xaf", "a 7z archive", "unpack it"),
     (b"Rar!", "a RAR archive", "unpack it"),
     (b"SQLite format 3", "a database", "export its table as CSV"),
 )
 """What some give that holds no table, or none that is read; by its first bytes."""
+
+_PACKED: Final[tuple[tuple[bytes, Callable[[], Any]], ...]] = (
+    (b"\x1f\x8b", lambda: zlib.decompressobj(31)),
+    (b"BZh", bz2.BZ2Decompressor),
+    (b"\xfd7zXZ\0", lzma.LZMADecompressor),
+)
 
 _BY_LIBRARIES: Final = ("file of arrays", "zip archive")
 """Of these a library takes the file apart, and raises whatever it stumbles on."""
@@ -91,7 +100,7 @@ def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
         wrong, what to do.
     """
     place = Path(path)
-    data = file_bytes(place)
+    data = _unpacked(place, file_bytes(place))
     plain = read_if_plain(place, data, options)
     recording = (
         plain if plain is not None else recording_of(table_of(place, data, options), options)
@@ -151,6 +160,22 @@ def _standard_input() -> bytes:
     data = sys.stdin.buffer.read(_LARGEST + 1)
     _refuse_size(Path("-"), len(data))
     return data
+
+
+def _unpacked(place: Path, data: bytes) -> bytes:
+    """Unpack what gzip, bzip2 or xz has packed."""
+    unpacker: Any = next((make() for mark, make in _PACKED if data.startswith(mark)), None)
+    if unpacker is None:
+        return data
+    try:
+        content = bytes(unpacker.decompress(data, most_unpacked(len(data))))
+    except (OSError, ValueError, EOFError, zlib.error, lzma.LZMAError) as fault:
+        raise InputError(place, f"it can't be unpacked ({fault})", "pack it again") from None
+    if not unpacker.eof:
+        raise InputError(
+            place, "what is packed in it is cut short, or too large", "give the file in it"
+        )
+    return content
 
 
 def _refuse_size(place: Path, size: int) -> None:
@@ -475,7 +500,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         When no reader knows the file, or it holds no readings.
     """
     place = Path(path)
-    data = file_bytes(place)
+    data = _unpacked(place, file_bytes(place))
     plain = read_if_plain(place, data, options)
     table = table_of_plain(place, plain) if plain is not None else table_of(place, data, options)
     choice = choose(table, options, reading=False)

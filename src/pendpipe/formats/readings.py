@@ -122,6 +122,10 @@ def _unit(
         return _Guess(
             Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
         )
+    headed = _UNITS_OF.search(table.metadata.get("header", ""))
+    named = unit_of(headed[1]) if headed else None
+    if headed and named and named.kind in ("length", "volts") and role in ("unknown", named.kind):
+        return _Guess(named, f"is in {headed[1]}, by the header")
     if role == "volts":
         return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
     names = {other.name.lower() for other in choice.channels if not other.unit}
@@ -140,6 +144,10 @@ def _unit(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
         )
     return _angle_unit(table, choice, column, time_s)
+
+
+_UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
+"""What an oscilloscope, or a system of cameras, says above its table."""
 
 
 def _reach(finite: FloatArray) -> float:
@@ -180,7 +188,7 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     )
     if stated and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
-    by_step = _by_step(finite)
+    by_step = _by_step(finite, choice.roles.get(column.number) == "angle")
     if by_step is not None:
         return by_step
     by_sibling = _by_sibling(choice, column, time_s)
@@ -238,8 +246,12 @@ def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | N
     return _Guess(_RADIAN, why)
 
 
-def _by_step(finite: FloatArray) -> _Guess | None:
-    """Read the unit off the step: a printed digit of the other unit, or a part of a turn."""
+def _by_step(finite: FloatArray, named: bool) -> _Guess | None:
+    """Read the unit off the step: a printed digit of the other unit, or a part of a turn.
+
+    A step of few digits is an encoder's in a column that is named an angle; in any other it may
+    be a converter's.
+    """
     if _printed_digit(finite, 1.0) is None:
         for unit, scale, name, other in (
             (_RADIAN, 180 / np.pi, "radians", "degrees"),
@@ -251,6 +263,8 @@ def _by_step(finite: FloatArray) -> _Guess | None:
                 return _Guess(unit, f"is taken to be in {name} ({why})")
     step = resolution(finite)
     if step is None or _is_round(step):
+        return None
+    if not named and abs(float(f"{step:.3g}") / step - 1.0) < 2e-5:
         return None
     for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
         parts = turn / step

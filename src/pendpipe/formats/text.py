@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import unescape
+from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -37,6 +39,8 @@ _LARGEST: Final = 512 << 20
 """Bytes of a table: ten million rows. Its lines and cells take some five times that."""
 _LONGEST_LINE: Final = 1 << 20
 _LONGEST_HEADER: Final = 5000
+_MOST_KEYS: Final = 20
+"""Runs or quantities that a long table may name."""
 
 
 def decode(data: bytes) -> str:
@@ -88,18 +92,11 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     """Read the table that is in `text`; `form` is the format's name for the user."""
     lines = _without_tags(text).split("\n")
     _refuse_long(place, lines)
-    for form_of in (
-        _without_labview_heads,
-        _side_by_side,
-        _in_rows,
-        _bare_cells,
-        _without_cassy_limits,
-        _without_panel,
-        _without_split_decimals,
-        _upright,
-    ):
+    for begins, own_form in _DIALECTS:
+        if begins.match("\n".join(lines[:50])):
+            lines = own_form(lines)
+    for form_of in (_in_rows, _bare_cells, _without_words, _without_split_decimals, _upright):
         lines = form_of(lines)
-    lines = _without_labels(lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
     if first > _LONGEST_HEADER:
@@ -108,16 +105,18 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
             f"no row of numbers stands in the first {_LONGEST_HEADER} lines",
             "give a table with a row a sample",
         )
-    header = read_header(place, lines[:first], layout)
+    header = read_header(place, lines[: first + 1], layout)
     lines, cut = _without_cut_row(lines, first, layout)
-    found = _at_once(lines, first, layout, header)
+    found, keys = _at_once(lines, first, layout, header), list[list[str]]()
+    notes: list[str] = []
+    numbers = np.arange(first + 1, first + 1 + (len(found[0].values) if found else 0))
     if found is None:
         rows, numbers, notes = _rows(lines, first, layout)
         if not rows:
             raise InputError(place, "there are no samples", "record again, or give another file")
-        found = _columns(place, rows, numbers, layout, header)
-    else:
-        numbers, notes = np.arange(first + 1, first + 1 + len(found[0].values)), []
+        found, keys = _columns(place, rows, numbers, layout, header)
+    for words in (*keys, *(c.values.tolist() for c in found if _numbers_runs(c))):
+        found, numbers = _by_key(found, numbers, words)
     return Table(
         place=place,
         format=form,
@@ -130,34 +129,34 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
 
 
 def _without_tags(text: str) -> str:
-    """Make of the tables of a web page rows with tabs."""
-    if not re.match(r"\s*<(!doctype html|html|table|meta|div)\b", text[:200], re.I):
+    """Make of the tables of a web page, or of Excel's XML, rows with tabs."""
+    if not re.match(
+        r"\s*<(!doctype html|html|table|meta|div|\?xml[^<]*(<\?[^<]*)?<workbook)\b",
+        text[:400],
+        re.I,
+    ):
         return text
     # (No pattern here runs on over the next sign, or a hostile page would take hours.)
     text = re.sub(r"(?i)<(style|script|title)\b[^<]*", "", " ".join(text.split()))
-    text = re.sub(r"(?i)</tr ?>|<br ?/? ?>", "\n", text)
-    return unescape(re.sub(r"<[^<>]*>", "", re.sub(r"(?i)</t[dh] ?>(?! ?\n)", "\t", text)))
+    text = re.sub(r"(?i)</(tr|row) ?>|<br ?/? ?>", "\n", text)
+    return unescape(re.sub(r"<[^<>]*>", "", re.sub(r"(?i)</(t[dh]|data) ?>(?! ?\n)", "\t", text)))
 
 
-def _without_labview_heads(lines: list[str]) -> list[str]:
+def _of_labview(lines: list[str]) -> list[str]:
     """Make of the two headers that LabVIEW writes (.lvm) remarks and one row of names."""
     ends = [row for row, line in enumerate(lines[:100]) if line.startswith("***End_of_Header***")]
-    if not ends or not lines[0].startswith("LabVIEW Measurement"):
-        return lines
-    at = ends[-1] + 1
-    told = {line.split("\t")[0]: line.split("\t")[1:] for line in lines[:at]}
-    units = ["s", *told.get("Y_Unit_Label", [])]
+    at = max(ends, default=-1) + 1
+    told = {key: cells for key, *cells in (line.split("\t") for line in lines[:at])}
     names = [name for name in lines[at].split("\t") if name not in ("Comment", "")]
-    head = [f"{n} ({u})" if u else n for n, u in zip(names, [*units, *names], strict=False)]
+    units = ["s", *told.get("Y_Unit_Label", [])][: len(names)]
+    head = [f"{n} ({u})" if u else n for n, u in zip_longest(names, units, fillvalue="")]
     bare = told.get("X_Columns") == ["No"]  # then the rows begin with an empty cell
     rows = [line[bare:].rstrip("\t") for line in lines[at + 1 :]]
     return [*("# " + line for line in lines[:at]), "\t".join(head[bare:]), *rows]
 
 
-def _side_by_side(lines: list[str]) -> list[str]:
+def _of_octave(lines: list[str]) -> list[str]:
     """Put columns that Octave saves below one another beside one another."""
-    if not lines[0].startswith("# Created by Octave"):
-        return lines
     blocks = re.split(r"^# name: ", "\n".join(lines), flags=re.M)[1:]
     columns = [
         [b.split("\n", 1)[0], *re.findall(r"^ *([^#\s]+) *$", b.split("\n", 1)[-1], re.M)]
@@ -165,13 +164,70 @@ def _side_by_side(lines: list[str]) -> list[str]:
     ]
     longest = max(map(len, columns), default=0)
     columns = [column for column in columns if len(column) == longest]
-    if longest < 5:
+    return ["\t".join(row) for row in zip(*columns, strict=True)] if longest > 4 else lines
+
+
+def _of_cassy(lines: list[str]) -> list[str]:
+    """Make of the header that CASSY Lab writes (MIN=, MAX=, SCALE=, DEC=, DEF=) a line of names."""
+    head = [
+        line.removeprefix("DEF=").replace('"', "").replace("&", "")
+        if line.startswith("DEF=")
+        else re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line)
+        for line in lines[:50]
+    ]
+    return head + lines[50:]
+
+
+_PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
+
+
+def _of_tektronix(lines: list[str]) -> list[str]:
+    """Put above what Tektronix writes in three columns to the left of its first readings."""
+    rows = [_PANEL.fullmatch(line) for line in lines]
+    if any(row is None for row, line in zip(rows, lines, strict=True) if line.strip()):
         return lines
-    return ["\t".join(row) for row in zip(*columns, strict=True)]
+    told = {row[1].strip(): row[2].strip() for row in rows[:30] if row is not None}
+    across, up = told.get("Horizontal Units", "s"), told.get("Vertical Units", "V")
+    names = f"time ({across}),{told.get('Source', 'CH1')} ({up}),"
+    return [names, *(row[4] if row is not None else "" for row in rows)]
+
+
+def _of_igor(lines: list[str]) -> list[str]:
+    """Make of Igor's text a table: names above, and the interval, which stands below."""
+    text = "\n".join(lines)
+    scale = re.search(r"SetScale */P +x *,[^,]*,([^,]*),", text)
+    unit = re.search(r'SetScale +[yd] *,[^,]*,[^,]*, *"([^"]+)"', text)
+    names = lines[1].partition(" ")[2] if " " in lines[1] else lines[1].partition("\t")[2]
+    names = re.sub(r"[,\s]+", "\t", names.strip()) + (f" ({unit[1]})" if unit else "")
+    rows = [line.strip() for line in lines[2:] if not re.match(r"\s*(BEGIN|END|X )", line)]
+    return [f"# dt = {scale[1].strip()} s" if scale else "#", names, *rows]
+
+
+def _of_origin(lines: list[str]) -> list[str]:
+    """Leave of Origin's three lines of titles the names and the units."""
+    head = [re.sub(r"^(Long Name|Units)(?=\t)", "", line) for line in lines[:6]]
+    return [*(re.sub(r"^[A-Z].*", "#", line) for line in head), *lines[6:]]
+
+
+def _of_seismograph(lines: list[str]) -> list[str]:
+    """Put the samples of an SLIST, several in a line, below one another."""
+    return [f"# {lines[0]}", *" ".join(lines[1:]).split()]
+
+
+_DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]], ...]] = (
+    (re.compile(r"LabVIEW Measurement[\s\S]*\*\*\*End_of_Header"), _of_labview),
+    (re.compile("# Created by Octave"), _of_octave),
+    (re.compile(r"(?:.*\n)*DEF="), _of_cassy),
+    (re.compile('"?Record Length"?,'), _of_tektronix),
+    (re.compile(r"IGOR\s*\nWAVES"), _of_igor),
+    (re.compile(r"Long Name\t"), _of_origin),
+    (re.compile("TIMESERIES .*SLIST"), _of_seismograph),
+)
+"""Texts that are no plain table, by how they begin."""
 
 
 def _bare_cells(lines: list[str]) -> list[str]:
-    """Take off what programs and people put about numbers, where most lines have it."""
+    """Take off what programs and people put behind numbers, where most lines have it."""
     for found, put in _CLOTHED:
         some = [line for line in lines[:100] if found.search(line)]
         if len(some) > 0.5 * len([line for line in lines[:100] if line.strip()]):
@@ -184,12 +240,6 @@ def _degrees(match: re.Match[str]) -> str:
     return f"{match[1]}{size:.9g}°"
 
 
-def _stamped(match: re.Match[str]) -> str:
-    sign = next((sign for sign in "\t;," if sign in match[3]), " ")
-    return (match[1] or match[2]).replace(" ", "T") + sign + match[3]
-
-
-_CLOCK: Final = r"(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
 _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
     (
         re.compile(
@@ -199,73 +249,66 @@ _CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str
         _degrees,
     ),
     (re.compile(r"(?<=\d)\s*(?:±|\+/?-)\s*\d+(?:\.\d+|,\d+(?=[^,]*[;\t]|[^,]*$))?"), ""),
-    (re.compile(r"np\.float\d\d\(([^()]*)\)"), r"\1"),
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
-    (re.compile(rf"^\s*(?:({_CLOCK})\s*->|\[({_CLOCK})\])\s*(.*)$"), _stamped),
-    (re.compile(r"^\s*[\[({]+([^\[\](){}]*)[\])}]+,?\s*$"), r"\1"),
 )
-"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); NumPy's types; rows that end in ``;``;
-times that serial monitors put before each line (``12:03:04.5 ->``, ``[2024-05-01 12:03:04.5]``);
-rows printed as lists."""
-
-
-def _without_cassy_limits(lines: list[str]) -> list[str]:
-    """Make of the header that CASSY Lab writes (MIN=, MAX=, SCALE=, DEC=, DEF=) a line of names."""
-    if not any(line.startswith("DEF=") for line in lines[:50]):
-        return lines
-    head = [
-        line.removeprefix("DEF=").replace('"', "").replace("&", "")
-        if line.startswith("DEF=")
-        else re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line)
-        for line in lines[:50]
-    ]
-    return head + lines[50:]
-
-
-_LABELLED: Final = re.compile(
-    r"\s*([A-Za-z]\w*)\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*[,;|]?\s*"
-)
+"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); rows that end in ``;``."""
 
 
 def _in_rows(lines: list[str]) -> list[str]:
     """Part a list that stands in one line."""
     if len(lines) >= 5:
         return lines
-    whole = re.sub(r"^(\w+\s*=\s*)?\[\s*(?=[(\[])", "", "\n".join(lines).lstrip())
-    return re.sub(r"(?<=[)\]])\s*,\s*(?=[(\[])", "\n", whole).split("\n")
+    whole = re.sub(r"^(\w+\s*=\s*)?[\[{]\s*(?=[(\[{])", "", "\n".join(lines).lstrip())
+    return re.sub(r"(?<=[)\]}])\s*,\s*(?=[(\[{])", "\n", whole).split("\n")
 
 
-_PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
+_TOKEN: Final = re.compile(
+    r"(?<![\w.])(?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[+-]\d\d:\d\d)?(?![\w:])"
+    r"|(?<![\w.])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:(?:[eE]|\*\^)[+-]?\d+)?"
+)
+"""A time of day, or a number (Mathematica's ``1.2*^-3`` too)."""
+_SAID: Final = re.compile(r"([^\W\d]\w*)\s*[:=]\s*$")
+_WORDS: Final = re.compile(r"[^\W\d]\w*\s*[:=]\s*\0|(->|[\[({]|\])\s*\0")
 
 
-def _without_panel(lines: list[str]) -> list[str]:
-    """Put above what Tektronix writes in three columns to the left of its first readings."""
-    if not lines[0].startswith(("Record Length,", '"Record Length",')):
+def _without_words(lines: list[str]) -> list[str]:
+    """Keep the numbers and units of rows that say the same words about them, each time anew.
+
+    So serial monitors, logs and printed lists have it: ``t = 12 ms, theta: 0.5 deg``,
+    ``12:03:04.5 -> 0.3``, ``(0.1, 0.2),``. The words become the names.
+    """
+    some = [line for line in lines[:100] if line.strip()]
+    shapes = Counter(" ".join(_TOKEN.sub("\0", line).split()) for line in some)
+    shape, many = shapes.most_common(1)[0] if shapes else ("", 0)
+    if 2 * many <= len(some) or not _WORDS.search(shape):
         return lines
-    rows = [_PANEL.fullmatch(line) for line in lines]
-    if any(row is None for row, line in zip(rows, lines, strict=True) if line.strip()):
-        return lines
-    told = {row[1].strip(): row[2].strip() for row in rows[:30] if row is not None}
-    across, up = told.get("Horizontal Units", "s"), told.get("Vertical Units", "V")
-    names = f"time ({across}),{told.get('Source', 'CH1')} ({up}),"
-    return [names, *(row[4] if row is not None else "" for row in rows)]
+    said = [_SAID.search(piece) for piece in shape.split("\0")[:-1]]
+    behind = [piece.split()[:1] for piece in re.sub(r"[,;|)\]}]", " ", shape).split("\0")[1:]]
+    units = [word[0] if word and unit_of(word[0]) else "" for word in behind]
+    names = "\t".join(each[1] if each else "" for each in said)
+    rows, first = list(lines), len(lines)
+    for row, line in enumerate(lines):
+        if " ".join(_TOKEN.sub("\0", line).split()) == shape:
+            cells = zip(_TOKEN.findall(line), units, strict=True)
+            rows[row] = "\t".join(
+                f"{cell.replace(' ', 'T').replace('*^', 'e')} {unit}".strip()
+                for cell, unit in cells
+            )
+            first = min(first, row)
+    # The names take the place of the line above, so that the rows keep their numbers.
+    return [*rows[: max(0, first - 1)], names, *rows[first:]] if names.strip() else rows
 
 
 def _without_split_decimals(lines: list[str]) -> list[str]:
     """Repair rows with commas in the numbers and between them: as many again as there are names."""
     head = next((row for row, line in enumerate(lines[:50]) if _SPLIT.fullmatch(line)), 0)
-    cells = lines[head].split(",")
-    names = lines[head - 1].split(",") if head else []
+    cells, names = lines[head].split(","), lines[head - 1].split(",") if head else []
     if len(names) < 2 or len(cells) != 2 * len(names):
         return lines
-    if not all(
-        _SPLIT.fullmatch(line) and line.count(",") == len(cells) - 1
-        for line in lines[head : head + 100]
-        if line
-    ):
+    rows = [line for line in lines[head:] if line]
+    if not all(_SPLIT.fullmatch(row) and row.count(",") == len(cells) - 1 for row in rows[:100]):
         return lines
-    rows = [re.sub(r"(\d+),(\d+)(,|$)", r"\1.\2\3", line) for line in lines[head:]]
-    return [*lines[:head], *rows]
+    return [*lines[:head], *(re.sub(r"(\d+),(\d+)(,|$)", r"\1.\2\3", row) for row in lines[head:])]
 
 
 _SPLIT: Final = re.compile(r"[+-]?\d+,\d+(,[+-]?\d+,\d+)+")
@@ -278,37 +321,12 @@ def _upright(lines: list[str]) -> list[str]:
         return lines
     sign = max("\t;,", key=rows[0].count)
     cells = [row.strip().split(sign if sign in rows[0] else None) for row in rows]
-    width = len(cells[0])
-    if width < 5 * _FEW_LINES or any(len(row) != width for row in cells):
+    if len(cells[0]) < 5 * _FEW_LINES or len(set(map(len, cells))) > 1:
         return lines
     return ["\t".join(column) for column in zip(*cells, strict=True)]
 
 
 _FEW_LINES: Final = 12
-
-
-def _without_labels(lines: list[str]) -> list[str]:
-    """Take names out of rows that repeat them (``t:0.01,theta:0.5``) and put them above."""
-    first = next((row for row, line in enumerate(lines[:100]) if _labels(line)), None)
-    if first is None:
-        return lines
-    names = _labels(lines[first])
-    rows = [line for line in lines[first : first + 50] if line.strip()]
-    if len(rows) < 4 or any(_labels(line) != names for line in rows[:-1]):
-        return lines
-    bare = [
-        ",".join(match[2] for match in _LABELLED.finditer(line)) if _labels(line) else line
-        for line in lines[first:]
-    ]
-    # The names take the place of the line above, so that the rows keep their numbers.
-    return [*lines[: max(0, first - 1)], ",".join(names), *bare]
-
-
-def _labels(line: str) -> list[str]:
-    """The names in a row of names and numbers; none where it is anything else."""
-    found = _LABELLED.findall(line) if ":" in line or "=" in line else []
-    whole = bool(found) and not _LABELLED.sub("", line).strip()
-    return [name for name, _ in found] if whole else []
 
 
 def _refuse_long(place: Path, lines: Sequence[str]) -> None:
@@ -415,11 +433,11 @@ _NO_TEXT: Final = re.compile(r"[\s\d.,;:+\-eE|/\"']*")
 
 def _columns(
     place: Path, rows: list[str], numbers: IntArray, layout: Layout, header: Header
-) -> list[Column]:
-    """Turn the rows into columns with the header's names."""
+) -> tuple[list[Column], list[list[str]]]:
+    """Turn the rows into columns with the header's names, and those of words as they stand."""
     table = all_numbers(rows, layout)
     if table is not None:
-        return [_column(header, column, values) for column, values in enumerate(table.T)]
+        return [_column(header, column, values) for column, values in enumerate(table.T)], []
     cells = [layout.split(row) for row in rows]
     width = max(layout.width, max(map(len, cells)))
     if width > max(_WIDEST, 4 * layout.width):
@@ -427,17 +445,61 @@ def _columns(
         raise InputError(
             f"{place}, line {numbers[row]}", f"{width} cells in a row", "correct or drop the row"
         )
-    columns = []
+    columns: list[Column] = []
+    words: list[list[str]] = []
     for place_of in range(width):
         texts = [row[place_of] if place_of < len(row) else "" for row in cells]
         column = column_of_numbers(texts, layout, _column(header, place_of, np.empty(0)))
         if not np.isfinite(column.values).any():
             clock = column_of_clock_times(texts)
             if clock is None:
+                words.append(texts)
+                # "0.123,V": the unit stands in a column of its own.
+                if columns and unit_of(texts[0]) and not columns[-1].unit and len(set(texts)) == 1:
+                    columns[-1] = replace(columns[-1], unit=texts[0])
                 continue
             column = Column(column.name or "time", "s", clock, column.number)
         columns.append(column)
-    return columns
+    return columns, words
+
+
+def _numbers_runs(column: Column) -> bool:
+    """Say whether a column may number runs or sensors, as in a long table."""
+    some = column.values[:: max(1, len(column.values) // 1000)]
+    return role_of(column.name) == "index" and 1 < len(np.unique(some)) <= _MOST_KEYS
+
+
+def _by_key(
+    columns: list[Column], numbers: IntArray, keys: Sequence[str | float]
+) -> tuple[list[Column], IntArray]:
+    """Put the quantities or runs of a long table, each named by a key, side by side.
+
+    It is long where the time rises among the rows of each key, and not in the file.
+    """
+    which = np.array(keys)
+    clock = next(
+        (c for c in columns if role_of(c.name) == "time" and len(c.values) == len(which)), None
+    )
+    rows = [np.flatnonzero(which == key) for key in dict.fromkeys(keys) if key != ""]
+    some_keys, rows = len(rows), [each for each in rows if len(each) >= 8]
+    if clock is None or not rows or not 1 < some_keys <= _MOST_KEYS:
+        return columns, numbers
+    if np.all(np.diff(clock.values) > 0) or any(
+        np.any(np.diff(clock.values[each]) <= 0) for each in rows
+    ):
+        return columns, numbers
+    longest = max(map(len, rows))
+    values = [c for c in columns if c is not clock and not np.array_equal(c.values, which)]
+    found, numbered = list[Column](), isinstance(keys[0], float)
+    for some in rows:
+        one = not found or numbered or not np.array_equal(clock.values[some], clock.values[rows[0]])
+        for column in [clock, *values] if one else values:
+            said = [] if column is clock else [str(keys[some[0]]).removesuffix(".0")]
+            named = column is clock or len(values) > 1 or numbered
+            name, unit = split_header(" ".join([*said, column.name] if named else said))
+            filled = np.append(column.values[some], np.full(longest - len(some), np.nan))
+            found.append(Column(name, column.unit or unit, filled, len(found) + 1))
+    return found, numbers[max(rows, key=len)]
 
 
 def _column(header: Header, place: int, values: FloatArray) -> Column:
@@ -448,7 +510,7 @@ def _column(header: Header, place: int, values: FloatArray) -> Column:
 
 _RATE_WORD: Final = re.compile(
     r"sampl\w*[\s_\-.]*(rate|freq)|abtast(rate|freq)|frame[\s_]*rate|scan[\s_]*rate|\bfps\b|\bfs\b"
-    r"|messrate|rate[\s_]*\(?hz|sampled at|(update|output|data)[\s_]*rate",
+    r"|messrate|(?-i:^FREQUENCY\t)|rate[\s_]*\(?hz|sampled at|(update|output|data)[\s_]*rate",
     re.I,
 )
 _INTERVAL_WORD: Final = re.compile(
@@ -477,16 +539,17 @@ class Header:
 
 
 def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
-    """Read the lines above the first row of numbers.
+    """Read the lines above the first row of numbers, which is the last of `lines`.
 
     Raises
     ------
     InputError
         When a line under the names is a row with text where the numbers begin.
     """
-    filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
+    *above, row = lines
+    filled = [(number, line) for number, line in enumerate(above, start=1) if line.strip()]
     names_at, cells = _names(filled, layout)
-    _refuse_damaged_rows(place, filled, names_at, layout)
+    _refuse_damaged_rows(place, filled, names_at, layout.split(row), layout)
     interval = _interval([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
     if not cells:
@@ -511,7 +574,7 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     bare = line.strip().lstrip("".join(COMMENT)).strip()
     own = [layout.split(line), layout.split(bare)]
     yield from (cells for cells in own if len(cells) == layout.width)
-    told = ": " in bare  # a remark, unless the rows' own sign splits it
+    told = ": " in f"{bare} "  # a remark, unless the rows' own sign splits it
     if not told and not any(map(layout.is_number, layout.split(bare))):
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
         joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
@@ -546,8 +609,10 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
         if candidates and len(own) == layout.width and all(map(layout.is_number, own)):
             break  # the block has begun: what follows is damaged
         for cells in _splits(line, layout):
-            while len(cells) > layout.width and not cells[-1]:
-                cells.pop()
+            # Rigol's names go on beyond the rows.
+            longer = layout.delimiter in "\t;," and number >= filled[-1][0] - 1 and cells == own
+            while len(cells) > layout.width and (longer or not cells[-1]):
+                cells = cells[:-1]
             texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]
             texts = [cell for cell in texts if not layout.is_number(cell)]
             if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
@@ -577,14 +642,14 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
 def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     """Read a row under the names that holds units only."""
     for line in below:
-        for cells in _splits(line.strip().lstrip("#%"), layout):
+        for cells in _splits(line.strip(" ").lstrip("#%"), layout):
             if len(cells) == layout.width and _are_units(cells):
                 return [cell.strip("[](){} ") for cell in cells]
     return None
 
 
 def _refuse_damaged_rows(
-    place: Path, filled: Sequence[tuple[int, str]], names_at: int, layout: Layout
+    place: Path, filled: Sequence[tuple[int, str]], names_at: int, row: list[str], layout: Layout
 ) -> None:
     """Refuse text where the numbers begin: a row of the block's width under the names.
 
@@ -595,9 +660,12 @@ def _refuse_damaged_rows(
     for place_of, (number, line) in enumerate(below):
         cells = layout.split(line)
         numbers = [layout.is_number(cell) for cell in cells]
-        if len(cells) != layout.width or layout.width == 1 or not any(numbers):
+        if len(cells) != len(row) or layout.width == 1 or not any(numbers):
             continue
-        wrong = [cell for cell, good in zip(cells, numbers, strict=True) if not good and cell]
+        texts = [at for at, good in enumerate(numbers) if not good and cells[at]]
+        wrong = [cells[at] for at in texts if layout.is_number(row[at])]
+        if texts and not wrong:
+            continue
         if not wrong:
             number, text = below[place_of + 1] if place_of + 1 < len(below) else (number, line)
             wrong = [text.strip()[:60]]
@@ -613,12 +681,11 @@ def _interval(lines: Sequence[str]) -> float | None:
             found = words.search(line)
             if found is None:
                 continue
-            value = _VALUE.search(line, found.end())
-            if value is None and "," in line:
-                # A row of names over a row of values.
-                names, cells = line.split(","), follower.split(",")
-                place = next(i for i, name in enumerate(names) if words.search(name))
-                value = _VALUE.search(cells[place]) if place < len(cells) else None
+            # Else names stand over their values.
+            place = len(re.findall("[,\t]", line[: found.start()]))
+            cells = re.split("[,\t]", follower) if re.search("[,\t]", line) else [follower]
+            below = "".join(cells[place : place + 1]).strip()
+            value = _VALUE.search(line, found.end()) or _VALUE.fullmatch(below)
             if value is None:
                 continue
             number = float(value[1].replace(",", "."))
@@ -632,7 +699,7 @@ def _interval(lines: Sequence[str]) -> float | None:
             known = {"khz": 1e3} if inverse else {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}
             number *= next((size for word, size in known.items() if word in unit), 1.0)
             return 1.0 / number if inverse else number
-    alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)Hz\b", " ".join(lines))
+    alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)(?:Hz|sps)\b", " ".join(lines))
     if len(alone) == 1 and float(alone[0][0]) > 0.0:
         return 1.0 / (float(alone[0][0]) * (1e3 if alone[0][1] else 1.0))
     return None

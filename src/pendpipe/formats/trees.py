@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,11 +17,21 @@ from pendpipe.formats.layout import column_of_clock_times
 from pendpipe.formats.matlab import is_matlab, tree_of, tree_of_version_4
 from pendpipe.formats.samples import swing_of
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
+from pendpipe.formats.text import table_of_text
 from pendpipe.formats.words import role_of, split_header
 
 _SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
 """What a rate or an interval may be."""
-_RATES = ("fs", "samplerate", "sample_rate", "srate", "rate", "sampling_rate", "samplingrate")
+_RATES = (
+    "fs",
+    "fps",
+    "samplerate",
+    "sample_rate",
+    "srate",
+    "rate",
+    "sampling_rate",
+    "samplingrate",
+)
 _INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat")
 _MOST: Final = 1 << 27
 """Numbers that an array may hold."""
@@ -217,7 +228,32 @@ def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
             tree = [json.loads(line) for line in text.splitlines() if line.strip()]
         except (ValueError, RecursionError):
             raise NotThisFormatError("it is no JSON") from None
+    if isinstance(tree, list) and tree and all(isinstance(record, dict) for record in tree):
+        from pandas import json_normalize
+
+        table = json_normalize(tree, max_level=8).to_csv(sep="\t", index=False)
+        return table_of_text(place, table, replace(options, delimiter="\t", decimal="."), form)
     return table_of_tree(place, tree, form, options)
+
+
+def _of_tdms(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    """Read the channels of LabVIEW's TDMS, each with its interval and its unit."""
+    import logging
+
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    log_manager.set_level(logging.CRITICAL)
+    with TdmsFile.open(io.BytesIO(data)) as file:
+        channels = [channel for group in file.groups() for channel in group.channels()]
+        if sum(map(len, channels)) > len(data):
+            raise ValueError("it promises more samples than it has bytes")
+        tree: dict[str, Any] = {channel.name: channel[:] for channel in channels}
+        told = {channel.name: channel.properties for channel in channels}
+    units = {name: str(each.get("unit_string", "")) for name, each in told.items()}
+    for each in told.values():
+        tree |= {"dt": each["wf_increment"]} if "wf_increment" in each else {}
+    return table_of_tree(place, tree, form, options, units)
 
 
 def _of_sound(place: Path, data: bytes, form: str, _options: ReadOptions) -> Table:
@@ -254,6 +290,7 @@ _FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
         lambda data: data[:6] == b"\x93NUMPY" or (data[:2] == b"PK" and b".npy" in data[:128]),
         _of_numpy,
     ),
+    ("tdms", lambda data: data[:4] == b"TDSm", _of_tdms),
     ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
     ("matlab-v5", is_matlab, lambda p, d, f, o: table_of_tree(p, tree_of(d), f, o)),
     ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),

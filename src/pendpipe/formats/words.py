@@ -230,7 +230,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         "volts",
         r"volts?|\w*voltage|spannung|tension|voltaje|tensione|tensión|напряжение|电压|電圧|u"
         r"|ch\s?\d*|chn\s?\d*|channel\s?\d*|kanal\s?\d*|ain\d*|ai\d*|adc\d*|a\d|analog\w*"
-        r"|potential|sensor\w*|signal|output|out|poti\w*",
+        r"|inp?(ut)?\s?\d+|ampl|potential|sensor\w*|signal|output|out|poti\w*",
     ),
     (
         "length",
