@@ -18,7 +18,7 @@ import numpy as np
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
 from pendpipe.acquisition.simulated import acquire_simulated
-from pendpipe.formats import ReadOptions, dataq_text, text
+from pendpipe.formats import ReadOptions, text, windaq
 
 SAMPLES = 1 << 19
 PIECE = 65536
@@ -76,7 +76,7 @@ def _captured(channels: int) -> float:
     rows = _codes(12, channels).tolist()
     lines = ["start", *("sc " + " ".join(map(str, row)) for row in rows), "stop", ""]
     data = "\n".join(lines).encode()
-    return _best(lambda: dataq_text.read_capture(Path("a.cso"), data, ReadOptions()), SAMPLES)
+    return _best(lambda: windaq.read_capture(Path("a.cso"), data, ReadOptions()), SAMPLES)
 
 
 def _volts(channels: int) -> float:

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, containers, inspect, matlab, read
+from pendpipe.formats import ReadOptions, containers, inspect, read, trees
 
 from .decays import swing
 
@@ -66,7 +66,7 @@ def test_what_unpacks_to_more_than_any_recording_is_refused(
     book.active.append(["t", "angle"])
     book.save(tmp_path / "a.xlsx")
     assert len(read(path)) == len(TIME)
-    for module in (matlab, containers):
+    for module in (trees, containers):
         monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)
     with pytest.raises(InputError, match="its compressed data are more than 0 MB"):
         read(path)

@@ -66,8 +66,23 @@ class Choice:
 def listed(names: Sequence[str], most: int = 12) -> str:
     """Join names for a message of one line: the first dozen, each of a bearable length."""
     shown = [name if len(name) <= 60 else name[:57] + "..." for name in names[:most]]
-    more = len(names) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more > 0 else "") or "none"
+    return ", ".join(shown) + f" and {len(names) - most} more" * (len(names) > most) or "none"
+
+
+_BY_KIND: Final[Mapping[str, Role]] = {
+    "angle": "angle",
+    "volts": "volts",
+    "length": "length",
+    "time": "time",
+    "none": "none",
+}
+_BY_UNIT: Final[Mapping[str, Role]] = {
+    "rad/s": "velocity",
+    "m/s": "velocity",
+    "px/s": "velocity",
+    "m/s^2": "acceleration",
+    "rad/s^2": "acceleration",
+}
 
 
 def meaning(column: Column) -> Role:
@@ -80,27 +95,14 @@ def meaning(column: Column) -> Role:
     unit = unit_of(column.unit) if column.unit else None
     if unit is None or role == "none":
         return role
-    by_name: dict[str, Role] = {
-        "rad/s": "velocity",
-        "m/s": "velocity",
-        "px/s": "velocity",
-        "m/s^2": "acceleration",
-        "rad/s^2": "acceleration",
-    }
-    by_kind: dict[str, Role] = {
-        "angle": "angle",
-        "volts": "volts",
-        "length": "length",
-        "time": "time",
-        "none": "none",
-    }
+    if unit.kind == "own" and unit.name in _BY_UNIT:
+        silent = role in ("unknown", "angle", "length", "index")
+        return _BY_UNIT[unit.name] if silent else role
     if unit.kind == "own":
-        if unit.name in by_name and role in ("unknown", "angle", "length", "index"):
-            return by_name[unit.name]
         return "signal" if role == "unknown" else role
-    if role in ("velocity", "acceleration") and unit.kind in ("angle", "length"):
-        return role  # a rate whose unit is printed without its "/s"
-    return by_kind.get(unit.kind, role)
+    # "(m)" beside a velocity: a rate whose unit is printed without its "/s".
+    rate = role in ("velocity", "acceleration") and unit.kind in ("angle", "length")
+    return role if rate else _BY_KIND[unit.kind]
 
 
 def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choice:
@@ -123,14 +125,10 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         # "run1" counts nothing where it swings.
         if roles[column.number] == "index" and swing_of(column.values).clear:
             roles[column.number] = "unknown"
-    table = replace(table, columns=_whole_times(table.columns, roles))
-    table = replace(
-        table,
-        columns=tuple(
-            replace(c, values=_counted_on(c.values)) if roles[c.number] == "time" else c
-            for c in table.columns
-        ),
-    )
+    columns = _whole_times(table.columns, roles)
+    clocks = {c.number: _counted_on(c.values) for c in columns if roles[c.number] == "time"}
+    columns = tuple(replace(c, values=clocks.get(c.number, c.values)) for c in columns)
+    table = replace(table, columns=columns)
     own_clock = [column for column in table.columns if column.time_s is not None]
     time, counts = (None, False) if own_clock else _time(table, options, roles)
     channels = tuple(column for column in table.columns if column is not time)
@@ -139,12 +137,12 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         for column in channels:
             if re.fullmatch(r"[yYzZ]\d?", column.name) and not column.unit:
                 roles[column.number] = "unknown"
-    if options.reading_column is not None:
-        picked = tuple(find(table, table.columns, part) for part in _parts(table, options))
-        return Choice(time, counts, picked, channels, roles=roles)
-    if options.channel is not None:
-        picked = (find(table, channels, options.channel, range(1, len(channels) + 1)),)
-        return Choice(time, counts, picked, channels, roles=roles)
+    parts = _parts(table, options) if options.reading_column is not None else []
+    picked = [find(table, table.columns, part) for part in parts]
+    if not parts and options.channel is not None:
+        picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
+    if picked:
+        return Choice(time, counts, tuple(picked), channels, roles=roles)
     mine, others = _of_one_run(channels, time, roles)
     readings, notes, weak = _readings(mine, time, roles)
     # What an instrument sampled by a clock of its own is no list.
@@ -176,14 +174,13 @@ def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[in
     names = [f"{n} {c.label}" for n, c in zip(numbers, columns, strict=False)]
     names = names or [column.label for column in columns]
     numbers = numbers or [column.number for column in columns]
-    for exact in (
-        lambda column, _: column.name == key,
-        lambda column, _: column.name.lower() == key.lower(),
-        lambda _, number: str(number) == key,
-    ):
-        for column, number in zip(columns, numbers, strict=True):
-            if exact(column, number):
+    for names_it in (str, str.lower):
+        for column in columns:
+            if names_it(column.name) == names_it(key):
                 return column
+    for column, number in zip(columns, numbers, strict=True):
+        if str(number) == key:
+            return column
     raise InputError(table.place, f"there is no column '{key}'", f"choose from: {listed(names)}")
 
 
@@ -253,13 +250,11 @@ def _time(
         given = find(table, table.columns, options.time_column)
         return given, roles[given.number] == "index"
     runs = [column for column in table.columns if roles[column.number] == "time"]
-    wanted = options.reading_column or options.channel
-    if wanted is not None and len(runs) > 1:
+    wanted = (options.reading_column or options.channel or "").lower()
+    if wanted and len(runs) > 1 and not (options.channel is not None and wanted.isdigit()):
         # Runs side by side, each with its own time: the one before the reading is meant.
-        meant = [c for c in table.columns if wanted.lower() in (c.name.lower(), str(c.number))]
-        if options.channel is not None and wanted.isdigit():
-            meant = []
-        before = [column for column in runs if meant and column.number < meant[0].number]
+        meant = [c.number for c in table.columns if wanted in (c.name.lower(), str(c.number))]
+        before = [column for column in runs if meant and column.number < meant[0]]
         if before:
             return before[-1], False
     taken = (options.reading_column or "").lower()
@@ -269,12 +264,12 @@ def _time(
     )
     for place, column in enumerate(table.columns, start=-counted):
         role, share = roles[column.number], one_way(column.values)
-        if role in ("none", "signal", "volts", "velocity", "acceleration"):
-            continue
-        if taken in (column.name.lower() or "-", str(column.number)):
-            continue
         named = role == "time"
-        if share < (0.5 if named else 0.95):
+        if (
+            role in ("none", "signal", "volts", "velocity", "acceleration")
+            or taken in (column.name.lower() or "-", str(column.number))
+            or share < (0.5 if named else 0.95)
+        ):
             continue
         finite = column.values[np.isfinite(column.values)]
         distinct = min(1.0, len(np.unique(finite)) / (0.5 * len(finite)))
@@ -284,14 +279,11 @@ def _time(
         if not named and even < 0.5 and not first:
             continue
         score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
-        if role == "index":
-            score -= 5.0
-        elif not named and _counts_samples(column, role):
-            score -= 3.0  # a number of the row, where anything else is a time
-        if role == "angle" or (role == "length" and place > 0):
-            score -= 4.0
-        if score > best[0]:
-            best = (score, column)
+        # A number of the row, where anything else is a time.
+        numbers = not named and _counts_samples(column, role)
+        score -= 5.0 * (role == "index") or 3.0 * numbers
+        score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
+        best = max(best, (score, column), key=lambda each: each[0])
     found = best[1]
     return found, found is not None and _counts_samples(found, roles[found.number])
 
@@ -300,30 +292,28 @@ def _of_one_run(
     channels: Sequence[Column], time: Column | None, roles: Mapping[int, Role]
 ) -> tuple[Sequence[Column], str]:
     """Of runs side by side, each with its own time column, keep one; name the others."""
-    if time is None:
-        return channels, ""
+    start = time.number if time is not None else len(channels) + 2
     clocks = [
         c.number
         for c in channels
-        if _moves(c) and (roles[c.number] == "time" or _same_as(time.values, c.values))
+        if time is not None and _moves(c) and (roles[c.number] == "time" or _same(time, c))
     ]
-    if any(c.number < time.number and _WORTH[roles[c.number]] > 0.5 for c in channels):
-        return channels, ""  # several clocks of one run, behind its readings
-    end = min((number for number in clocks if number > time.number), default=None)
-    if end is None:
+    holding = [c.number for c in channels if _WORTH[roles[c.number]] > 0.5 and _moves(c)]
+    end = min((number for number in clocks if number > start), default=start)
+    # Readings before the first clock: then those are several clocks of one run.
+    before = any(c.number < start and _WORTH[roles[c.number]] > 0.5 for c in channels)
+    if before or not any(start < number < end for number in holding):
         return channels, ""
-    mine = [c for c in channels if time.number < c.number < end]
-    if not any(_WORTH[roles[c.number]] > 0.5 and _moves(c) for c in mine):
-        return channels, ""
-    wanted = [c.number - time.number for c in mine]
+    mine = [c for c in channels if start < c.number < end]
+    wanted = [c.number - start for c in mine]
     others = [c.label for c in channels if any(c.number - number in wanted for number in clocks)]
     return mine, listed(others, 6)
 
 
-def _same_as(clock: FloatArray, values: FloatArray) -> bool:
+def _same(clock: Column, column: Column) -> bool:
     """Say whether a column without a name repeats the clock, as far as it goes."""
-    filled = np.isfinite(values)
-    return len(clock) == len(values) and bool(np.array_equal(values[filled], clock[filled]))
+    filled = np.isfinite(column.values)
+    return bool(np.array_equal(column.values[filled], clock.values[filled]))
 
 
 def _evenness(finite: FloatArray) -> float:
@@ -385,25 +375,21 @@ def _of_equals(
     if len(equals) == 1 or len(first) > 1:
         return first, ""
     # A drive has one size from beginning to end; a free decay has all of them.
-    decaying = [swings[c[0].number] for c in equals]
-    graded = [
-        c for c, swing in zip(equals, decaying, strict=True) if swing.clear and swing.graded > 0.3
-    ]
-    if graded and swings[first[0].number].graded < 0.1 and swings[first[0].number].clear:
+    of = [swings[c[0].number] for c in equals]
+    graded = [c for c, swing in zip(equals, of, strict=True) if swing.clear and swing.graded > 0.3]
+    if graded and of[0].graded < 0.1 and of[0].clear:
         return graded[0], ", whose swing decays"
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
     if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
         return first, ""
-    for column, swing in zip(equals, decaying, strict=True):
+    for column, swing in zip(equals, of, strict=True):
         # Height, and the pull along the string, go through two cycles in one of the swing.
-        ratio = swing.samples_per_cycle / (decaying[0].samples_per_cycle or np.inf)
+        ratio = swing.samples_per_cycle / (of[0].samples_per_cycle or np.inf)
         if swing.clear and abs(ratio - 2.0) < 0.05:
             return column, f", of which '{first[0].label}' has twice the frequency"
-    largest = max(swings[c[0].number].amplitude for c in equals)
-    for column in equals:
-        if swings[column[0].number].amplitude >= largest / 3:
-            return column, "" if column is first else ", which swings most"
-    return first, ""
+    largest = max(swing.amplitude for swing in of)
+    wide = [c for c, swing in zip(equals, of, strict=True) if swing.amplitude >= largest / 3]
+    return wide[0], "" if wide[0] is first else ", which swings most"
 
 
 def _not_a_derivative(
@@ -425,9 +411,9 @@ def _not_a_derivative(
             continue
         # Of a swing the derivative's derivative is the swing again, but upside down.
         first = 2 * _like_units(forward) - 2 * _like_units(backward)
-        if first + (1 if forward is not None and forward > 0 else -1) > 0:
-            return (chosen,), f", whose derivative '{column.label}' is"
-        return (column,), f", whose derivative '{chosen.label}' is"
+        first += 1 if forward is not None and forward > 0 else -1
+        kept, other = (chosen, column) if first > 0 else (column, chosen)
+        return (kept,), f", whose derivative '{other.label}' is"
     return (chosen,), why
 
 
@@ -448,15 +434,10 @@ def _moves(column: Column) -> bool:
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     """Find x, y of something that moves on a circle about the origin, below or above it."""
     named = {column.name.lower(): column for column in columns}
-    pairs = [
-        (named[a], named[b]) for a, b in (("x", "y"), ("px", "py")) if a in named and b in named
-    ]
-    silent = [column for column in columns if not column.name]
-    if not pairs:
-        pairs = _bob_from_pivot(columns)
-    if not pairs and len(silent) >= 2:
-        pairs = [(silent[0], silent[1])]
-    for x, y in pairs:
+    silent = tuple(column for column in columns if not column.name)
+    pairs = [(named[a], named[b]) for a, b in ("xy", ("px", "py")) if {a, b} <= named.keys()]
+    bare = [(silent[0], silent[1])] if len(silent) > 1 else []
+    for x, y in pairs or _bob_from_pivot(columns) or bare:
         # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
         sensed = "z" in named and not x.unit
         if not sensed and _on_a_circle(x.values, y.values, named=bool(x.name)):
@@ -497,16 +478,17 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     x, y = x[good], y[good]
     if len(x) < 8 or np.abs(x).max() > 1e100 or np.abs(y).max() > 1e100:
         return False
-    radius = np.hypot(x, y)
-    if not 0.0 < np.std(radius) <= 0.08 * np.mean(radius) or abs(np.mean(np.sign(y))) <= 0.95:
-        return False
-    angle = np.arctan2(x, np.abs(y))
-    if np.std(radius) > 0.3 * np.std(x) or abs(np.median(angle)) > 0.4 or not swing_of(x).clear:
+    radius, angle = np.hypot(x, y), np.arctan2(x, np.abs(y))
+    if (
+        not 0.0 < np.std(radius) <= min(0.08 * np.mean(radius), 0.3 * np.std(x))
+        or abs(np.mean(np.sign(y))) <= 0.95
+        or abs(np.median(angle)) > 0.4
+        or not swing_of(x).clear
+    ):
         return False
     if not np.ptp(x**2) > 0.0 or not np.ptp(np.abs(y)) > 0.0:
         return named
     # On a circle y falls with x squared; two columns without names must show it.
     follows = float(np.corrcoef(x**2, np.abs(y))[0, 1])
-    if named:
-        return follows < 0.5
-    return follows < -0.5 and bool(np.std(radius) < 0.5 * np.std(y)) and one_way(y) < 0.9
+    shown = follows < -0.5 and np.std(radius) < 0.5 * np.std(y) and one_way(y) < 0.9
+    return follows < 0.5 if named else bool(shown)

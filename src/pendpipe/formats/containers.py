@@ -17,8 +17,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.matlab import most_unpacked
-from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
+from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
 from pendpipe.formats.text import read_table as read_text
 from pendpipe.formats.text import table_of_text
 

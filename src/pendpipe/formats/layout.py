@@ -62,32 +62,26 @@ class Layout:
 
     def split(self, line: str) -> list[str]:
         """Split a line into its cells, quotes and blanks around them removed."""
-        if '"' in line:
-            return self._split_quoted(line)
-        if self.delimiter == " ":
-            return line.split()
-        return [cell.strip() for cell in line.split(self.delimiter)]
-
-    def _split_quoted(self, line: str) -> list[str]:
+        if '"' not in line:
+            blank = self.delimiter == " "
+            return line.split() if blank else [cell.strip() for cell in line.split(self.delimiter)]
         import csv
 
-        blank = self.delimiter == " "
-        rows = csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True)
         try:
-            cells = next(rows)
+            rows = csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True)
+            return [cell.strip() for cell in next(rows) if cell.strip() or self.delimiter != " "]
         except csv.Error:  # a quote that opens 128 kB of text
             return [line.strip()]
-        return [cell.strip() for cell in cells if cell.strip() or not blank]
 
     def is_number(self, cell: str) -> bool:
         """Say whether a cell is a number in this layout."""
         cell = self.ungrouped(cell)
         if self.decimal == ",":
             cell = "x" if "." in cell else cell.replace(",", ".")
-        if _NUMBER.fullmatch(cell) is not None:
-            return True
         parts = _WITH_UNIT.fullmatch(cell)
-        return parts is not None and unit_of(parts[2]) is not None
+        return bool(_NUMBER.fullmatch(cell)) or (
+            parts is not None and unit_of(parts[2]) is not None
+        )
 
     def kinds(self, cells: Iterable[str]) -> str:
         """Say what each cell is, by a letter: number, clock time or date, blank, text."""
@@ -104,9 +98,8 @@ class Layout:
 
     def ungrouped(self, cell: str) -> str:
         """Take the signs between thousands out of ``1,234.5``, ``1.234,5`` and ``1'234``."""
-        if _GROUPED[self.decimal].fullmatch(cell) is None:
-            return cell
-        return re.sub(r"['’ ,]" if self.decimal == "." else r"['’ .]", "", cell)
+        signs = r"['’ ,]" if self.decimal == "." else r"['’ .]"
+        return re.sub(signs, "", cell) if _GROUPED[self.decimal].fullmatch(cell) else cell
 
     @property
     def description(self) -> str:
@@ -147,22 +140,18 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
         for decimal in _wanted("--decimal", options.decimal, _DECIMALS, ".,", r"[.,]")
         if delimiter != decimal or (quoted and delimiter == ",")
     ]
-    best, best_score = None, (0.0, 0)
-    for layout in candidates:
-        score, width, numbers = _score(sample, layout)
-        if (round(score, 3), numbers) > best_score:
-            best_score = (round(score, 3), numbers)
-            best = Layout(layout.delimiter, layout.decimal, width)
-    if best is None or best_score[0] < 0.3:
+    scored = [(_score(sample, layout), layout) for layout in candidates]
+    (score, _, width), best = max(scored, key=lambda each: each[0][:2])
+    if score < 0.3:
         raise NotThisFormatError("no block of rows with numbers was found")
     forced = options.delimiter is not None or options.decimal is not None
-    if best.delimiter == "," and best.width == 2 and not forced and _is_one_column(sample):
+    if best.delimiter == "," and width == 2 and not forced and _is_one_column(sample):
         return Layout(" ", ",", 1)
-    return best
+    return replace(best, width=width)
 
 
 def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
-    """Score a layout: share of number cells in rows of the usual width; width; numbers."""
+    """Score a layout: share of number cells in rows of the usual width; numbers; width."""
     rows = [layout.split(line) for line in sample]
     width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
     if not 0 < width <= MOST_COLUMNS:
@@ -172,7 +161,7 @@ def _score(sample: Sequence[str], layout: Layout) -> tuple[float, int, int]:
         (width - row.count("t") - row.count("b")) / max(width - row.count("b"), 1) for row in kinds
     )
     numbers = sum(column.count("n") > len(rows) / 2 for column in zip(*kinds, strict=True))
-    return full / len(rows), width, numbers
+    return round(full / len(rows), 3), numbers, width
 
 
 def _is_one_column(sample: Sequence[str]) -> bool:
@@ -206,12 +195,11 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
         if not line.strip() or is_comment(line):
             continue
         cells = layout.split(line)
-        cells = cells if _is_row(cells, layout) else []
-        if cells and first is None:
-            first = place
-        if not cells or (above and _is_title(above[-1][1], cells, layout)):
+        row = _is_row(cells, layout)
+        if not row or (above and _is_title(above[-1][1], cells, layout)):
             above = []
-        if cells:
+        if row:
+            first = place if first is None else first
             above.append((place, cells))
         if len(above) == _IN_A_ROW:
             return above[0][0]
@@ -261,15 +249,14 @@ def column_of_numbers(cells: Sequence[str], layout: Layout, column: Column) -> C
     cells = [layout.ungrouped(cell) for cell in cells]
     if layout.decimal == ",":
         cells = [cell.replace(",", ".") for cell in cells]
-    filled = [row for row, cell in enumerate(cells) if not is_blank(cell)]
-    unit, fault = "", None
-    if filled and all(_WITH_UNIT.fullmatch(cells[row]) for row in filled[:2]):
-        parts = [_WITH_UNIT.fullmatch(cells[row]) for row in filled]
-        units = {part[2] for part in parts if part is not None}
-        if all(parts) and len(units) == 1:
-            unit = units.pop()
-            cells = [cell.removesuffix(unit).rstrip() for cell in cells]
-    values = np.full(len(cells), np.nan)
+    filled, unit = [row for row, cell in enumerate(cells) if not is_blank(cell)], ""
+    parts = [_WITH_UNIT.fullmatch(cells[row]) for row in filled[:1]]
+    parts = [_WITH_UNIT.fullmatch(cells[row]) for row in filled if any(parts)]
+    units = {part[2] if part else "" for part in parts}
+    if len(units) == 1 and "" not in units:
+        unit = units.pop()
+        cells = [cell.removesuffix(unit).rstrip() for cell in cells]
+    values, fault = np.full(len(cells), np.nan), None
     for row in filled:
         try:
             values[row] = float(cells[row].lower().replace("d", "e"))
@@ -299,19 +286,15 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     seconds
         ``None`` if the cells are no times.
     """
-    if not cells:
-        return None
     matches = [_CLOCK.fullmatch(cell.strip().lstrip("'")) for cell in cells]
-    if any(match is None for match in matches):
+    if not cells or any(match is None for match in matches):
         return None
     seconds = np.empty(len(cells))
-    days: dict[tuple[str | None, ...], int] = {}
+    days = {match.groups()[:6]: 0 for match in matches if match is not None}
     for row, match in enumerate(matches):
         assert match is not None
-        date = match.groups()[:6]
-        hour, minute, second, half = match.groups()[6:]
-        if date not in days:
-            days[date] = _days(date, "/" in match[0])
+        date, (hour, minute, second, half) = match.groups()[:6], match.groups()[6:]
+        days[date] = days[date] or _days(date, "/" in match[0])
         hours = int(hour or 0)
         hours = hours % 12 + 12 * (half.lower() == "pm") if half else hours
         of_day = 3600 * hours + 60 * int(minute) + float(re.sub("[,:]", ".", second))

@@ -21,8 +21,7 @@ import numpy as np
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
-from pendpipe.formats.matlab import most_unpacked
-from pendpipe.formats.readings import Readings, readings
+from pendpipe.formats.measured import Readings, TimeBase, readings, refuse_text, time_base
 from pendpipe.formats.samples import (
     Gap,
     clipped_samples,
@@ -32,8 +31,14 @@ from pendpipe.formats.samples import (
     resolution,
     sample_rate,
 )
-from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
-from pendpipe.formats.timebase import TimeBase, refuse_text, time_base
+from pendpipe.formats.table import (
+    Column,
+    Marker,
+    NotThisFormatError,
+    ReadOptions,
+    Table,
+    most_unpacked,
+)
 from pendpipe.formats.words import role_of, split_header, unit_of
 from pendpipe.recording import (
     GOOD,
@@ -76,8 +81,8 @@ READERS: Final = (
     ("file of arrays", "trees.read_table"),
     ("zip archive", "containers.read_table"),
     ("XML", "containers.read_project"),
-    ("WinDaq CSV", "dataq_text.read_export"),
-    ("DI-149 capture", "dataq_text.read_capture"),
+    ("WinDaq CSV", "windaq.read_export"),
+    ("DI-149 capture", "windaq.read_capture"),
     ("text table", "text.read_table"),
 )
 """In the order in which they are tried, each imported in its turn.
@@ -102,11 +107,8 @@ def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
     place = Path(path)
     data = _unpacked(place, file_bytes(place))
     plain = read_if_plain(place, data, options)
-    recording = (
-        plain if plain is not None else recording_of(table_of(place, data, options), options)
-    )
-    metadata = dict(recording.metadata)
-    metadata.setdefault("source", place.name)
+    recording = recording_of(table_of(place, data, options), options) if plain is None else plain
+    metadata = {"source": place.name, **recording.metadata}
     if options.volts_per_radian is not None:
         metadata["volts_per_radian"] = repr(float(options.volts_per_radian))
     recording = replace(recording, metadata=metadata)
@@ -131,27 +133,32 @@ def file_bytes(place: Path) -> bytes:
     InputError
         When it can't be read, holds nothing, is no regular file, or is too large.
     """
-    if str(place) in ("-", "/dev/stdin"):
-        data = _standard_input()
-    else:
-        try:
-            found = place.stat()
-            if stat.S_ISDIR(found.st_mode):
-                raise InputError(place, "this is a folder", "give a file in it")
-            if not stat.S_ISREG(found.st_mode):
-                raise InputError(
-                    place, "this is a device or a pipe", "give a file, or - for standard input"
-                )
-            _refuse_size(place, found.st_size)
-            data = place.read_bytes()
-        except FileNotFoundError:
-            raise InputError(place, "there is no such file", "check the path") from None
-        except (OSError, ValueError) as fault:
-            reason = getattr(fault, "strerror", None) or str(fault)
-            raise InputError(place, f"the file can't be read ({reason})", "check it") from None
+    try:
+        standard = str(place) in ("-", "/dev/stdin")
+        found = None if standard else place.stat()
+        for is_kind, what, remedy in _NO_FILES:
+            if found is not None and is_kind(found.st_mode):
+                raise InputError(place, f"this is a {what}", remedy)
+        _refuse_size(place, found.st_size if found else 0)
+        data = _standard_input() if standard else place.read_bytes()
+    except FileNotFoundError:
+        raise InputError(place, "there is no such file", "check the path") from None
+    except (OSError, ValueError) as fault:
+        reason = getattr(fault, "strerror", None) or str(fault)
+        raise InputError(place, f"the file can't be read ({reason})", "check it") from None
     if not data[:1024].strip(b"\0 \t\r\n\xef\xbb\xbf") and not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(place, "the file is empty", "record again, or give another file")
     return data
+
+
+_NO_FILES: Final[tuple[tuple[Callable[[int], bool], str, str], ...]] = (
+    (stat.S_ISDIR, "folder", "give a file in it"),
+    (
+        lambda mode: not stat.S_ISREG(mode),
+        "device or a pipe",
+        "give a file, or - for standard input",
+    ),
+)
 
 
 @cache
@@ -200,15 +207,12 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
             return reader(place, data, options)
         except NotThisFormatError as fault:
             reason = fault
-        except InputError:
-            raise
         except Exception as fault:
-            if name not in _BY_LIBRARIES:
+            if isinstance(fault, InputError) or name not in _BY_LIBRARIES:
                 raise
+            said = " ".join(str(fault).split())[:200]
             raise InputError(
-                place,
-                f"the {name} can't be read ({' '.join(str(fault).split())[:200]})",
-                "save it again, or export CSV",
+                place, f"the {name} can't be read ({said})", "save it again, or export CSV"
             ) from None
     # The last reader takes any text, and so it knows what is wrong.
     raise InputError(
@@ -292,11 +296,9 @@ def _quality(table: Table, values: FloatArray, base: TimeBase) -> ByteArray | No
     """Mark rows without a reading as missing; infinity is a fault."""
     odd = np.flatnonzero(np.isinf(values))
     if odd.size:
-        raise InputError(
-            table.where(int(base.rows[odd[0]])),
-            f"{odd.size} reading(s) that are infinite",
-            "drop the rows, or leave the cells blank",
-        )
+        where = table.where(int(base.rows[odd[0]]))
+        problem = f"{odd.size} reading(s) that are infinite"
+        raise InputError(where, problem, "drop the rows, or leave the cells blank")
     missing = np.isnan(values)
     return np.where(missing, MISSING, GOOD).astype(np.uint8) if missing.any() else None
 
@@ -317,18 +319,14 @@ def _markers(markers: tuple[Marker, ...]) -> dict[str, str]:
 
 def _check_scale(place: str | Path, recording: Recording) -> None:
     """Refuse times and readings whose squares leave the range of numbers."""
-    readings = recording.values[recording.usable]
-    spans = {
-        "times": np.ptp(recording.time_s),
-        "readings": np.ptp(readings) if readings.size else 0,
-    }
-    for name, span in spans.items():
-        if span and not 1e-30 < span < 1e30:
-            raise InputError(
-                place, f"the {name} span {span:.3g}, which no pendulum does", "check their unit"
-            )
+    usable = recording.values[recording.usable]
+    for name, some in (("times", recording.time_s), ("readings", usable)):
+        if some.size and np.ptp(some) and not 1e-30 < np.ptp(some) < 1e30:
+            problem = f"the {name} span {np.ptp(some):.3g}, which no pendulum does"
+            raise InputError(place, problem, "check their unit")
 
 
+_STEERING: Final = ("channel", "column", "unit", "sample_rate", "decimal", "delimiter")
 _READINGS: Final = ("angle", "volts", "length", "velocity", "acceleration", "signal")
 
 
@@ -343,16 +341,8 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
         When the header has ``time_s`` and nothing that could be a reading, or a row
         is damaged.
     """
-    steered = (
-        options.channel,
-        options.column,
-        options.unit,
-        options.sample_rate,
-        options.decimal,
-        options.delimiter,
-    )
     names = _header(data)
-    if "time_s" not in names or any(option is not None for option in steered):
+    if "time_s" not in names or any(getattr(options, name) is not None for name in _STEERING):
         return None
     found = [name for name in QUANTITIES if name in names]
     if len(found) != 1:
@@ -376,27 +366,18 @@ def _header(data: bytes) -> list[str]:
 
 def table_of_plain(place: Path, recording: Recording) -> Table:
     """Show a plain recording as the table that ``inspect`` goes through."""
-    limits = None
     high, low = recording.number("range_volts"), recording.number("range_low_volts")
-    step = converter_step(recording)
+    step, limits = converter_step(recording), None
     if high is not None and step is not None:
         limits = (-high if low is None else low, high - step)
     column = Column(
-        name=recording.quantity,
-        unit=recording.unit,
-        values=recording.values,
-        number=2,
+        *(recording.quantity, recording.unit, recording.values, 2),
         time_s=recording.time_s,
         resolution=recording.resolution,
         limits=limits,
     )
-    return Table(
-        place=place,
-        format="plain",
-        columns=(column,),
-        markers=tuple(markers_of(recording)),
-        notes=recording.notes,
-    )
+    markers = tuple(markers_of(recording))
+    return Table(place, "plain", (column,), markers=markers, notes=recording.notes)
 
 
 def markers_of(recording: Recording) -> list[Marker]:
@@ -504,26 +485,22 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     plain = read_if_plain(place, data, options)
     table = table_of_plain(place, plain) if plain is not None else table_of(place, data, options)
     choice = choose(table, options, reading=False)
-    if not choice.readings:
-        if not choice.channels:
-            raise InputError(place, "there is no column but the time", "give readings beside it")
-        choice = replace(choice, readings=choice.channels[:1])
-    column = choice.readings[0]
-    weak: tuple[str, ...] = ()
+    if not choice.readings and not choice.channels:
+        raise InputError(place, "there is no column but the time", "give readings beside it")
+    choice = replace(choice, readings=choice.readings or choice.channels[:1])
+    column, weak = choice.readings[0], tuple[str, ...]()
     try:
         recording = recording_of(table, options) if plain is None else plain
-        unit, values, notes = recording.unit, recording.values, list(recording.notes)
-        time, step = recording.time_s[recording.usable], recording.resolution
-        values, weak = values[recording.usable], recording.weak_guesses
+        time, values = recording.time_s[recording.usable], recording.values[recording.usable]
+        unit, step, weak = recording.unit, recording.resolution, recording.weak_guesses
+        notes = list(recording.notes)
     except InputError as fault:
         base = time_base(table, choice, options)
         time, values = base.time_s, column.values[base.rows]
         unit, step = column.unit, column.resolution or resolution(values)
         notes = [*table.notes, *choice.notes, f"the readings can't be analysed: {fault.problem}"]
-    scale = 1.0
     known = unit_of(column.unit) if column.unit else None
-    if known is not None and unit in ("rad", "V", "m"):
-        scale = known.factor
+    scale = known.factor if known is not None and unit in ("rad", "V", "m") else 1.0
     limits = (column.limits[0] * scale, column.limits[1] * scale) if column.limits else None
     finite = values[np.isfinite(values)]
     return Inspection(

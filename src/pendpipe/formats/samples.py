@@ -52,8 +52,7 @@ def swing_of(values: FloatArray) -> Swing:
         return Swing()
     block = -(-len(finite) // _LOOKED_AT)
     some = finite[: len(finite) // block * block].reshape(-1, block).mean(axis=1)
-    ramp = np.linspace(-1.0, 1.0, len(some))
-    rest = some - some.mean()
+    ramp, rest = np.linspace(-1.0, 1.0, len(some)), some - some.mean()
     rest -= float(rest @ ramp) / float(ramp @ ramp) * ramp
     power = np.abs(np.fft.rfft(rest)) ** 2
     power[:2] = 0.0
@@ -77,9 +76,8 @@ def swing_of(values: FloatArray) -> Swing:
 def _graded(rest: FloatArray, cycle: float) -> float:
     """Share of the cycles of middling size."""
     width = max(2, round(cycle))
-    cycles = rest[: len(rest) // width * width].reshape(-1, width)
-    size = np.ptp(cycles, axis=1)
-    large = float(size.max()) if len(size) else 0.0
+    size = np.ptp(rest[: len(rest) // width * width].reshape(-1, width), axis=1)
+    large = float(size.max(initial=0.0))
     return float(np.mean((size > 0.1 * large) & (size < 0.85 * large))) if large else 0.0
 
 
@@ -232,11 +230,9 @@ def is_uniform(time_s: FloatArray) -> bool:
     digits alternates by 10 %).
     """
     steps = np.diff(time_s)
-    if len(steps) < 2:
-        return True
-    middle = float(np.median(steps))
+    middle = float(np.median(steps)) if len(steps) > 1 else 0.0
     if not middle > 0:
-        return False
+        return len(steps) < 2
     return float(np.mean(np.abs(steps - middle) <= 0.15 * middle)) >= 0.99 or (
         # A handful of gaps in a short recording is no unevenness.
         bool(np.all(np.abs(steps / middle - np.rint(steps / middle)) < 0.1))
@@ -247,9 +243,7 @@ def is_uniform(time_s: FloatArray) -> bool:
 def sample_rate(time_s: FloatArray) -> float:
     """Samples a second, gaps left out; of uneven samples the reciprocal median interval."""
     steps = np.diff(time_s)
-    if not len(steps):
-        return float("nan")
-    middle = float(np.median(steps))
+    middle = float(np.median(steps)) if len(steps) else 0.0
     if not middle > 0:
         return float("nan")
     usual = steps[np.abs(steps - middle) <= 0.5 * middle]
@@ -325,12 +319,11 @@ def clipped_samples(
     readings at the very extreme, whose neighbours lie more than four steps off, as no
     smooth motion would have it.
     """
-    if not len(values):
-        return 0
     if limits is not None:
         tolerance = 0.5 * (step or 0.0)
         return int(np.sum((values <= limits[0] + tolerance) | (values >= limits[1] - tolerance)))
-    span = float(np.ptp(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0
+    finite = values[np.isfinite(values)]
+    span = float(np.ptp(finite)) if len(finite) else 0.0
     off = max(4.0 * (step or 0.0), 1e-3 * span)
     return sum(_flat_tops(sign * values, off) for sign in (1.0, -1.0)) if span else 0
 

@@ -14,6 +14,11 @@ class NotThisFormatError(Exception):
     """A reader's reason why the file is none of its own; the next one is tried."""
 
 
+def most_unpacked(size: int) -> int:
+    """How many bytes a packed file of so many may hold; what holds more is no recording."""
+    return max(256 << 20, 100 * size)
+
+
 @dataclass(frozen=True)
 class Marker:
     """An event that was marked while the recording was made."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import unescape
-from itertools import zip_longest
+from itertools import product, zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +23,7 @@ from pendpipe.formats.layout import (
     column_of_numbers,
     first_row,
     guess_layout,
+    is_blank,
     is_comment,
 )
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table
@@ -347,32 +348,27 @@ def _without_cut_row(
     It has fewer cells than every other row; or no end of line, and its last number has fewer
     letters, or fewer decimals, than that of every other row.
     """
-    last = len(lines) - 1
-    while last > first and not lines[last].strip():
-        last -= 1
+    last = max((row for row, line in enumerate(lines) if line.strip()), default=0)
     others = [line for line in lines[max(first, last - 500) : last] if line.strip()]
     if last <= first + 2 or not others or is_comment(lines[last]):
         return lines, ()
     final, rows = layout.split(lines[last]), [layout.split(line) for line in others]
     short = len(final) < min(map(len, rows))
-    ended = last < len(lines) - 1
-    if not ended and not final[-1] and all(row[-1] for row in rows):
-        short = True
-    if not short and not ended and len(final) == len(rows[-1]) and layout.is_number(final[-1]):
-        sizes = [_size(row[-1], layout) for row in rows if layout.is_number(row[-1])]
-        letters, decimals = _size(final[-1], layout)
-        short = len(sizes) > 2 and (
-            letters < min(size[0] for size in sizes) or decimals < min(size[1] for size in sizes)
+    numeric = not final[-1] or layout.is_number(final[-1])
+    if last == len(lines) - 1 and len(final) == len(rows[-1]) and numeric:
+        sizes = [_size(row[-1], layout) for row in rows]
+        short = any(
+            a < min(b)
+            for a, b in zip(_size(final[-1], layout), zip(*sizes, strict=True), strict=True)
         )
     if not short or not any(map(layout.is_number, final)):
         return lines, ()
-    note = f"line {last + 1} is cut short: not taken for a sample"
-    return lines[:last], (note,)
+    return lines[:last], (f"line {last + 1} is cut short: not taken for a sample",)
 
 
 def _size(cell: str, layout: Layout) -> tuple[int, int]:
     """Letters of a number without its sign, and those behind its decimal sign."""
-    bare = cell.lstrip("+-")
+    bare = cell.lstrip("+-") if not is_blank(cell) else ""
     return len(bare), len(bare.partition(layout.decimal)[2])
 
 
@@ -380,9 +376,7 @@ def _at_once(
     lines: Sequence[str], first: int, layout: Layout, header: Header
 ) -> list[Column] | None:
     """Read a block of nothing but numbers, a row a line; ``None`` if it is anything else."""
-    last = len(lines)
-    while last > first and not lines[last - 1].strip():
-        last -= 1
+    last = max(row for row, line in enumerate(lines, start=1) if line.strip())
     table = all_numbers(lines[first:last], layout)
     # A blank line is passed over in silence: then the rows' lines are to be found.
     if table is None or len(table) != last - first:
@@ -410,9 +404,8 @@ def _rows(
     ]
     rows = [entry for entry, remark in zip(kept, remarks, strict=True) if not remark]
     left = len(kept) - len(rows)
-    notes = [f"{left} line(s) of text below the first row left out"] if left else []
-    numbers = np.array([number for number, _ in rows], dtype=np.int64)
-    return [line for _, line in rows], numbers, notes
+    notes = [f"{left} line(s) of text below the first row left out"] * bool(left)
+    return [line for _, line in rows], np.array([number for number, _ in rows], np.int64), notes
 
 
 def _text_of(line: str, layout: Layout) -> tuple[bool, bool]:
@@ -424,8 +417,9 @@ def _text_of(line: str, layout: Layout) -> tuple[bool, bool]:
         return (is_comment(line),) * 2
     cells = layout.split(line)
     kinds = layout.kinds(filter(None, cells))
-    begins = kinds.startswith("t")
-    return begins and (set(kinds) == {"t"} or len(cells) != layout.width), begins
+    return kinds[:1] == "t" and (set(kinds) == {"t"} or len(cells) != layout.width), kinds[
+        :1
+    ] == "t"
 
 
 _NO_TEXT: Final = re.compile(r"[\s\d.,;:+\-eE|/\"']*")
@@ -578,19 +572,20 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     if not told and not any(map(layout.is_number, layout.split(bare))):
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
         joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
-        for cells in (
-            *(bare.split(sign) for sign in "\t;,|"),
-            re.split(r"\s{2,}", bare),
-            [cell.replace("\0", " ") for cell in joined],
-        ):
-            cells = [cell.strip() for cell in cells]
-            while len(cells) > layout.width and not cells[-1]:
-                cells.pop()
+        others = [bare.split(sign) for sign in "\t;,|"] + [re.split(r"\s{2,}", bare)]
+        for cells in (*others, [cell.replace("\0", " ") for cell in joined]):
+            cells = _trimmed([cell.strip() for cell in cells], layout.width)
             if len(cells) == layout.width:
                 yield cells
-    if is_comment(line):
-        yield bare.split()
+    yield from ([bare.split()] if is_comment(line) else [])
     yield from own
+
+
+def _trimmed(cells: list[str], width: int) -> list[str]:
+    """Leave out empty cells beyond the width."""
+    while len(cells) > width and not cells[-1]:
+        cells = cells[:-1]
+    return cells
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -608,35 +603,34 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
         own = layout.split(line)
         if candidates and len(own) == layout.width and all(map(layout.is_number, own)):
             break  # the block has begun: what follows is damaged
+        words = len(bare.split())
+        titled = (
+            words > 4 or (words > 1 and not split_header(bare)[1]) or "," in bare or ":" in bare
+        )
+        if bare.endswith(("[", "{", "(")) or (layout.width == 1 and titled):  # A = [
+            continue
         for cells in _splits(line, layout):
             # Rigol's names go on beyond the rows.
             longer = layout.delimiter in "\t;," and number >= filled[-1][0] - 1 and cells == own
-            while len(cells) > layout.width and (longer or not cells[-1]):
-                cells = cells[:-1]
-            texts = [cell for cell in cells if any(map(str.isalpha, cell)) or "°" in cell]
-            texts = [cell for cell in texts if not layout.is_number(cell)]
-            if not texts or len(cells) > layout.width or len(texts) < len(cells) / 2:
+            cells = cells[: layout.width] if longer else _trimmed(cells, layout.width)
+            said = [any(map(str.isalpha, cell)) or "°" in cell for cell in cells]
+            numbers = list(map(layout.is_number, cells))
+            texts = sum(a and not b for a, b in zip(said, numbers, strict=True))
+            few = len(cells) < layout.width and not is_comment(line)
+            # A column of row numbers may have no name.
+            timed = few and len(cells) == layout.width - 1 and texts == len(cells) > 1
+            if few and not (timed and role_of(split_header(cells[0])[0]) == "time"):
                 continue
-            if bare.endswith(("[", "{", "(")):  # A = [
-                continue
-            numbered = len(cells) == layout.width - 1 and len(texts) == len(cells) > 1
-            timed = numbered and role_of(split_header(cells[0])[0]) == "time"
-            if len(cells) < layout.width and not is_comment(line) and not timed:
-                continue
-            if (candidates or layout.width < 4) and any(map(layout.is_number, cells)):
-                continue
-            if _are_units(cells) and candidates and candidates[-1][0] == len(cells):
-                continue
-            words = len(bare.split())
-            titled = words > 4 or (words > 1 and not split_header(bare)[1])
-            if layout.width == 1 and (titled or "," in bare or ":" in bare):
-                continue
-            candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
-            break
-    if not candidates:
-        return 0, []
-    width, number, cells = max(candidates, key=lambda entry: entry[:2])
-    return number, cells if width else []
+            if (
+                texts
+                and len(cells) / 2 <= texts <= len(cells) <= layout.width
+                and not ((candidates or layout.width < 4) and any(numbers))
+                and not (_are_units(cells) and candidates and candidates[-1][0] == len(cells))
+            ):
+                candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
+                break
+    _, number, names = max(candidates, key=lambda entry: entry[:2], default=(0, 0, []))
+    return number, names
 
 
 def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
@@ -676,33 +670,30 @@ def _refuse_damaged_rows(
 
 def _interval(lines: Sequence[str]) -> float | None:
     """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
-    for line, follower in zip(lines, [*lines, ""][1:], strict=True):
-        for words, inverse in ((_RATE_WORD, True), (_INTERVAL_WORD, False), (_SAMPLING, None)):
-            found = words.search(line)
-            if found is None:
-                continue
-            # Else names stand over their values.
-            place = len(re.findall("[,\t]", line[: found.start()]))
-            cells = re.split("[,\t]", follower) if re.search("[,\t]", line) else [follower]
-            below = "".join(cells[place : place + 1]).strip()
-            value = _VALUE.search(line, found.end()) or _VALUE.fullmatch(below)
-            if value is None:
-                continue
-            number = float(value[1].replace(",", "."))
-            unit = value[2].lower() or line[found.end() : found.end() + 8].lower()
-            if inverse is None:
-                inverse = any(word in unit for word in ("hz", "s/s", "sps", "fps"))
-                if not inverse and unit not in ("s", "ms", "us", "µs"):
-                    continue
-            if not 1e-9 < number < 1e12:
-                continue
-            known = {"khz": 1e3} if inverse else {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}
-            number *= next((size for word, size in known.items() if word in unit), 1.0)
+    words = ((_RATE_WORD, True), (_INTERVAL_WORD, False), (_SAMPLING, None))
+    for (line, follower), (word, inverse) in product(
+        zip(lines, [*lines[1:], ""], strict=False), words
+    ):
+        found = word.search(line)
+        # Else names stand over their values.
+        place = len(re.findall("[,\t]", line[: found.start()])) if found else 0
+        cells = re.split("[,\t]", follower) if re.search("[,\t]", line) else [follower]
+        below = "".join(cells[place : place + 1]).strip()
+        value = found and (_VALUE.search(line, found.end()) or _VALUE.fullmatch(below))
+        if not found or not value:
+            continue
+        number = float(value[1].replace(",", "."))
+        unit = value[2].lower() or line[found.end() : found.end() + 8].lower()
+        if inverse is None:
+            inverse = any(sign in unit for sign in ("hz", "s/s", "sps", "fps"))
+            number *= inverse or unit in ("s", "ms", "us", "µs")
+        known = {"khz": 1e3} if inverse else {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+        if 1e-9 < number < 1e12:
+            number *= next((size for sign, size in known.items() if sign in unit), 1.0)
             return 1.0 / number if inverse else number
     alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)(?:Hz|sps)\b", " ".join(lines))
-    if len(alone) == 1 and float(alone[0][0]) > 0.0:
-        return 1.0 / (float(alone[0][0]) * (1e3 if alone[0][1] else 1.0))
-    return None
+    rates = [float(number) * (1e3 if kilo else 1.0) for number, kilo in alone]
+    return 1.0 / rates[0] if len(rates) == 1 and rates[0] > 0.0 else None
 
 
 def _metadata(lines: Sequence[str]) -> dict[str, str]:
@@ -717,8 +708,7 @@ def _metadata(lines: Sequence[str]) -> dict[str, str]:
 
 def _unique(names: Sequence[str]) -> list[str]:
     """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
-    counts = [list(names[:place]).count(name) + 1 for place, name in enumerate(names)]
+    counts = [list(names[:place]).count(name) for place, name in enumerate(names)]
     return [
-        name if count == 1 or not name else f"{name} ({count})"
-        for name, count in zip(names, counts, strict=True)
+        f"{name} ({n + 1})" if n and name else name for name, n in zip(names, counts, strict=True)
     ]

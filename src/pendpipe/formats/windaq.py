@@ -5,6 +5,7 @@ start; the only mark is 0x8001 in the header's last two bytes. Behind the sample
 annotations and comments, which also hold pauses, and what a damaged header lost. What WinDaq's
 screen needs (windows, keys, cursors) is written as in the files that WinDaq itself writes for one
 time window; nothing of it concerns the samples.
+Dataq's own texts are here too: spreadsheet exports, and captures of a DI-149 in its ASCII mode.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import InputError
+from pendpipe.formats.layout import Layout
 from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
+from pendpipe.formats.text import decode, table_of_text
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {
@@ -550,3 +553,116 @@ def _gain(range_volts: float | None) -> int:
 def _encoded(text: str) -> bytes:
     """Encode a text as WinDaq has it: Latin-1, ended by a NUL."""
     return text.replace("\0", " ").encode("latin-1", "replace") + b"\0"
+
+
+_CLOCKS: Final = ("time stamp", "timestamp", "clock")
+_CLOCK_HZ: Final = 750_000.0
+_SLOWEST: Final = 65535
+_VOLTS_PER_COUNT: Final = 10.0 / 2048.0
+_SCAN: Final = re.compile(r"sc(\s+[+-]?\d{1,9})+")
+
+
+def read_export(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read an export; its columns are named by their units, so they go by their place.
+
+    Relative Time is rounded to microseconds: times are the index over the rate, where the
+    rounding allows. The last column holds ``Resume`` or a comment at an event; what the
+    clock columns gained over Relative Time there is the pause.
+    """
+    text = decode(data) if b"elative Time" in data[:4096].replace(b"\0", b"") else ""
+    head = re.search(r"^\W*relative time.*", text, re.I | re.M)
+    if head is None:
+        raise NotThisFormatError("there is no line that begins with 'Relative Time'")
+    table = table_of_text(place, text, options, "windaq-csv")
+    layout = Layout(next((sign for sign in ";\t" if sign in head[0]), ","), ".", 0)
+    names, lines = layout.split(head[0].strip()), text.split("\n")
+    time = table.columns[0]
+    if time.number != 1 or time.fault is not None or not np.isfinite(time.values).all():
+        return table
+    labels = dict(enumerate(map(str.lower, names), start=1))
+    rows = [layout.split(lines[n - 1]) for n in (table.lines if table.lines is not None else ())]
+    marked = "event" in labels[len(names)]
+    events = [row[-1] if marked and len(row) == len(names) else "" for row in rows]
+    dated = [c for c in table.columns if labels.get(c.number, "").startswith(("date", *_CLOCKS))]
+    clocks = [c.values for c in dated if not labels[c.number].startswith("date")]
+    seconds, notes = _evened(time.values).copy(), list(table.notes)
+    for row in [
+        row for row, event in enumerate(events) if row and clocks and event.lower() == "resume"
+    ]:
+        missing = np.diff(clocks[0])[row - 1] - np.diff(seconds)[row - 1]
+        if missing > 1.0:
+            seconds[row:] += missing
+            notes.append(f"pause of {missing:.0f} s before row {row + 1}, by the clock column")
+    told = zip(names, rows[0], strict=False)
+    began = " ".join(cell for name, cell in told if name.lower().startswith(("date", *_CLOCKS)))
+    readings = [column for column in table.columns[1:] if column not in dated]
+    return replace(
+        table,
+        columns=tuple(
+            replace(
+                c,
+                name=f"channel {n}",
+                unit=dict(enumerate(names, 1)).get(c.number, ""),
+                time_s=seconds,
+            )
+            for n, c in enumerate(readings, start=1)
+        ),
+        markers=tuple(Marker(n, float(seconds[n]), said) for n, said in enumerate(events) if said),
+        metadata={**table.metadata, **({"recorded_at": began} if " " in began else {})},
+        notes=tuple(notes),
+    )
+
+
+def _evened(time: FloatArray) -> FloatArray:
+    """Take the rate for exact where times rounded to microseconds agree; a whole one first."""
+    rate = (len(time) - 1) / (time[-1] - time[0]) if time[-1] > time[0] else 0.0
+    for candidate in (float(round(rate)), rate):
+        even: FloatArray = time[0] + np.arange(len(time), dtype=np.float64) / (candidate or np.nan)
+        if np.abs(even - time).max() <= 1.5e-6:
+            return even
+    return time
+
+
+def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read ``start``, ``sc 12 13`` ..., ``stop``: volts are 10 counts/2048, 750 kHz over ``srate``.
+
+    Raises
+    ------
+    NotThisFormatError
+        When there is no ``sc`` line.
+    InputError
+        When a scan is damaged.
+    """
+    if not re.search(rb"(^|[\r\n])sc\s+[+-]?\d", data[:65536]):
+        raise NotThisFormatError("there is no line 'sc' with counts")
+    text, notes = decode(data).replace("\0", ""), list[str]()
+    lines = [line.strip() for line in text.split("\n")]
+    scans = {n: line for n, line in enumerate(lines, start=1) if line.startswith("sc")}
+    rows = {n: scan.split()[1:] if _SCAN.fullmatch(scan) else [] for n, scan in scans.items()}
+    width, last = len(next(iter(rows.values()))), max(rows)
+    if not width or len(rows[last]) != width:
+        notes.append(f"the last scan (line {last}) is cut short and left out")
+        del rows[last]
+    if not rows:
+        raise InputError(place, "there is no whole scan", "record again, or give another file")
+    for number, row in rows.items():
+        if not row or len(row) != width:
+            problem = f"'{scans[number][:60]}' is no whole scan"
+            raise InputError(f"{place}, line {number}", problem, "drop the row")
+    rates = re.findall(r"srate\s+(?:x([0-9a-f]{1,8})|(\d{1,9}))", text)
+    srate = int(rates[-1][0] or rates[-1][1], 16 if rates[-1][0] else 10) if rates else 0
+    if not srate and options.sample_rate is None:
+        srate = _SLOWEST
+        notes.append("the capture does not give its srate: 65535 (11.44 Hz) is taken")
+    metadata = {"bits": "12", "range_volts": "10"}
+    for second in re.findall(r"^\s*(1\d{9}(?:\.\d+)?)\s*$", text, re.M):
+        metadata["recorded_at"] = f"{second} s since 1970"
+    limits = -10.0, 2047 * _VOLTS_PER_COUNT
+    columns = tuple(
+        Column(f"channel {n}", "V", volts, n, resolution=_VOLTS_PER_COUNT, limits=limits)
+        for n, volts in enumerate(_VOLTS_PER_COUNT * np.array([*rows.values()], float).T, start=1)
+    )
+    interval_s = srate / _CLOCK_HZ or None
+    return Table(
+        place, "di149-ascii", columns, np.array([*rows]), interval_s, (), metadata, tuple(notes)
+    )

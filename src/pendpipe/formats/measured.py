@@ -1,0 +1,675 @@
+"""From the chosen columns to seconds that rise, and to readings in radians, volts, metres or so."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.errors import InputError
+from pendpipe.formats.choose import Choice, one_way
+from pendpipe.formats.samples import (
+    derivative_slope,
+    follows_sine,
+    periods,
+    resolution,
+    same_motion,
+    swing_of,
+)
+from pendpipe.formats.table import Column, ReadOptions, Table
+from pendpipe.formats.words import Unit, plain, unit_of
+from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
+
+_EPOCH: Final = 3e8
+"""Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
+_LATEST: Final = 1e10
+"""Seconds since 1970 that no recording has reached: the unit in the header is wrong."""
+_EPOCHS: Final = (
+    (3e17, 1e-9, "nanoseconds"),
+    (3e14, 1e-6, "microseconds"),
+    (3e11, 1e-3, "milliseconds"),
+    (_EPOCH, 1.0, "seconds"),
+)
+_LONGEST_S: Final = 300.0
+"""Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
+_SHORTEST_S: Final = 5e-4
+"""Period below which it is hardly in seconds either."""
+
+
+@dataclass
+class TimeBase:
+    """Times of the rows that are kept; which rows those are, in order; what was done.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,), rising.
+    rows
+        Row of the table that each comes from, shape (n,); a permutation where the file
+        has its newest row first.
+    """
+
+    time_s: FloatArray
+    rows: IntArray
+    notes: list[str] = field(default_factory=list)
+    weak_guesses: list[str] = field(default_factory=list)
+    metadata: dict[str, str] = field(default_factory=dict)
+
+
+def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
+    """Find the time of every row.
+
+    In this order: the rate that the user gives, the instrument's own clock, the time
+    column (in the unit given, or the one that fits), a column that counts samples with the
+    rate in the header, the rate in the header alone.
+
+    Raises
+    ------
+    InputError
+        When there is no time, or it falls, repeats or is no number: file, line, remedy.
+    """
+    reading = choice.readings[0] if choice.readings else table.columns[0]
+    every = np.arange(len(reading.values))
+    if options.sample_rate is not None:
+        time: FloatArray = every.astype(np.float64) / options.sample_rate
+        note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
+        return TimeBase(time, every, [note])
+    if reading.time_s is not None:
+        return TimeBase(reading.time_s, every)
+    column = choice.time
+    if column is not None and not choice.counts:
+        return _from_column(table, choice, column, reading, options)
+    counted = f" ('{column.label}' only counts)" if column is not None else ""
+    if table.interval_s is None:
+        raise InputError(
+            table.place,
+            f"there is no time column and no sample rate{counted}",
+            "give --sample-rate, or name the time with --column TIME:READING",
+        )
+    note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
+    if column is None:
+        return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
+    _refuse_missing_times(table, column, np.ones(len(every), dtype=bool))
+    time = (column.values - column.values[0]) * table.interval_s
+    base = TimeBase(time, every, [f"{note} and '{column.label}'"])
+    return _in_order(table, choice, base, table.interval_s)
+
+
+def _from_column(
+    table: Table, choice: Choice, column: Column, reading: Column, options: ReadOptions
+) -> TimeBase:
+    """Read the times off a column."""
+    filled = np.ones(len(column.values), dtype=bool)
+    if len(reading.values) == len(filled):
+        # Of runs side by side one is shorter.
+        filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
+    _refuse_missing_times(table, column, filled)
+    factor, note, weak = _time_unit(column, reading, options)
+    if weak and table.interval_s is not None:
+        # A clock without a unit ticks in some decimal part of a second.
+        factor = table.interval_s / float(np.median(np.abs(np.diff(column.values[filled]))))
+        factor, rate, weak = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s, False
+        note = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
+    rows = np.flatnonzero(filled)
+    base = TimeBase(column.values[rows] * factor, rows)
+    if left := len(filled) - len(rows):
+        base.notes.append(f"{left} row(s) with neither time nor reading left out")
+    (base.weak_guesses if weak else base.notes).extend([note] * bool(note))
+    return _in_order(table, choice, base, factor)
+
+
+def refuse_text(table: Table, column: Column, remedy: str) -> None:
+    """Refuse a column by the first of its cells that should be a number and is not."""
+    if column.fault is not None:
+        row, text = column.fault
+        raise InputError(table.where(row), f"'{text}' is no number", remedy)
+
+
+def _refuse_missing_times(table: Table, column: Column, rows: BoolArray) -> None:
+    refuse_text(table, column, "correct or drop the row")
+    bad = np.flatnonzero(~np.isfinite(column.values) & rows)
+    if bad.size:
+        raise InputError(
+            table.where(int(bad[0])), "the time is missing or NaN", "correct or drop the row"
+        )
+
+
+def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
+    """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
+    if options.time_unit is not None:
+        given = unit_of(options.time_unit)
+        if given is None or given.kind != "time":
+            raise InputError(
+                "--unit", f"'{options.time_unit}' is no unit of time", "give s, ms, us"
+            )
+        return given.factor, "", False
+    values = column.values[np.isfinite(column.values)]
+    largest = float(np.abs(values).max(initial=0.0))
+    period = _period(reading, values)
+    for word in filter(unit_of, (column.unit, column.name)):
+        unit = unit_of(word)
+        fits = unit is not None and unit.kind == "time" and largest * unit.factor <= _LATEST
+        if unit and fits and (word == column.unit or plain(word) not in ("t", "h", "min")):
+            return unit.factor, "", False
+    for least, factor, name in _EPOCHS:
+        ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
+        if largest > least and not ticks and factor * period < _LONGEST_S:
+            return factor, f"'{column.label}' counts {name} since 1970", False
+    return _time_by_size(column, period, values)
+
+
+def _period(reading: Column, values: FloatArray) -> float:
+    """Period of the reading on a clock, in the clock's unit; 0 where nothing swings."""
+    cycle = swing_of(reading.values).samples_per_cycle
+    span = float(np.ptp(values)) if len(values) else 0.0
+    return cycle * span / max(1, len(values) - 1)
+
+
+def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, str, bool]:
+    """Take seconds, unless no pendulum would be so slow."""
+    step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
+    whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
+    taken = f"'{column.label}' is taken to be in"
+    if period > _LONGEST_S or (not period and whole and step >= 500):
+        cycle, seen = period or 50.0 * step, f"a period of {period:.4g}"
+        ticks = ((3e7, 1e-9, "nanoseconds"), (3e4, 1e-6, "microseconds"), (0, 1e-3, "milliseconds"))
+        factor, name = next((size, name) for least, size, name in ticks if cycle > least)
+        seen = seen if period else f"steps of {step:.4g}"
+        note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
+        return factor, note, True
+    if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
+        dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
+        return 86400.0, f"{taken} days, as spreadsheets count (--unit s: for s)", not dated
+    if period and (whole or not 0.02 < period < 60.0):
+        said = f"{taken} seconds: a period of {period:.4g} s (--unit ms: for milliseconds)"
+        return 1.0, said, True
+    return 1.0, f"{taken} seconds", False
+
+
+def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> TimeBase:
+    """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
+    if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
+        base.time_s, base.rows = base.time_s[::-1].copy(), base.rows[::-1].copy()
+        base.notes.append("the newest row stands first: rows turned round")
+    if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
+        start = float(base.time_s[0])
+        base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
+        base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
+        base.time_s = base.time_s - start
+    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _sorted):
+        if np.diff(base.time_s).min(initial=1.0) > 0:
+            return base
+        repaired(choice, base)
+    steps = np.diff(base.time_s)
+    if steps.min(initial=1.0) > 0:
+        return base
+    at = int(np.argmax(steps <= 0))
+    verb = "repeats" if steps[at] == 0 else "falls"
+    before, after = base.time_s[at] / tick, base.time_s[at + 1] / tick
+    raise InputError(
+        table.where(int(base.rows[at + 1])),
+        f"the time {verb} ({before:.10g} is followed by {after:.10g})",
+        "correct the rows, or give --sample-rate if they are evenly spaced",
+    )
+
+
+def _count_rows(_choice: Choice, base: TimeBase) -> None:
+    """Count the rows where stamps are rounded and repeat."""
+    even = _rounded(base.time_s)
+    if even is not None:
+        interval = np.diff(even).min()
+        frames = round((even[-1] - even[0]) / interval) + 1 - len(even)
+        lost = f", with {frames} missing" if frames else ""
+        base.time_s = even
+        base.notes.append(
+            "time stamps are rounded and repeat: rows are counted at"
+            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with"
+        )
+
+
+def _drop_repeats(choice: Choice, base: TimeBase) -> None:
+    """Leave out rows with the time of an earlier row: a logger that sends what it has sent.
+
+    Whole copies always; with other readings where they are rare, for then the earlier row,
+    which stands where its time belongs, is the true one.
+    """
+    _, first, which = np.unique(base.time_s, return_index=True, return_inverse=True)
+    origin = first[which.reshape(-1)]
+    again = origin < np.arange(len(origin))
+    if again.sum() > max(20, 0.01 * len(again)):
+        for column in choice.channels:
+            if len(column.values) > base.rows.max():
+                values = column.values[base.rows]
+                same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
+                again &= same
+    if again.any():
+        base.notes.append(f"{again.sum()} row(s) that repeat the time of an earlier row left out")
+        base.time_s, base.rows = base.time_s[~again], base.rows[~again]
+
+
+def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
+    """Keep the first of several runs that stand below one another, each from its own start."""
+    starts = np.flatnonzero(np.diff(base.time_s) < 0) + 1
+    lengths = np.diff(np.concatenate(([0], starts, [len(base.time_s)])))
+    again = np.abs(base.time_s[starts] - base.time_s[0]) < 0.05 * np.ptp(base.time_s)
+    if not 0 < len(starts) <= 50 or lengths.min() < 50 or not again.all():
+        return
+    base.weak_guesses.append(
+        f"{len(lengths)} runs stand below one another: the first is read ({lengths[0]} rows);"
+        " put each into a file of its own for the others"
+    )
+    base.time_s, base.rows = base.time_s[: starts[0]], base.rows[: starts[0]]
+
+
+def _sorted(choice: Choice, base: TimeBase) -> None:
+    """Sort rows that came out of order (threads, radio), where that makes the motion smooth."""
+    order = np.argsort(base.time_s, kind="stable")
+    steps = np.diff(base.time_s[order])
+    values = choice.readings[0].values if choice.readings else np.empty(0)
+    if np.all(np.diff(order) == 1) or len(values) <= base.rows.max(initial=0):
+        return
+    even = float(np.mean(np.abs(steps - np.median(steps)) <= 0.2 * np.median(steps)))
+    before, after = (
+        float(np.nansum(np.abs(np.diff(values[rows])))) for rows in (base.rows, base.rows[order])
+    )
+    if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
+        return
+    moved = int(np.sum(order != np.arange(len(order))))
+    base.notes.append(f"{moved} row(s) out of order: sorted by time")
+    base.time_s, base.rows = base.time_s[order], base.rows[order]
+
+
+def _rounded(time: FloatArray) -> FloatArray | None:
+    """Undo the rounding of evenly spaced time stamps; ``None`` if they are not that.
+
+    Each row is counted one interval after the row above, or, where a stamp shows that frames
+    are missing, as many as bring it within the stamp's last digit. The interval with which
+    fewest are missing is right.
+    """
+    steps = np.diff(time)
+    if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.02:
+        return None
+    # A clock's own jitter comes on top: a tenth of an interval.
+    digit = _last_digit(time) + 0.15 * float(time[-1] - time[0]) / len(time)
+    index = np.arange(len(time), dtype=np.float64)
+    even: FloatArray = np.polynomial.Polynomial.fit(index, time, 1, w=1.0 / digit)(index)
+    if np.all(np.abs(time - even) <= 0.6 * digit):
+        return even if even[-1] > even[0] else None
+    # The first stamps are the finest.
+    early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
+    best: FloatArray | None = None
+    for change in (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2):
+        found = _frames(time, digit, (1.0 + change) * float(np.median(np.diff(early))))
+        # Fewest frames in all is the longest interval.
+        if found is not None and (best is None or np.diff(found).min() > np.diff(best).min()):
+            best = found
+    return best
+
+
+def _last_digit(time: FloatArray) -> FloatArray:
+    """What one in the last printed digit of each stamp is worth.
+
+    Either all have so many decimals, or all so many digits: then it grows with the time.
+    """
+    some = time[:: max(1, len(time) // 1000)]
+    texts = [f"{abs(stamp):.10f}".rstrip("0") for stamp in (*time[:100], *some) if stamp]
+    decimals = max((len(text.partition(".")[2]) for text in texts), default=0)
+    digits = max((len(text.replace(".", "").lstrip("0")) for text in texts), default=1)
+    size = np.floor(np.log10(np.maximum(np.abs(time), 1e-9)) + 1e-9)
+    return np.maximum(10.0**-decimals, 10.0 ** (size - digits + 1))
+
+
+def _frames(time: FloatArray, digit: FloatArray, interval: float) -> FloatArray | None:
+    """Count the frames from the first row to each, improving their interval on the way.
+
+    Returns
+    -------
+    time_s
+        ``None`` where some stamp contradicts the count, or more than 2 % are missing: of
+        so many any interval would do.
+    """
+    if not interval > 0:
+        return None
+    index = np.arange(len(time), dtype=np.float64)
+    start = float(time[0])
+    for _ in range(8):
+        # At least one more than the row above, and at least what the stamp asks for.
+        least = np.ceil((time - start - 0.6 * digit) / interval - 1e-9)
+        count = index + np.maximum.accumulate(np.maximum(least - index, 0.0))
+        if count[-1] > 1.02 * len(time) + 3:
+            return None
+        even: FloatArray = start + interval * count
+        if np.all(np.abs(even - time) <= 0.6 * digit):
+            return even
+        fitted = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
+        start, interval = float(fitted.coef[0]), float(fitted.coef[1])
+        if not interval > 0:
+            return None
+    return None
+
+
+def _keep_last(choice: Choice, base: TimeBase) -> None:
+    """For one row a count: of the rows in one tick of the clock keep the last."""
+    values = choice.readings[0].values if choice.readings else np.empty(0)
+    if len(values) <= base.rows.max() or np.any(np.diff(base.time_s) < 0):
+        return
+    jumps = np.abs(np.diff(values[base.rows]))
+    count = float(np.median(jumps))
+    if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:
+        last = np.append(np.diff(base.time_s) > 0, True)
+        base.time_s, base.rows = base.time_s[last], base.rows[last]
+        base.notes.append(
+            f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
+        )
+
+
+_RADIAN = Unit("angle", 1.0, "rad")
+_DEGREE = Unit("angle", np.pi / 180, "rad")
+_UNKNOWN = Unit("own", 1.0, "1")
+_QUANTITIES: dict[str, Quantity] = {
+    "angle": "angle_rad",
+    "volts": "volts",
+    "length": "displacement_m",
+    "own": "reading",
+}
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Values of all rows, shape (n,), in the unit of `quantity`; scale; what was guessed."""
+
+    values: FloatArray
+    quantity: Quantity
+    factor: float
+    unit: str
+    notes: tuple[str, ...] = ()
+    weak_guesses: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A unit, its reason, and whether it is a weak guess."""
+
+    unit: Unit
+    why: str = ""
+    weak: bool = False
+
+
+def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatArray) -> Readings:
+    """Turn the chosen column, or the pair x, y, into one of the quantities.
+
+    Parameters
+    ----------
+    time_s
+        Times of all rows, NaN where a row is left out.
+    """
+    if len(choice.readings) == 2:
+        return _position(choice.readings[0], choice.readings[1])
+    column = choice.readings[0]
+    guess = _unit(table, choice, column, options, time_s)
+    unit, values, notes = guess.unit, column.values * guess.unit.factor, tuple[str, ...]()
+    if unit.kind == "angle":
+        values, notes = from_below(values)
+    elif unit.name == "counts":
+        values, notes = _over_the_turn(values)
+    stated = f"'{column.label}' {guess.why}"
+    if guess.why and not guess.weak:
+        notes = (stated, *notes)
+    weak = (f"{stated} (--unit)",) if guess.weak else ()
+    return Readings(values, _QUANTITIES[unit.kind], unit.factor, unit.name, notes, weak)
+
+
+def _unit(
+    table: Table, choice: Choice, column: Column, options: ReadOptions, time_s: FloatArray
+) -> _Guess:
+    """Find the unit: from the user, from the file, or from the numbers."""
+    if options.reading_unit is not None:
+        given = unit_of(options.reading_unit)
+        if given is None or given.kind not in _QUANTITIES:
+            raise InputError(
+                "--unit",
+                f"'{options.reading_unit}' is not known",
+                "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
+            )
+        return _Guess(given)
+    # "second,Volt,Volt": some programs print the unit for a name.
+    written = unit_of(column.unit or (column.name if len(column.name) > 2 else ""))
+    role = choice.roles.get(column.number, "unknown")
+    if written is not None and written.kind in _QUANTITIES:
+        if role == "velocity" and written.kind in ("angle", "length"):
+            return _Guess(Unit("own", written.factor, f"{written.name}/s"))
+        return _contradicted(column, written, time_s) or _Guess(written)
+    if column.unit and written is None:
+        return _Guess(Unit("own", 1.0, column.unit), f"is in {column.unit}, analysed as it stands")
+    if written is not None or role in ("none", "time", "index"):
+        raise InputError(
+            table.place,
+            f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
+            " motion is read from",
+            "choose another with --column, or give its unit with --unit",
+        )
+    finite = column.values[np.isfinite(column.values)]
+    whole = bool(len(finite)) and bool(np.all(finite == np.rint(finite)))
+    reach = _reach(finite)
+    # Whole numbers are an instrument's counts where degrees or millimetres would not be: a
+    # pendulum seldom goes beyond 180 degrees.
+    few = {"volts": 20.0, "signal": 20.0, "angle": 180.0, "length": 400.0, "unknown": 400.0}
+    counted = re.search(r"(?i)enc|count|tick|raw", column.name) is not None
+    if whole and (counted or reach > few.get(role, np.inf)):
+        return _Guess(
+            Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
+        )
+    headed = _UNITS_OF.search(table.metadata.get("header", ""))
+    named = unit_of(headed[1]) if headed else None
+    if headed and named and named.kind in ("length", "volts") and role in ("unknown", named.kind):
+        return _Guess(named, f"is in {headed[1]}, by the header")
+    if role == "volts":
+        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
+    names = {other.name.lower() for other in choice.channels if not other.unit}
+    # A phone's sensor: of a position it knows nothing.
+    sensed = role == "length" and {"x", "y", "z"} <= names
+    if sensed or role in ("velocity", "acceleration", "signal"):
+        what = "one of x, y, z" if sensed else role
+        return _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", weak=True)
+    if role == "length":
+        if reach <= 2.0:
+            grown = _by_period(column, time_s, named=False)
+            if grown is not None and not grown.weak:
+                return grown
+            return _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
+        return _Guess(
+            _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
+        )
+    return _angle_unit(table, choice, column, time_s)
+
+
+_UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
+"""What an oscilloscope, or a system of cameras, says above its table."""
+
+
+def _reach(finite: FloatArray) -> float:
+    """How far the readings go from their middle."""
+    if not len(finite):
+        return 0.0
+    low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
+    return max(float(high - middle), float(middle - low))
+
+
+def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
+    """Doubt a header that gives the one unit of angles where the period shows the other."""
+    if written.kind != "angle":
+        return None
+    reach = _reach(column.values[np.isfinite(column.values)])
+    if written.factor == _DEGREE.factor and 0.3 < reach < 3.0:
+        other, name, headed = _RADIAN, "radians", "degrees"
+    elif written.factor == 1.0 and 3.6 < reach < 170.0:
+        other, name, headed = _DEGREE, "degrees", "radians"
+    else:
+        return None
+    slope = follows_sine(time_s, column.values, other.factor)
+    if slope is None or abs(slope - 1.0) > 0.25:
+        return None
+    why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
+    return _Guess(other, why, weak=True)
+
+
+def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess:
+    """Tell degrees from radians by whatever the file gives away."""
+    finite = column.values[np.isfinite(column.values)]
+    if not len(finite):
+        return _Guess(_RADIAN)
+    words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
+    stated = re.search(
+        r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
+    )
+    if stated and "rad" not in words.replace("grad", ""):
+        return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
+    named = choice.roles.get(column.number) == "angle"
+    return (
+        _by_step(finite, named)
+        or _by_sibling(choice, column, time_s)
+        or _by_size(choice, column, finite, time_s)
+    )
+
+
+def _by_size(choice: Choice, column: Column, finite: FloatArray, time_s: FloatArray) -> _Guess:
+    """Judge by how far it swings, and by whether the period follows the amplitude."""
+    named, reach = choice.roles.get(column.number) == "angle", _reach(finite)
+    # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
+    if jumps_of_a_turn(finite):
+        return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
+    if reach > 1.1 * np.pi:
+        slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 170 else None
+        if slope is not None and abs(slope - 1.0) < 0.4:
+            return _Guess(
+                _DEGREE, "is taken to be in degrees (its period grows as such swings' does)"
+            )
+        odd = slope is not None and np.radians(reach) > 0.5
+        if reach > 360.0 or odd or not (named or reach <= 90.0):
+            return _Guess(
+                _UNKNOWN, f"has no unit and swings by {reach:.4g}: analysed in its own", True
+            )
+        return _Guess(_DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True)
+    grown = _by_period(column, time_s, named=named)
+    if grown is not None:
+        return grown
+    slope = follows_sine(time_s, column.values, 1.0)
+    if slope is None or abs(slope) >= 0.35 or reach <= 0.35:
+        return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
+    # No pendulum of so many radians: a torsion pendulum, or another unit.
+    odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
+    level = float(np.median(finite))
+    if named and abs(level - 0.5 * np.pi * np.rint(level / (0.5 * np.pi))) > 0.35:
+        return _Guess(_DEGREE, f"{odd}; it hangs at {level:.3g}: taken to be degrees", True)
+    taken, unit = ("taken to be radians of a torsion pendulum", _RADIAN)
+    if not named:
+        taken, unit = "analysed in its own", _UNKNOWN
+    return _Guess(unit, f"{odd}: {taken}", True)
+
+
+def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | None:
+    """Take for radians what is swung through ever faster, just as such an angle is."""
+    slope = follows_sine(time_s, column.values, 1.0)
+    if slope is None or abs(slope - 1.0) >= 0.35:
+        return None
+    why = "is taken to be in radians (its period grows as such swings' does)"
+    # Of a pendulum 1 m long (2 s) metres look the same.
+    usual = float(np.median(periods(time_s, column.values)[0]))
+    if not named and abs(usual - 2.0) < 0.3:
+        return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", weak=True)
+    return _Guess(_RADIAN, why)
+
+
+def _by_step(finite: FloatArray, named: bool) -> _Guess | None:
+    """Read the unit off the step: a printed digit of the other unit, or a part of a turn.
+
+    A step of few digits is an encoder's in a column that is named an angle; in any other it may
+    be a converter's.
+    """
+    if _printed_digit(finite, 1.0) is None:
+        for unit, scale, name, other in (
+            (_RADIAN, 180 / np.pi, "radians", "degrees"),
+            (_DEGREE, np.pi / 180, "degrees", "radians"),
+        ):
+            digit = _printed_digit(finite, scale)
+            if digit is not None:
+                why = f"converted to {other}, its values are multiples of {digit:.4g}"
+                return _Guess(unit, f"is taken to be in {name} ({why})")
+    step = resolution(finite)
+    if step is None or _is_round(step):
+        return None
+    if not named and abs(float(f"{step:.3g}") / step - 1.0) < 2e-5:
+        return None
+    for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
+        parts = turn / step
+        whole = round(parts)
+        near = abs(parts - whole) < 1e-6 * whole + 1e-4
+        if near and 100 <= whole <= 1 << 20 and (whole % 4 == 0 or whole % 50 == 0):
+            return _Guess(unit, f"is taken to be in {name} (its step is a turn over {whole})")
+    return None
+
+
+def _printed_digit(finite: FloatArray, scale: float) -> float | None:
+    """Find the decimal place of which all readings, times `scale`, are multiples."""
+    some = finite[:: max(1, len(finite) // 2000)]
+    # Beyond 1e9 a double has no such digits left.
+    if len(some) < 20 or np.abs(some).max() > 1e9:
+        return None
+    some = scale * some
+    for place in range(7):
+        whole = some * 10.0**place
+        # Of readings that have no such digit a few in a hundred are this near to one.
+        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
+            return 10.0**-place
+    return None
+
+
+def _is_round(step: float) -> bool:
+    """Say whether a step is 1, 2, 2.5 or 5 of some decimal place: a printed digit."""
+    leading = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
+    return bool(np.min(np.abs(leading - np.array([1.0, 2.0, 2.5, 5.0, 10.0])) / leading) < 2e-5)
+
+
+def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Compare with the same angle in another unit, or with its derivative in a known one."""
+    for other in choice.channels:
+        unit = unit_of(other.unit) if other.unit else None
+        if other is column or unit is None or len(other.values) != len(column.values):
+            continue
+        if unit.kind == "angle":
+            good = np.isfinite(column.values) & np.isfinite(other.values)
+            ratio = same_motion(column.values[good], other.values[good], 0.99) if good.any() else 0
+            scale = unit.factor * ratio if ratio else None
+        elif unit.name == "rad/s":
+            slope = derivative_slope(time_s, column.values, other.values)
+            scale = unit.factor * abs(slope) if slope is not None else None
+        else:
+            continue
+        for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
+            if scale is not None and abs(scale / guess.factor - 1.0) < 0.25:
+                return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
+    return None
+
+
+def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Undo the jumps of an absolute encoder of 2^k counts that hangs near its zero."""
+    finite = np.isfinite(values)
+    low, high = np.min(values[finite], initial=0.0), np.max(values[finite], initial=0.0)
+    turn = 2.0 ** np.ceil(np.log2(high + 1.0)) if high > 0.0 else 1.0
+    if low < 0.0 or turn < 256.0 or not np.any(np.abs(np.diff(values[finite])) > 0.8 * turn):
+        return values, ()
+    values = values.copy()
+    values[finite] = np.unwrap(values[finite], period=turn)
+    return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
+
+
+def _position(x: Column, y: Column) -> Readings:
+    """Turn a position seen from the pivot into an angle: atan2(x, -y), 0 straight down."""
+    down = -1.0 if float(np.nanmedian(y.values)) < 0 else 1.0
+    angle = np.arctan2(x.values, down * y.values)
+    sign = "-" if down < 0 else ""
+    note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
+    return Readings(angle, "angle_rad", 1.0, "rad", (note,))
