@@ -762,3 +762,49 @@ def test_labview_without_units_of_its_columns(tmp_path: Path) -> None:
     assert (
         read_text(tmp_path, head + text(TIME, ANGLE, 0.0 * ANGLE, sign="\t"), "a.lvm").unit == "V"
     )
+
+
+def test_symbols_above_the_units_are_no_units(tmp_path: Path) -> None:
+    head = "Vernier Format 2\nRun 1\nTime\tAngle\tVelocity\nt\tA\tv\ns\trad\trad/s\n\n"
+    recording = read_text(tmp_path, head + text(TIME, ANGLE, RATE, sign="\t"))
+    same(recording)
+    assert recording.unit == "rad"
+
+
+@pytest.mark.parametrize("form", ["yaml", "matlab", "xml"])
+def test_lists_by_name_and_attributes_of_elements(tmp_path: Path, form: str) -> None:
+    times, angles = ([f"{x:.6f}" for x in column] for column in (TIME, ANGLE))
+    pairs = zip(times, angles, strict=True)
+    content = {
+        "yaml": f"bob: brass\nt: [{', '.join(times)}]\ntheta: [{', '.join(angles)}]\n",
+        "matlab": f"t = [{' '.join(times)}];\ntheta = [{' '.join(angles)}];\n",
+        "xml": "".join(f'<sample t="{t}" theta="{x}"/>\n' for t, x in pairs),
+    }[form]
+    same(read_text(tmp_path, content))
+
+
+def test_the_name_of_a_section_is_no_unit(tmp_path: Path) -> None:
+    head = "[Header]\nSampleRate=30\nUnit=deg\n[Data]\n"
+    same(read_text(tmp_path, head + text(np.degrees(ANGLE))))
+
+
+def test_readings_beside_gravity_are_an_accelerometers(tmp_path: Path) -> None:
+    along = 9.81 * np.cos(ANGLE) + 0.5 * RATE**2
+    for columns in ((along,), (9.81 * np.sin(ANGLE), along)):
+        recording = read_text(tmp_path, text(TIME, *columns))
+        assert recording.unit == "m/s^2"
+        assert "accelerometer" in recording.weak_guesses[-1]
+
+
+def test_a_column_that_counts_frames_gives_way_to_one_that_may_be_a_time(tmp_path: Path) -> None:
+    content = text(np.arange(1500.0), TIME, ANGLE, head="frame,tau,theta\n")
+    same(read_text(tmp_path, content))
+
+
+@pytest.mark.parametrize(("share", "chosen"), [(0.35, "ch1"), (0.31, "ch2")])
+def test_of_equal_columns_the_first_that_swings_a_third_as_far(
+    tmp_path: Path, share: float, chosen: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text(TIME, share * ANGLE, ANGLE, head="t_s,ch1,ch2\n"))
+    assert inspect(path).chosen == chosen

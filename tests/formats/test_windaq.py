@@ -171,6 +171,12 @@ def test_samples_at_the_converters_end_are_counted(tmp_path: Path) -> None:
     assert found.clipped_samples == np.sum((clipped == -8192) | (clipped == 8191)) > 0
 
 
+def test_an_event_behind_the_last_sample_has_its_time(tmp_path: Path) -> None:
+    events = [0, 0, len(COUNTS), 99]
+    found = inspect(write(tmp_path / "a.WDQ", WindaqFile(COUNTS, events=events)))
+    assert found.markers[-1].time_s == pytest.approx(0.004 * (len(COUNTS) - 1), abs=1e-9)
+
+
 def test_a_spreadsheet_export_goes_by_place_and_index(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     head = "Relative Time,Date,Time Stamp UTC,Volt,Volt,Chn 1 Events\n"

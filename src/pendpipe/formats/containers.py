@@ -6,16 +6,16 @@ import io
 import re
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import replace
-from math import cos, radians, sin
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
 from pendpipe.formats.text import read_table as read_text
@@ -206,12 +206,10 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     """
     if not _START.match(data[:200]):
         raise NotThisFormatError("the file is no XML")
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise InputError(place, "the XML declares entities", "export the data as CSV")
-    if len(data) > _LARGEST:
-        raise InputError(
-            place, f"the XML holds more than {_LARGEST >> 20} MB", "export the data as CSV"
-        )
+    declares = b"<!DOCTYPE" in data or b"<!ENTITY" in data
+    if declares or len(data) > _LARGEST:
+        what = "declares entities" if declares else f"holds more than {_LARGEST >> 20} MB"
+        raise InputError(place, f"the XML {what}", "export the data as CSV")
     try:
         root = ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError) as fault:
@@ -223,23 +221,19 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     elif root.find(".//ColumnCells") is not None:
         name, found = "logger-pro", list(_of_logger_pro(root))
     elif "TrackerPanel" in root.get("class", ""):
-        name, found = "tracker", list(_of_tracker(place, root))
+        name, found = "tracker", _of_tracker(place, root)
     else:
         raise NotThisFormatError("the XML is none of CASSY Lab's, Logger Pro's or Tracker's")
     found = [(title, unit, values) for title, unit, values in found if len(values) > 3]
     if not found:
         raise InputError(place, "the project holds no samples", "export the data as CSV")
-    longest = max(len(values) for _, _, values in found)
+    # Runs side by side are of unlike length: the shorter end in empty cells.
+    values = np.array([*zip_longest(*(each[2] for each in found), fillvalue=np.nan)], np.float64)
     columns = tuple(
-        Column(title, unit, _filled(values, longest), number)
-        for number, (title, unit, values) in enumerate(found, start=1)
+        Column(title.strip(), unit.strip(), np.ascontiguousarray(values[:, number]), number + 1)
+        for number, (title, unit, _) in enumerate(found)
     )
     return Table(place=place, format=name, columns=columns)
-
-
-def _filled(values: FloatArray, length: int) -> FloatArray:
-    """Runs side by side are of unlike length: the shorter end in empty cells."""
-    return np.concatenate((values, np.full(length - len(values), np.nan)))
 
 
 def _number(text: str | None) -> float:
@@ -247,87 +241,73 @@ def _number(text: str | None) -> float:
     try:
         value = float((text or "").strip().replace(",", "."))
     except ValueError:
-        return float("nan")
-    return value if abs(value) < 1e300 else float("nan")
+        value = np.nan
+    return value if abs(value) < 1e300 else np.nan
 
 
-def _of_cassy(root: ET.Element) -> Iterator[tuple[str, str, FloatArray]]:
-    """Give each channel of a .labx file: quantity, symbol, unit, values."""
+_Named = tuple[str, str, Sequence[float]]
+
+
+def _of_cassy(root: ET.Element) -> Iterator[_Named]:
+    """Give each channel of a .labx file: quantity and symbol, unit, values."""
     for channel in root.iter("channel"):
-        cells = channel.find("values")
-        if cells is None:
-            continue
         title = f"{channel.findtext('quantity') or ''} {channel.findtext('symbol') or ''}"
-        values = np.array([_number(cell.text) for cell in cells], dtype=np.float64)
-        yield title.replace("&", "").strip(), (channel.findtext("unit") or "").strip(), values
+        cells = [_number(cell.text) for cell in channel.find("values") or ()]
+        yield title.replace("&", ""), channel.findtext("unit") or "", cells
 
 
-def _of_logger_pro(root: ET.Element) -> Iterator[tuple[str, str, FloatArray]]:
+def _of_logger_pro(root: ET.Element) -> Iterator[_Named]:
     """Give each filled column of each data set."""
     for column in root.iter("DataColumn"):
         cells = (column.findtext("ColumnCells") or "").split("\n")
-        values = np.array([_number(cell) for cell in cells if cell.strip()], dtype=np.float64)
-        title = (column.findtext("DataObjectName") or "").strip()
+        values = [_number(cell) for cell in cells if cell.strip()]
         if np.isfinite(values).any():
-            yield title, (column.findtext("ColumnUnits") or "").strip(), values
+            yield (
+                column.findtext("DataObjectName") or "",
+                column.findtext("ColumnUnits") or "",
+                values,
+            )
 
 
-def _of_tracker(place: Path, root: ET.Element) -> Iterator[tuple[str, str, FloatArray]]:
+def _of_tracker(place: Path, root: ET.Element) -> list[_Named]:
     """Give t, x, y of the point mass with most frames, as Tracker itself would print them.
 
     The image's y points down; origin, scale and tilt of the axes are those of the frame.
     """
-    marks = [
-        _frames(track, "PointMass$FrameData")
-        for track in root.iter("object")
-        if track.get("class", "").endswith("tracker.PointMass")
-    ]
-    marks = [mark for mark in marks if mark]
-    axes = next(
-        (
-            _frames(each, "ImageCoordSystem$FrameData")
-            for each in root.iter("object")
-            if each.get("class", "").endswith("ImageCoordSystem")
-        ),
-        {},
-    )
-    if not marks:
-        raise InputError(place, "the project has no point mass", "export its data as text")
-    mass = max(marks, key=len)
-    step_ms = next(
-        (value for value in map(_number, _properties(root, "delta_t")) if value > 0), float("nan")
-    )
-    if not step_ms > 0:
-        raise InputError(
-            place, "the project does not give its frame rate", "export its data as text"
-        )
-    first = _number(next(iter(_properties(root, "startframe")), "0"))
-    start_ms = _number(next(iter(_properties(root, "starttime")), "0"))
-    rows = []
-    frame_axes: dict[str, float] = {}
+    told = {each.get("name"): each.text for each in [*root.iter("property")][::-1] if each.text}
+    steps = [_number(each.text) for each in root.iter("property") if each.get("name") == "delta_t"]
+    step_ms = next((step for step in steps if step > 0), np.nan)
+    of: dict[str, list[dict[int, dict[str, float]]]] = {"PointMass": [{}], "ImageCoordSystem": [{}]}
+    for track in root.iter("object"):
+        kind = track.get("class", "").rpartition(".")[2]
+        if kind in of:
+            of[kind].append(_frames(track, f"{kind}$FrameData"))
+    mass, axes = max(of["PointMass"], key=len), next(filter(None, of["ImageCoordSystem"]), {})
+    for wrong, what in ((not mass, "has no point mass"), (not step_ms > 0, "gives no frame rate")):
+        if wrong:
+            raise InputError(place, f"the project {what}", "export its data as text")
+    numbers = [number for number in sorted(mass) if {"x", "y"} <= mass[number].keys()]
+    # The axes of a frame are those that were set last.
     known = sorted(axes)
-    for number in sorted(mass):
-        while known and known[0] <= number:
-            frame_axes = axes[known.pop(0)]
-        point = mass[number]
-        if "x" not in point or "y" not in point:
-            continue
-        tilt = radians(frame_axes.get("angle", 0.0))
-        across = point["x"] - frame_axes.get("xorigin", 0.0)
-        up = frame_axes.get("yorigin", 0.0) - point["y"]
-        x = (across * cos(tilt) + up * sin(tilt)) / (frame_axes.get("xscale") or 1.0)
-        y = (up * cos(tilt) - across * sin(tilt)) / (frame_axes.get("yscale") or 1.0)
-        rows.append((1e-3 * ((number - first) * step_ms + start_ms), x, y))
-    unit = next(iter(_properties(root, "length_unit")), "")
-    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    places = [bisect_right(known, number) - 1 for number in numbers]
+    last = [axes[known[place]] if place >= 0 else {} for place in places]
+    x, y = (np.array([mass[number][axis] for number in numbers]) for axis in "xy")
+    x0, y0, angle, across, up = (
+        np.array([frame.get(name) or usual for frame in last], np.float64)
+        for name, usual in (
+            ("xorigin", 0),
+            ("yorigin", 0),
+            ("angle", 0),
+            ("xscale", 1),
+            ("yscale", 1),
+        )
+    )
+    turned = (x - x0 + 1j * (y0 - y)) * np.exp(-1j * np.radians(angle))
+    first, start_ms = _number(told.get("startframe", "0")), _number(told.get("starttime", "0"))
+    time = 1e-3 * ((np.array(numbers) - first) * step_ms + start_ms)
     scaled = any(axis.get("xscale", 1.0) != 1.0 for axis in axes.values())
-    yield "t", "s", table[:, 0]
-    yield "x", unit if scaled else "px", table[:, 1]
-    yield "y", unit if scaled else "px", table[:, 2]
-
-
-def _properties(root: ET.Element, name: str) -> Iterator[str]:
-    return (each.text or "" for each in root.iter("property") if each.get("name") == name)
+    unit = (told.get("length_unit") or "") if scaled else "px"
+    return [("t", "s", time), ("x", unit, turned.real / across), ("y", unit, turned.imag / up)]
 
 
 def _frames(track: ET.Element, kind: str) -> dict[int, dict[str, float]]:
@@ -344,6 +324,6 @@ def _frames(track: ET.Element, kind: str) -> dict[int, dict[str, float]]:
             if each.get("type") in ("double", "int")
         }
         # Newer versions number the entries through and keep the frame as n.
-        frame = numbers.get("n", float(place[1]))
+        frame = numbers.get("n", np.nan)
         frames[int(frame) if frame == frame else int(place[1])] = numbers
     return frames

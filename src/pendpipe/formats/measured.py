@@ -369,6 +369,7 @@ def _keep_last(choice: Choice, base: TimeBase) -> None:
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
 _UNKNOWN = Unit("own", 1.0, "1")
+_GRAVITY = Unit("own", 1.0, "m/s^2")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
     "volts": "volts",
@@ -483,6 +484,12 @@ def _unit(
         return _Guess(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
         )
+    bare = [other.values for other in choice.channels if not other.name]
+    if not column.name and any(9.6 < abs(np.nanmedian(values)) < 10.1 for values in bare):
+        why = (
+            "stands beside 9.8, as an accelerometer's readings do: taken to be in m/s^2; along the"
+        )
+        return _Guess(_GRAVITY, f"{why} string the pull swings twice a period", weak=True)
     return _angle_unit(table, choice, column, time_s)
 
 

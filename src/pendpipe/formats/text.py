@@ -268,8 +268,8 @@ _TOKEN: Final = re.compile(
     r"|(?<![\w.])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:(?:[eE]|\*\^)[+-]?\d+)?"
 )
 """A time of day, or a number (Mathematica's ``1.2*^-3`` too)."""
-_SAID: Final = re.compile(r"([^\W\d]\w*)\s*[:=]\s*$")
-_WORDS: Final = re.compile(r"[^\W\d]\w*\s*[:=]\s*\0|(->|[\[({]|\])\s*\0")
+_SAID: Final = re.compile(r"([^\W\d]\w*)\s*[:=]\s*\"?\s*$")
+_WORDS: Final = re.compile(r"[^\W\d]\w*\s*[:=]\s*\"?\0|(->|[\[({]|\])\s*\0")
 
 
 def _without_words(lines: list[str]) -> list[str]:
@@ -284,7 +284,7 @@ def _without_words(lines: list[str]) -> list[str]:
     if 2 * many <= len(some) or not _WORDS.search(shape):
         return lines
     said = [_SAID.search(piece) for piece in shape.split("\0")[:-1]]
-    behind = [piece.split()[:1] for piece in re.sub(r"[,;|)\]}]", " ", shape).split("\0")[1:]]
+    behind = [piece.split()[:1] for piece in re.sub(r"[,;|)\]}\"]", " ", shape).split("\0")[1:]]
     units = [word[0] if word and unit_of(word[0]) else "" for word in behind]
     names = "\t".join(each[1] if each else "" for each in said)
     rows, first = list(lines), len(lines)
@@ -317,16 +317,18 @@ _SPLIT: Final = re.compile(r"[+-]?\d+,\d+(,[+-]?\d+,\d+)+")
 
 def _upright(lines: list[str]) -> list[str]:
     """Turn a table that lies on its side: a few long lines, each of one quantity."""
-    rows = [line for line in lines[:_FEW_LINES] if line.strip()]
-    if len(lines) > _FEW_LINES or len(rows) < 2:
-        return lines
-    sign = max("\t;,", key=rows[0].count)
-    cells = [row.strip().split(sign if sign in rows[0] else None) for row in rows]
-    if len(cells[0]) < 5 * _FEW_LINES or len(set(map(len, cells))) > 1:
+    longest = max(lines[:_FEW_LINES], key=len).strip(";, ")
+    sign = next((sign for sign in "\t;," if sign in longest), " ")
+    some = (re.sub(_BRACKETS, rf"\1{sign}\2", line.strip()) for line in lines[:_FEW_LINES])
+    cells = [row.split(sign if sign != " " else None) for row in some if row]
+    cells = [row for row in cells if len(row) >= 5 * _FEW_LINES]
+    if len(lines) > _FEW_LINES or len(cells) < 2 or len(set(map(len, cells))) > 1:
         return lines
     return ["\t".join(column) for column in zip(*cells, strict=True)]
 
 
+_BRACKETS: Final = re.compile(r"^['\"]?(\w+)['\"]?\s*[:=]\s*\[([^\[\]]*)\]\s*[;,]?$")
+"""``t = [0 0.1 0.2];``: MATLAB, Python, YAML."""
 _FEW_LINES: Final = 12
 
 
@@ -592,7 +594,8 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Say whether a row holds nothing but units: known ones, or all in brackets."""
     filled = [cell for cell in cells if cell]
     bracketed = all(re.fullmatch(r"[\[({<].*[\])}>]", cell) for cell in filled)
-    return bool(filled) and (bracketed or all(map(unit_of, filled)))
+    known = [unit_of(cell) is not None for cell in filled]
+    return any(known) and (bracketed or all(known))
 
 
 def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list[str]]:
@@ -635,7 +638,7 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
 
 def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     """Read a row under the names that holds units only."""
-    for line in below:
+    for line in reversed(below):  # "t A v" above "s rad rad/s" are symbols
         for cells in _splits(line.strip(" ").lstrip("#%"), layout):
             if len(cells) == layout.width and _are_units(cells):
                 return [cell.strip("[](){} ") for cell in cells]

@@ -114,15 +114,13 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
         return
     # Simulink's "structure with time" keeps the readings in NAME.signals.values.
     path = path.removesuffix(".signals.values").removesuffix(".values").removesuffix(".Data")
-    if array.ndim < 2:
-        yield path, np.atleast_1d(array).astype(np.float64)
-        return
-    tall = array if array.shape[0] >= array.shape[1] else array.T
-    if tall.shape[1] == 1:
-        yield path, np.ascontiguousarray(tall[:, 0], dtype=np.float64)
+    flat = np.atleast_1d(np.squeeze(array)).astype(np.float64)
+    tall = flat.T if flat.ndim > 1 and flat.shape[0] < flat.shape[1] else flat
+    if tall.ndim < 2:
+        yield path, tall
     elif tall.shape[1] <= 64:
-        for number in range(tall.shape[1]):
-            yield f"{path}({number + 1})", np.ascontiguousarray(tall[:, number], dtype=np.float64)
+        for number, column in enumerate(tall.T, start=1):
+            yield f"{path}({number})", np.ascontiguousarray(column)
 
 
 def _array_of_list(entries: list[Any]) -> Any:
@@ -154,27 +152,21 @@ def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
 
 def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """Keep one of several equal time columns, and put it first."""
-    clocks: list[FloatArray] = []
     first: dict[str, FloatArray] = {}
     rest: dict[str, FloatArray] = {}
     for name, values in columns.items():
-        if role_of(_last(name)) != "time":
-            rest[name] = values
-        elif not any(np.array_equal(values, clock) for clock in clocks):
-            clocks.append(values)
-            first[name] = values
+        clock = role_of(_last(name)) == "time"
+        if not clock or not any(np.array_equal(values, each) for each in first.values()):
+            (first if clock else rest)[name] = values
     return first | rest
 
 
 def _interval(arrays: dict[str, FloatArray]) -> float | None:
     for name, values in arrays.items():
         word = _last(name).lower()
-        if values.size != 1 or not _SLOWEST_HZ < values[0] < _FASTEST_HZ:
-            continue
-        if word in _RATES:
-            return float(1.0 / values[0])
-        if word in _INTERVALS:
-            return float(values[0])
+        known = values.size == 1 and _SLOWEST_HZ < values[0] < _FASTEST_HZ
+        if known and word in (*_RATES, *_INTERVALS):
+            return float(1.0 / values[0] if word in _RATES else values[0])
     return None
 
 

@@ -38,7 +38,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("angle", _DEGREE / 3600, "rad", "arcsec ″"),
     ("angle", 2 * pi, "rad", "rev revs turn turns revolution revolutions umdrehungen tours giri"),
     ("angle", pi, "rad", "half-turns"),
-    ("volts", 1.0, "V", "v volt volts vdc volt(s) voltios в"),
+    ("volts", 1.0, "V", "v volt volts vdc voltdc volt(s) voltios в"),
     ("volts", 1e-3, "V", "mv millivolt millivolts"),
     ("volts", 1e-6, "V", "µv uv microvolt microvolts"),
     ("volts", 1e3, "V", "kv"),
