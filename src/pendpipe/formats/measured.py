@@ -485,11 +485,10 @@ def _unit(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
         )
     bare = [other.values for other in choice.channels if not other.name]
-    if not column.name and any(9.6 < abs(np.nanmedian(values)) < 10.1 for values in bare):
-        why = (
-            "stands beside 9.8, as an accelerometer's readings do: taken to be in m/s^2; along the"
-        )
-        return _Guess(_GRAVITY, f"{why} string the pull swings twice a period", weak=True)
+    levels = [np.median(values) for values in bare if np.isfinite(values).all()]
+    if not column.name and any(9.6 < abs(level) < 10.1 for level in levels):
+        why = "stands beside 9.8, as an accelerometer's do: taken to be in m/s^2 (along the string"
+        return _Guess(_GRAVITY, f"{why} the pull swings twice in a period)", weak=True)
     return _angle_unit(table, choice, column, time_s)
 
 
