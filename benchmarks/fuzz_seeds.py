@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import io
+import lzma
 import re
 import struct
 import zipfile
@@ -56,7 +58,37 @@ def texts() -> list[bytes]:
             'MIN=0\t-1\nMAX=3\t1\nSCALE=3\t1\nDEC=1\t3\nDEF="Zeit" t / s\t"Winkel" w / rad\n'
             + rows("{t:.3f}\t{x:.4f}\n").replace(".", ",")
         ).encode(),
+        ("time,what,value\n" + rows("{t:.2f},theta,{x:.4f}\n{t:.2f},omega,1.5\n")).encode(),
+        ("ready\n" + rows("2024-05-01 12:00:{n:02d} t = {t:.2f} s, theta: {x:.3f} deg\n")).encode(),
+        (
+            "IGOR\nWAVES/D\tphi\nBEGIN\n" + rows("\t{x:.4f}\n") + "END\nX SetScale/P x,0,0.1,phi"
+        ).encode(),
+        ("TIMESERIES A, 40 sps, SLIST\n" + rows("{n}\t{n}\t{x:.3f}\n")).encode(),
+        ("Long Name\tTime\tAngle\nUnits\ts\trad\n" + rows("{n}\t{t:.2f}\t{x:.4f}\n")).encode(),
+        f"t: [{rows('{t:.2f}, ')}0]\ntheta: [{rows('{x:.4f}, ')}0]\n".encode(),
+        ("[" + rows('{{"t": "{t:.2f}", "sensor": "arm", "x": {x:.4f}}},') + "{}]").encode(),
     ]
+
+
+def opendocument() -> bytes:
+    """The content of an OpenDocument table, its cells and rows repeated."""
+    of = "<table-cell value='{}'/>"
+    body = rows(f"<table-row>{of.format('{t}')}{of.format('{x}')}</table-row>")
+    rest = (
+        "<table-row number-rows-repeated='9'><table-cell number-columns-repeated='99'/></table-row>"
+    )
+    return f"<body><table>{body}{rest}</table></body>".encode()
+
+
+def tdms() -> bytes:
+    """A recording of one channel as LabVIEW writes it."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    held = io.BytesIO()
+    with TdmsWriter(held) as writer:
+        told = {"wf_increment": 0.1, "unit_string": "deg"}
+        writer.write_segment([ChannelObject("log", "arm", swing()[1], told)])
+    return held.getvalue()
 
 
 def projects() -> list[tuple[str, bytes]]:
@@ -95,6 +127,10 @@ def projects() -> list[tuple[str, bytes]]:
         (".trk", (head + tracker).encode()),
         (".zip", zipped({"Raw Data.csv": texts()[0], "meta/time.csv": b"event,0\n"})),
         (".trz", zipped({"a.trk": (head + tracker).encode()})),
+        (".ods", zipped({"content.xml": opendocument()})),
+        (".csv.gz", gzip.compress(texts()[0])),
+        (".csv.xz", lzma.compress(texts()[0], preset=0)),
+        (".tdms", tdms()),
     ]
 
 

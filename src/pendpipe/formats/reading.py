@@ -65,10 +65,12 @@ _OTHERS: Final = (
 )
 """What some give that holds no table, or none that is read; by its first bytes."""
 
+_MOST_UNPACKING: Final = 64 << 20
+"""Bytes of memory that xz may ask for: nine times what it asks for as it is usually set."""
 _PACKED: Final[tuple[tuple[bytes, Callable[[], Any]], ...]] = (
     (b"\x1f\x8b", lambda: zlib.decompressobj(31)),
     (b"BZh", bz2.BZ2Decompressor),
-    (b"\xfd7zXZ\0", lzma.LZMADecompressor),
+    (b"\xfd7zXZ\0", lambda: lzma.LZMADecompressor(memlimit=_MOST_UNPACKING)),
 )
 
 _BY_LIBRARIES: Final = ("file of arrays", "zip archive")
