@@ -102,6 +102,18 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     assert found.steps[0].winner.identifier == leads
 
 
+def test_no_second_curve_is_swapped_in() -> None:
+    """One curve follows what no name explains; a second would only share it."""
+    found = diagnosed("circular-error").search
+    (step,) = found.steps
+    each = weigh(found, diagnosed("circular-error").beginning, step)
+    curve = next(rival for rival in step.rivals if rival.drawn)
+    each = each._replace(mates=(curve,), weights=np.array([0.0, 1.0, 0.0]))
+    assert weighing._likelier(found, step, each) is curve
+    drawn = replace(step, rivals=(curve,))
+    assert weighing._likelier(replace(found, steps=(step, drawn)), step, each) is None
+
+
 def test_a_wrong_parameter_replaces_missing_physics() -> None:
     """It is fitted then, and comes out right."""
     taken = next(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq
 
-from pendpipe.analysis.fit.least_squares import FRACTIONS, bounded_least_squares
+from pendpipe.analysis.fit.least_squares import bounded_least_squares
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
@@ -22,10 +24,10 @@ SETTLED: Final = 0.02
 """Expected fall of chi^2 below which a step is the last."""
 _LARGEST_RATIO: Final = 1.5
 """By which a scale (a time, a speed, a length) may change in one step."""
-_REFITTED_FRACTIONS: Final = (1.0, 0.3)
-"""The same where the linear values are refitted after the scales have moved."""
-_ENOUGH: Final = 0.5
-"""Part of the expected fall of chi^2 from which no further fraction is line_search."""
+_PRECISE: Final = 1e-11
+"""Singular value over the largest from which a direction is seen."""
+_RADIUS_MET: Final = 0.01
+"""Relative precision of the damping that gives a step its length."""
 _SHARE_SD: Final = 0.3
 """Prior about 0.5: one recording hardly constrains the hysteretic share of b."""
 
@@ -71,9 +73,14 @@ class GaussNewton:
         self._shapes = np.array(_shapes(model), dtype=np.int64)
         # A shape that must be positive is a scale: a speed, a time or a length.
         self._scales = self._shapes[self._low[self._shapes] > 0.0]
-        self._stay = np.zeros(model.size, dtype=bool)
-        self._stay[np.setdiff1d(self._shapes, self._scales)] = True
         self._factored: _Factored | None = None
+
+    def without_places(self, free: IntArray) -> IntArray:
+        """Return the values without those along which chi^2 has many minima.
+
+        These are the shapes that are no scales: the frequency of a line, an instant.
+        """
+        return free[~np.isin(free, np.setdiff1d(self._shapes, self._scales))]
 
     def evaluate_within_bounds(self, value: FloatArray) -> Evaluation:
         """Evaluate the model at values, clipped to the bounds."""
@@ -86,9 +93,17 @@ class GaussNewton:
         return Evaluation(value, at, residual, slip, self._model, self._noise)
 
     def step(
-        self, here: Evaluation, free: IntArray, columns: FloatArray | None = None
-    ) -> FloatArray:
-        """Return the best step of the free values for a linear model with these `columns`."""
+        self,
+        here: Evaluation,
+        free: IntArray,
+        radius: float = math.inf,
+        columns: FloatArray | None = None,
+    ) -> tuple[FloatArray, float]:
+        """Return the best step of a linear model with these `columns`, and its length.
+
+        The length, at most `radius`, is that of the changes that each value makes by itself in the
+        whitened readings (More 1978): values that compensate each other have long steps.
+        """
         low, high = self._low.copy(), self._high.copy()
         # The readings are linear in a scale over a fraction of it at most, and while the effect
         # is still small the step in its scale is arbitrary.
@@ -98,56 +113,16 @@ class GaussNewton:
         columns = here.columns if columns is None else columns
         if self._factored is None or not self._factored.is_of(columns, free):
             self._factored = _Factored.of(columns, free)
-        return _step(self._factored, here.residual, here.value, low, high)
+        return _step(self._factored, here.residual, here.value, low, high, radius)
 
     def forget(self) -> None:
         """Release the factored columns."""
         self._factored = None
 
-    def line_search(
-        self, here: Evaluation, step: FloatArray, free: IntArray, expected: float
-    ) -> Evaluation | None:
-        """Go along a step as far as it lowers chi^2; return None if no fraction does.
-
-        `expected` is the fall of chi^2 if the model were linear.
-        """
-        enough = here.chi2 + 0.5 * SETTLED
-        whole = self._evaluated(here.value + step)
-        if whole is not None and whole.chi2 < enough:
-            return whole
-        refitted = (self._refitted(here, part * step, free) for part in _REFITTED_FRACTIONS)
-        shorter = (self._evaluated(here.value + part * step) for part in FRACTIONS[1:])
-        lowest: Evaluation | None = None
-        for way in (refitted, shorter):
-            found = next((there for there in way if there and there.chi2 < enough), None)
-            if found and (lowest is None or found.chi2 < lowest.chi2):
-                lowest = found
-            if lowest and here.chi2 - lowest.chi2 > _ENOUGH * expected:
-                break
-        return lowest
-
-    def _refitted(self, here: Evaluation, step: FloatArray, free: IntArray) -> Evaluation | None:
-        """Move the scales along a step, then refit sizes and baseline at the new scales.
-
-        Two laws of friction that replace each other leave the motion unchanged except in second
-        order: the frequency changes by g^2, which accumulates over the whole record. Other
-        shapes (the frequency of a line, an instant) stay fixed, because chi^2 has many minima
-        along them.
-        """
-        if not np.isin(self._scales, free).any():
-            return None
-        there = self._evaluated(here.value + np.where(self._stay, 0.0, step))
-        if there is None:
-            return None
+    def moved(self, here: Evaluation, step: FloatArray) -> Evaluation | None:
+        """Evaluate the model a step away, within the bounds; None where it has no motion."""
         try:
-            further = self.step(there, free[~np.isin(free, self._shapes)])
-        except NoMotionError:
-            return None
-        return self._evaluated(there.value + further)
-
-    def _evaluated(self, value: FloatArray) -> Evaluation | None:
-        try:
-            return self.evaluate_within_bounds(value)
+            return self.evaluate_within_bounds(here.value + step)
         except NoMotionError:
             return None
 
@@ -208,17 +183,39 @@ class _Factored:
 
 
 def _step(
-    factored: _Factored, residual: FloatArray, value: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray:
-    """Solve for the Gauss-Newton step, the best within the bounds."""
+    factored: _Factored,
+    residual: FloatArray,
+    value: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    radius: float,
+) -> tuple[FloatArray, float]:
+    """Solve for the step, the best within the bounds and no longer than `radius`."""
     step, free, scale = np.zeros(len(value)), factored.free, factored.scale
-    right = factored.basis.T @ residual
-    solved = np.linalg.lstsq(factored.triangle, right, rcond=1e-11)[0]
     floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
-    if np.any(solved < floor) or np.any(solved > ceiling):
-        solved = bounded_least_squares(factored.triangle, right, floor, ceiling)
-    step[free] = solved / scale
+    matrix, right = factored.triangle, factored.basis.T @ residual
+    best = np.linalg.lstsq(matrix, right, rcond=_PRECISE)[0]
+    if np.linalg.norm(best) > radius:
+        damping = math.sqrt(_damping(matrix, right, radius)) * np.eye(len(free))
+        matrix, right = np.vstack([matrix, damping]), np.append(right, np.zeros(len(free)))
+        best = np.linalg.lstsq(matrix, right, rcond=_PRECISE)[0]
+    if np.any(best < floor) or np.any(best > ceiling):
+        best = bounded_least_squares(matrix, right, floor, ceiling)
+    step[free] = best / scale
     limit = 0.05 * value[OMEGA]
     if abs(step[OMEGA]) > limit:
         step *= limit / abs(step[OMEGA])
-    return step
+    return step, float(np.linalg.norm(best))
+
+
+def _damping(triangle: FloatArray, right: FloatArray, radius: float) -> float:
+    """Return the damping that gives a step the length `radius`; with none it is longer."""
+    left, singular, _ = np.linalg.svd(triangle)
+    seen = singular > _PRECISE * singular[0]
+    pull, squares = (singular * (left.T @ right))[seen], singular[seen] ** 2
+
+    def longer(damping: float) -> float:
+        return float(np.linalg.norm(pull / (squares + damping))) - radius
+
+    # The step is shorter than the gradient over the damping.
+    return float(brentq(longer, 0.0, float(np.linalg.norm(pull)) / radius, rtol=_RADIUS_MET))

@@ -10,12 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.gauss_newton import SETTLED, Evaluation, GaussNewton
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import C
 from pendpipe.effects.model import Evaluated, Model
 
 ROUNDS: Final = 14
@@ -27,6 +26,13 @@ _SLOW_GAIN: Final = 0.25
 """Fall of chi^2: a fit ends after three rounds that gain less."""
 _LAST_STEPS: Final = 3
 """Last steps from which the gain of further ones is extrapolated."""
+_TRIES: Final = 6
+_POOR: Final = 0.25
+_GOOD: Final = 0.75
+"""Parts of the expected gain below (above) which a step was too long (may be longer)."""
+_SHORTER: Final = 0.25
+_LONGER: Final = 2.0
+"""Radius of the next step over the length of the last; with the two above as More (1978) has."""
 _NUMBERS: Final = 100.0
 """What a misfit beyond the noise is described by at most: chi^2 counts against each of them."""
 _FAR_BEYOND_SD: Final = 3.0
@@ -128,7 +134,7 @@ def refine(
     rounds: int = ROUNDS,
     useful: float = math.inf,
 ) -> Fit:
-    """Minimise chi^2 by Gauss-Newton steps, within the bounds.
+    """Minimise chi^2 by Gauss-Newton steps, within the bounds and a radius of trust.
 
     Where model and readings are far out of phase, the residual is taken along the motion
     (amplitude and unwrapped phase, cycle by cycle), so that it stays linear. A fit that
@@ -199,6 +205,7 @@ class Refining:
         self._steps = GaussNewton(model, data, noise)
         self._here = self._steps.evaluate_within_bounds(start)
         self._gains: list[float] = []
+        self._radius = math.inf
         self._stalled = ((2, little), (3, max(little, _SLOW_GAIN)))
         self._ended = self._converged = False
 
@@ -239,28 +246,58 @@ class Refining:
         return len(last) == _LAST_STEPS and self.chi2 - left * sum(last) / _LAST_STEPS > useful
 
     def _round(self) -> None:
-        here, free, steps = self._here, self._free, self._steps
-        settled = SETTLED * self._unit
-        step = steps.step(here, free)
-        expected = _expected(here, here.columns, step)
-        better = steps.line_search(here, step, free, expected)
-        direct = better is not None
-        if better is None and C in free:
-            # More friction would stop the motion before the last reading: move the others first.
-            others = free[free != C]
-            step = steps.step(here, others)
-            better = steps.line_search(here, step, others, _expected(here, here.columns, step))
-        if better is None:
-            self._ended, self._converged = True, expected < 10.0 * settled
-            return
-        self._here = better
-        gained = here.chi2 - better.chi2
+        """Go one step: the whole one if chi^2 falls by what it promises, else a shorter one."""
+        here, steps, free = self._here, self._steps, self._free
+        settled, still = SETTLED * self._unit, steps.without_places(self._free)
+        tries = 0
+        while True:
+            step, length = steps.step(here, free, self._radius)
+            expected = _expected(here, here.columns, step)
+            there = steps.moved(here, step)
+            if tries == 0 and len(still) < len(free) and (not there or there.chi2 > here.chi2):
+                tries, free = 1, still
+                continue
+            there = self._corrected(there, free, expected)
+            gained = here.chi2 - there.chi2 if there else -math.inf
+            if gained < _POOR * expected:
+                self._radius = _SHORTER * length
+            elif gained > _GOOD * expected:
+                self._radius = max(self._radius, _LONGER * length)
+            if gained > -0.5 * SETTLED:
+                break
+            tries += 1
+            if tries > _TRIES or expected < settled:
+                self._ended, self._converged = True, expected < 10.0 * settled
+                return
+        assert there is not None
+        self._here = there
         self._gains.append(gained)
         if expected < settled or (gained < settled and expected < 50.0 * settled):
             self._ended = self._converged = True
-        elif direct and abs(expected - gained) < _LINEAR_WITHIN * expected:
+        elif tries == 0 and abs(expected - gained) < _LINEAR_WITHIN * expected:
             self._settle(here)
         self._ended |= self._stalls()
+
+    def _corrected(
+        self, there: Evaluation | None, free: IntArray, expected: float
+    ) -> Evaluation | None:
+        """Step back to where chi^2 is what it should be, with the derivatives at the start.
+
+        Two laws of friction that replace each other leave the motion unchanged to first order; to
+        second order the frequency changes, which accumulates over the record. A correction no
+        longer than what was not expected of the readings leaves the exchange as it is.
+        """
+        here = self._here
+        while there is not None:
+            missing = expected - (here.chi2 - there.chi2)
+            if missing <= (1.0 - _POOR) * max(expected, 0.0):
+                break
+            step, _ = self._steps.step(there, free, math.sqrt(missing), here.columns)
+            nearer = self._steps.moved(there, step)
+            if nearer is None or expected - (here.chi2 - nearer.chi2) > _POOR * missing:
+                break
+            there = nearer
+        return there
 
     def _stalls(self) -> bool:
         """Whether steps no longer gain what is expected.
@@ -282,10 +319,12 @@ class Refining:
         if not np.all(np.any(before.columns[:, self._free], axis=0)):
             # The shape of an effect had no influence while its size was zero.
             return
-        step = self._steps.step(here, self._free, before.columns)
+        step, _ = self._steps.step(here, self._free, columns=before.columns)
         expected = _expected(here, before.columns, step)
         if expected < SETTLED * self._unit:
-            self._here = self._steps.line_search(here, step, self._free, expected) or here
+            there = self._steps.moved(here, step)
+            if there and there.chi2 < here.chi2 + 0.5 * SETTLED:
+                self._here = there
             self._ended = self._converged = True
 
 

@@ -302,12 +302,16 @@ def _likelier(found: Search, step: Step, weighed: Weighed) -> Rival | None:
         (float(weight), rival)
         for rival, weight in zip(weighed.mates, weighed.weights[1:], strict=False)
         if rival.lead.effect.key not in present
-        # What no model explains has its curve already, on top of the names.
-        and not (rival.drawn and found.remainder.systematic)
+        # What no model explains has its curve already, on top of the names, and one is enough.
+        and not (rival.drawn and (found.remainder.systematic or _has_curve(found.steps, step)))
         and weight
         > weighed.weights[0] * (_LIKELIER_CURVE if rival.drawn and not own.drawn else _LIKELIER)
     ]
     return max(likelier, key=lambda each: each[0], default=(0.0, None))[1]
+
+
+def _has_curve(steps: Sequence[Step], but: Step) -> bool:
+    return any(step.winner.drawn for step in steps if step is not but)
 
 
 def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search | None:
