@@ -506,20 +506,17 @@ def _reach(finite: FloatArray) -> float:
 
 def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
     """Doubt a header that gives the one unit of angles where the period shows the other."""
-    if written.kind != "angle":
-        return None
     reach = _reach(column.values[np.isfinite(column.values)])
-    if written.factor == _DEGREE.factor and 0.3 < reach < 3.0:
-        other, name, headed = _RADIAN, "radians", "degrees"
-    elif written.factor == 1.0 and 3.6 < reach < 170.0:
-        other, name, headed = _DEGREE, "degrees", "radians"
-    else:
-        return None
-    slope = follows_sine(time_s, column.values, other.factor)
-    if slope is None or abs(slope - 1.0) > 0.25:
-        return None
-    why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
-    return _Guess(other, why, weak=True)
+    for unit, headed, least, most, other, name in (
+        (_DEGREE, "degrees", 0.3, 3.0, _RADIAN, "radians"),
+        (_RADIAN, "radians", 3.6, 170.0, _DEGREE, "degrees"),
+    ):
+        doubtful = written == unit and least < reach < most
+        slope = follows_sine(time_s, column.values, other.factor) if doubtful else None
+        if slope is not None and abs(slope - 1.0) <= 0.25:
+            why = f"is headed in {headed}, but its period grows as a swing in {name} does"
+            return _Guess(other, f"{why}: taken as such", weak=True)
+    return None
 
 
 def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess:

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, ByteArray, FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats.choose import Choice, choose
 from pendpipe.formats.measured import Readings, TimeBase, readings, refuse_text, time_base
@@ -231,18 +231,21 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         refuse_text(table, column, "correct the row, or leave it blank")
     base = time_base(table, choice, options)
     found = converted(table, choice, base, options)
-    values = found.values[base.rows]
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
-    values = _without_marks(values / found.factor, notes) * found.factor
-    quality = _quality(table, values, base)
-    if quality is not None:
-        notes.append(f"{np.sum(quality == MISSING)} row(s) without a reading, marked missing")
-    drawn = made_up(base.time_s, values)
-    if drawn.any():
-        notes.append(f"{_where(base.time_s, drawn)} on a straight line: interpolated, not measured")
-        quality = np.where(drawn, MISSING, GOOD if quality is None else quality).astype(np.uint8)
-    if base.time_s.size and base.time_s[0] < 0:
-        notes.append(f"the times begin at {base.time_s[0]:.6g} s, before their zero")
+    values = _without_marks(found.values[base.rows] / found.factor, notes) * found.factor
+    _refuse_infinite(table, values, base)
+    missing, drawn = np.isnan(values), made_up(base.time_s, values)
+    start = base.time_s[0] if base.time_s.size else 0.0
+    for said, note in (
+        (missing.any(), f"{missing.sum()} row(s) without a reading, marked missing"),
+        (
+            drawn.any(),
+            f"{_where(base.time_s, drawn)} on a straight line: interpolated, not measured",
+        ),
+        (start < 0, f"the times begin at {start:.6g} s, before their zero"),
+    ):
+        notes += [note] * bool(said)
+    quality = np.where(missing | drawn, MISSING, GOOD).astype(np.uint8)
     metadata = {**_kept(table), **base.metadata, **_markers(table.markers)}
     if found.quantity == "reading":
         metadata["unit"] = found.unit
@@ -251,7 +254,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         time_s=np.ascontiguousarray(base.time_s),
         values=np.ascontiguousarray(values),
         quantity=found.quantity,
-        quality=quality,
+        quality=quality if quality.any() else None,
         metadata=metadata,
         resolution=own_step * found.factor if own_step is not None else resolution(values),
         notes=tuple(notes),
@@ -294,15 +297,12 @@ def converted(table: Table, choice: Choice, base: TimeBase, options: ReadOptions
     return readings(table, choice, options, time_s)
 
 
-def _quality(table: Table, values: FloatArray, base: TimeBase) -> ByteArray | None:
-    """Mark rows without a reading as missing; infinity is a fault."""
+def _refuse_infinite(table: Table, values: FloatArray, base: TimeBase) -> None:
     odd = np.flatnonzero(np.isinf(values))
     if odd.size:
         where = table.where(int(base.rows[odd[0]]))
         problem = f"{odd.size} reading(s) that are infinite"
         raise InputError(where, problem, "drop the rows, or leave the cells blank")
-    missing = np.isnan(values)
-    return np.where(missing, MISSING, GOOD).astype(np.uint8) if missing.any() else None
 
 
 def _kept(table: Table) -> dict[str, str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.special import ellipk
 
 from pendpipe.arrays import BoolArray, FloatArray
 
@@ -150,10 +151,10 @@ def made_up(time: FloatArray, values: FloatArray) -> BoolArray:
 def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float | None:
     """How nearly the period grows with the amplitude as a pendulum's does.
 
-    A pendulum's period is that of small swings over the arithmetic-geometric mean of 1 and
-    cos(A/2); a reading is so many `radians` to its unit. The answer is the slope of the
-    logarithm of the measured period against that of the predicted: 1 if it is so, 0 if the
-    period is constant.
+    A pendulum's period is proportional to the complete elliptic integral K of the parameter
+    sin(A/2)^2; a reading is so many `radians` to its unit. The answer is the slope of the logarithm
+    of the measured period against that of the predicted: 1 if it is so, 0 if the period is
+    constant.
 
     Returns
     -------
@@ -165,8 +166,7 @@ def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float 
     lasted, angle = lasted[keep], radians * size[keep]
     if len(lasted) < 8 or angle.max() > 3.0:
         return None
-    expected = -np.log(_mean_of_gauss(np.cos(0.5 * angle)))
-    found = np.log(lasted)
+    expected, found = np.log(ellipk(np.sin(0.5 * angle) ** 2)), np.log(lasted)
     for _ in range(2):
         across = expected - expected.mean()
         spread = float(across @ across)
@@ -178,14 +178,6 @@ def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float 
         near = np.abs(rest) <= 4.0 * np.median(np.abs(rest))
         expected, found = expected[near], found[near]
     return slope if sd < 0.15 else None
-
-
-def _mean_of_gauss(other: FloatArray) -> FloatArray:
-    """Arithmetic-geometric mean of 1 and `other`."""
-    one = np.ones_like(other)
-    for _ in range(6):
-        one, other = 0.5 * (one + other), np.sqrt(one * other)
-    return one
 
 
 def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) -> float | None:

@@ -168,18 +168,28 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
             f"the WinDaq header is damaged ({count} channels of {entry} bytes at {table})"
         )
     interval = float(told["interval_s"])
-    if not 1e-7 < interval < 1e6:
-        if options.sample_rate is None:
-            raise damaged(
-                f"the WinDaq header is damaged (sample interval {interval:g} s)",
-                "give the true rate with --sample-rate",
-            )
-        notes.append(f"the sample interval in the header ({interval:g} s) can't be true")
-        interval = 1.0 / options.sample_rate
-    if told["compression"] < 1:  # WinDaq itself refuses such a file, by its byte 44
-        notes.append(
-            f"the header's compression of the display ({told['compression']}) can't be true"
+    hires, packed = bool(told["flags"] & _HIRES), bool(told["flags"] & _PACKED)
+    false = not 1e-7 < interval < 1e6
+    if false and options.sample_rate is None:
+        raise damaged(
+            f"the WinDaq header is damaged (sample interval {interval:g} s)",
+            "give the true rate with --sample-rate",
         )
+    form = "HiRes" if hires else "14-bit"
+    for odd, note in (
+        (false, f"the sample interval in the header ({interval:g} s) can't be true"),
+        # WinDaq itself refuses such a file, by its byte 44.
+        (
+            told["compression"] < 1,
+            f"the header's compression of the display ({told['compression']}) can't be true",
+        ),
+        (
+            suffix in SUFFIXES and (suffix in (".wdh", ".whc")) != hires,
+            f"the header is that of {form}, the name {place.suffix} is not: the header is believed",
+        ),
+    ):
+        notes += [note] * bool(odd)
+    interval = 1.0 / options.sample_rate if false and options.sample_rate else interval
     channels: list[Channel] = []
     for each in np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table):
         # DOS wrote the degree sign as byte 0xF8, which is another letter today.
@@ -190,15 +200,9 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         if not (0.0 < abs(slope) < _LARGEST_SCALE > abs(intercept)):
             raise damaged(f"the scale of channel {number} is damaged ({slope:g})")
         channels.append(Channel(number, slope, intercept, unit, divisor=divisor))
-    hires, packed = bool(told["flags"] & _HIRES), bool(told["flags"] & _PACKED)
     # A scan without a word would let a damaged header claim any number of scans.
     if packed and min(channel.divisor for channel in channels) > 1:
         raise damaged("no channel of this packed file is in every scan")
-    if suffix in SUFFIXES and (suffix in (".wdh", ".whc")) != hires:
-        notes.append(
-            f"the header is that of {'HiRes' if hires else '14-bit'}, the name {place.suffix} is"
-            " not: the header is believed"
-        )
     return WindaqHeader(
         told,
         size,
