@@ -27,7 +27,7 @@ from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
-from pendpipe.diagnosis.task import Task, applicable
+from pendpipe.diagnosis.task import Task, applicable, undrawn
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
@@ -66,7 +66,8 @@ def _chosen(names: int) -> float:
 
 def _is_further(step: Step) -> bool:
     effect = step.winner.lead.effect
-    return not (effect.expected or effect.parameter_free or effect.kind in ("unnamed", "parameter"))
+    known = effect.expected or effect.parameter_free or isinstance(effect, ReleasedParameter)
+    return not (known or effect.kind == "unnamed")
 
 
 def improve(state: State, progress: Progress) -> None:
@@ -211,9 +212,8 @@ def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
 
 def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
     """Return the curves with the coefficients that the recording resolves."""
-    present = {effect.key for effect in bare.model.effects}
-    drawn = [curve(bare.at.span) for curve in (*CURVES, *FOLLOW_UP_CURVES)]
-    drawn = [curve for curve in drawn if curve.key not in present and in_time >= curve.in_time]
+    curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), bare)
+    drawn = [curve for curve in curves if in_time >= curve.in_time]
     seen = build_bank(bare, state.noise, drawn).candidates
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from scipy.fft import dct, idct
@@ -70,6 +70,8 @@ class Noise:
         The cosines about the harmonics, from which S was not estimated, shape (n,).
     """
 
+    known: ClassVar[bool] = False
+    """Whether it is not to be estimated again."""
     variance: FloatArray
     weight: FloatArray
     level: FloatArray | None = None

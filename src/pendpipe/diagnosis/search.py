@@ -38,7 +38,7 @@ from pendpipe.quantities import compact
 _MOST_EFFECTS: Final = 4
 _TRIED: Final = 3
 """Rivals tried in their order where the best predicts worse."""
-_LESS_FRICTION: Final = (0.9, 0.7, 0.4)
+LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
 
@@ -131,10 +131,16 @@ def search(
     forensics = Forensics(samples, level)
     task = Task(catalogue, released, baseline, level, seed, forensics, progress)
     known_law_first(beginning, state, task)
+    return grown(state, task, beginning)
+
+
+def grown(state: State, task: Task, beginning: Beginning) -> Search:
+    """Add effects to a state, until chance explains the rest."""
     _grow(state, task)
     named = _described(state, task)
     remainder = remainder_of(state.fit, state.data, state.noise)
-    forensics.after(state, progress)
+    forensics = task.forensics
+    forensics.after(state, task.progress)
     improved = replace(state.fit, error_scale=remainder.error_scale)
     assert state.first is not None
     assert state.now is not None
@@ -195,8 +201,8 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     else:
         model = model.at_times(read.time_s)
         data = replace(data, time_s=read.time_s, values=read.values, uniform=read.uniform)
-    starts = [state.bare, beginning.value]
-    for share in _LESS_FRICTION:
+    starts = [beginning.value]
+    for share in LESS_FRICTION:
         starts.append(state.bare.copy())
         starts[-1][C] *= share
     fit = best_fit(model, data, state.noise, starts, held=beginning.held)
@@ -211,7 +217,7 @@ def _add_one(state: State, task: Task) -> bool:
     effects = task.scanned(state)
     assert state.now is not None
     chance = state.now.p_value > task.threshold
-    if state.noise.coloured and not gross and (chance or not state.steps):
+    if state.noise.coloured and not state.noise.known and not gross and (chance or not state.steps):
         reconsider_red_noise(state, effects, task.level, task.seed, progress)
     if state.now.p_value > task.threshold or _ends_with_curve(state):
         return False

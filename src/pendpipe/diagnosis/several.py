@@ -6,30 +6,40 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
-from pendpipe.analysis.fit.result import Baseline
-from pendpipe.arrays import FloatArray
+from pendpipe.analysis.fit.result import Baseline, units
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.chance import printed
-from pendpipe.diagnosis.joint import Joint, Named, Released, Together, may_be_common
-from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE, FILE_NAME, FoundEffect, Location
+from pendpipe.diagnosis.held_out import held_out
+from pendpipe.diagnosis.joint import happened, search_together
+from pendpipe.diagnosis.refine import Fit, best_fit
+from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.result import (
+    COLOURED_NOISE,
+    FILE_NAME,
+    Diagnosis,
+    FittedModel,
+    FoundEffect,
+    Location,
+)
 from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
+from pendpipe.diagnosis.search import Search
+from pendpipe.diagnosis.statement import statement
+from pendpipe.diagnosis.values import constants_of
+from pendpipe.diagnosis.weighing import effect_named, law_of
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import BASELINE, OMEGA
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.derivatives import jacobian
+from pendpipe.effects.stack import MAY_DIFFER, Differs
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact
 from pendpipe.recording import Recording
 
-PARAMETERS: Final = {"a": "a", "b": "b", "c": "c", "frequency": "omega"}
-"""What may be shared, and its name in the vector of values."""
-_UNITS: Final = {"a": "1/(rad s)", "b": "1/s", "c": "rad/s", "frequency": "Hz"}
 _HEAD: Final = 0.25
 """Part of a predicted recording to which its own values (its start) are fitted."""
 _Z95: Final = 1.959963984540054
@@ -109,8 +119,8 @@ def diagnose_several(
     """
     if len(recordings) < 2:
         raise InputError("diagnose", "one recording is not several", "give at least two")
-    if unknown := [name for name in own if name not in PARAMETERS]:
-        remedy = f"known are {', '.join(PARAMETERS)}"
+    if unknown := [name for name in own if name not in MAY_DIFFER]:
+        remedy = f"known are {', '.join(MAY_DIFFER)}"
         raise InputError("--own", f"'{unknown[0]}' is no parameter that can be shared", remedy)
     outcomes = []
     for recording, name in zip(recordings, names, strict=True):
@@ -120,374 +130,273 @@ def diagnose_several(
                 recording, baseline=baseline, level=level, seed=seed, place=name, progress=progress
             )
         )
-    units = {outcome.search.data.unit for outcome in outcomes}
-    if len(units) > 1:
+    if len({outcome.search.data.unit for outcome in outcomes}) > 1:
         raise InputError("diagnose", "angles and displacements are mixed", "give one kind")
-    joint = Joint(
-        [outcome.search for outcome in outcomes],
-        baseline=baseline,
-        level=level,
-        same_sensor=same_sensor,
-        own=[PARAMETERS[name] for name in own],
-        progress=progress,
-    )
     progress("all together")
     try:
-        together, named = joint.settled()
-        bare = joint.fitted((), joint.own)
+        found, weighed = search_together(
+            outcomes,
+            baseline=baseline,
+            level=level,
+            seed=seed,
+            same_sensor=same_sensor,
+            own=own,
+            progress=progress,
+        )
     except NoMotionError as error:
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
-    answer = _Answer(joint, outcomes, names, together, named, bare, level, baseline)
-    return JointOutcome(answer.content(dict(provenance or {})), answer.effects, tuple(outcomes))
-
-
-class _Answer:
-    """Turns the fit of all recordings into ``diagnosis.json``."""
-
-    def __init__(
-        self,
-        joint: Joint,
-        outcomes: Sequence[Outcome],
-        names: Sequence[str],
-        together: Together,
-        named: Sequence[Named],
-        bare: Together | None,
-        level: float,
-        baseline: str,
-    ) -> None:
-        self.joint, self.outcomes, self.names = joint, outcomes, names
-        self.together, self.named, self.bare = together, named, bare
-        self.level, self.baseline = level, baseline
-        self.unit = outcomes[0].search.data.unit
-        self.released = [each for each in together.released if each not in joint.own]
-        self.events = [
-            (name, each)
+    law = law_of(found, weighed)
+    after = _Answer(found, found.improved, law, outcomes, names, own)
+    before = replace(after, improved=found.baseline, law=found.baseline)
+    named, differing = [], []
+    for step, each in zip(found.steps, weighed, strict=True):
+        effect, one = step.winner.lead.effect, effect_named(found, step, each)
+        if isinstance(effect, Differs):
+            differing.append(after.contradiction(effect, one))
+        else:
+            everywhere = Location(summary=f"it shows in all {len(names)} recordings together")
+            named.append(replace(one, location=everywhere))
+    events = [
+        replace(each, location=replace(each.location, summary=f"in {name} alone"))
+        for name, outcome, part in zip(names, outcomes, law.at.parts, strict=True)
+        for each in outcome.effects
+        if each.kind not in ("unnamed", "parameter")
+        and (
+            each.identifier in {one.identifier for one in part.model.effects if happened(one)}
+            or not by_identifier(each.identifier).has_signature
+        )
+    ]
+    p_value = min([found.p_value, *(outcome.diagnosis.p_value for outcome in outcomes)])
+    p_value = min(1.0, (len(outcomes) + 1) * p_value)
+    effects = (*named, *differing, *events)
+    told = [after.recording(number) for number in range(len(names))]
+    missing = any(each.identifier != COLOURED_NOISE for each in effects)
+    noise_rms = _rms([outcome.diagnosis.noise_rms_rad for outcome in outcomes])
+    held = (
+        held_out(found.baseline, found.improved, found.data, found.noise, found.held, found.held)
+        if named
+        else None
+    )
+    models = (before.model() if named else after.model(), after.model())
+    text = statement(
+        baseline,
+        *models,
+        named,
+        held,
+        noise_rms,
+        p_value,
+        found.unexplained,
+        level,
+        unit=found.data.unit,
+        remainder=found.remainder,
+    )
+    diagnosis = Diagnosis(
+        baseline,
+        before.model(),
+        after.model(),
+        noise_rms,
+        "missing-physics" if missing else "consistent",
+        p_value,
+        effects,
+        held,
+        after.model().residual_rms_rad,
+        found.unexplained,
+        " ".join((after.opening(), _of_several(text), *after.closing(differing, events, told))),
+        warnings=tuple(
+            f"{name}: {line}"
             for name, outcome in zip(names, outcomes, strict=True)
-            for each in outcome.effects
-            if each.kind != "unnamed" and not may_be_common(by_identifier(each.identifier))
-        ]
-        self.effects = (
-            *map(self._effect, named),
-            *map(self._contradiction, self.released),
-            *(
-                replace(each, location=replace(each.location, summary=f"in {name} alone"))
-                for name, each in self.events
-            ),
-        )
+            for line in outcome.diagnosis.warnings
+        ),
+        remainder=found.remainder,
+        provenance=dict(provenance or {}),
+    )
+    content = {**diagnosis.to_dict(), "recordings": told}
+    return JointOutcome(content, effects, tuple(outcomes))
 
-    def content(self, provenance: dict[str, Any]) -> dict[str, Any]:
-        """Return the whole answer."""
-        before = self._p_value(self.bare) if self.bare else 0.0
-        alone = min(outcome.diagnosis.p_value for outcome in self.outcomes)
-        p_value = min(1.0, (len(self.outcomes) + 1) * min(before, alone))
-        recordings = [self._recording(number) for number in range(len(self.outcomes))]
-        after = self._model(self.together)
-        unexplained = self._p_value(self.together)
-        missing = any(each.identifier != COLOURED_NOISE for each in self.effects)
-        return {
-            "schema_version": 1,
-            "baseline": {"name": self.baseline, **self._model(self.bare)},
-            "noise_rms_rad": _rms([outcome.diagnosis.noise_rms_rad for outcome in self.outcomes]),
-            "verdict": "missing-physics" if missing else "consistent",
-            "p_value": p_value,
-            "effects": [each.as_json() for each in self.effects],
-            "improved": after,
-            "held_out": dict.fromkeys(
-                ("log_density_before", "log_density_after", "gain", "gain_sd")
-            ),
-            "unexplained": {"residual_rms_rad": after["residual_rms_rad"], "p_value": unexplained},
-            "recordings": recordings,
-            "statement": self._statement(recordings, p_value, unexplained),
-            "figures": [],
-            "warnings": [
-                f"{name}: {line}"
-                for name, outcome in zip(self.names, self.outcomes, strict=True)
-                for line in outcome.diagnosis.warnings
-            ],
-            "provenance": provenance,
+
+def _of_several(text: str) -> str:
+    """Return a statement about one recording as one about several."""
+    text = text.replace("his recording alone cannot", "hey cannot even together")
+    return text.replace("this recording", "them").replace("of the record (", "of the records (")
+
+
+class _Prediction(NamedTuple):
+    """How a recording is predicted from the others (`recordings` of ``diagnosis.json``)."""
+
+    fitted_readings: int
+    predicted_readings: int
+    rms_rad: float
+    expected_rms_rad: float
+    within_95: float
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What a fit of all recordings says of each."""
+
+    found: Search
+    improved: Fit
+    law: Fit
+    outcomes: Sequence[Outcome]
+    names: Sequence[str]
+    own: Sequence[str]
+
+    @property
+    def differing(self) -> set[str]:
+        """What the recordings contradict each other in."""
+        effects = self.improved.model.effects
+        return {each.parameter for each in effects if isinstance(each, Differs)}
+
+    def model(self) -> FittedModel:
+        """Return the shared values, and what the model leaves."""
+        data, fit = self.found.data, self.improved
+        left = data.residual(fit.at.reading)[data.weight > 0.0]
+        shared = {
+            name: value
+            for name, value in constants_of(self.law, data.unit).items()
+            if name in MAY_DIFFER and name not in {*self.own, *self.differing}
         }
+        return FittedModel(shared, _rms(left), fit.chi2 / max(data.used - len(fit.free), 1))
 
-    def _p_value(self, model: Together) -> float:
-        """Return the global p-value of the largest score, and of what sharing costs."""
-        chi2, freedom = self.joint.disagreement(model)
-        shared = float(chdtrc(max(freedom, 1), chi2))
-        leads = self.joint.leads(model)
-        scores = [self.joint.p_value(lead, lead.score) for lead in leads]
-        return min(1.0, 2.0 * min([shared, *scores]))
+    def of_recording(self, name: str, number: int) -> Estimate:
+        """Return one recording's value of a parameter."""
+        fit = self.improved if name in self.differing else self.law
+        row = fit.at.parts[number].mixing[MAY_DIFFER[name]]
+        scale = 0.5 / math.pi if name == "frequency" else 1.0
+        value = scale * float(row @ fit.value)
+        half = _Z95 * (sd := scale * math.sqrt(max(float(row @ fit.covariance() @ row), 0.0)))
+        return Estimate(value, sd, units(self.found.data.unit)[name], (value - half, value + half))
 
-    def _model(self, model: Together | None) -> dict[str, Any]:
-        if model is None:
-            return {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
-        residuals, chi2, used = [], 0.0, 0
-        for fit, member in zip(model.fits, self.joint.members, strict=True):
-            data = member.found.data
-            residuals.append(data.residual(fit.at.reading)[data.weight > 0.0])
-            chi2, used = chi2 + fit.chi2, used + data.used
-        return {
-            "parameters": {
-                name: each.as_json() for name, each in self._shared(model).items() if each
-            },
-            "residual_rms_rad": _rms(np.concatenate(residuals)),
-            "chi2_per_dof": chi2 / max(used - len(model.layout.keys), 1),
-        }
-
-    def _shared(self, model: Together) -> dict[str, Estimate | None]:
-        return {
-            name: _estimate(model, key, _UNITS[name], name == "frequency")
-            for name, key in PARAMETERS.items()
-        }
-
-    def _effect(self, named: Named) -> FoundEffect:
-        """Return one effect with its shared values."""
-        rival, effect = named.rival, named.rival.lead.effect
-        first = effect.parameter_free
-        found = {}
-        if self.joint.is_shared(effect):
-            for index, parameter in enumerate(effect.parameters):
-                key, unit = (effect.key, first + index), parameter.unit_in(self.unit)
-                found[parameter.name] = _estimate(self.together, key, unit)
-        return FoundEffect(
-            effect.identifier,
-            effect.name,
-            effect.kind,
-            effect.equation,
-            {name: each for name, each in found.items() if each},
-            rival.gain,
-            self.joint.p_value(rival.lead, rival.gain),
-            float(named.weights[0]),
-            tuple(
-                (mate.identifier, float(weight))
-                for mate, weight in zip(named.mates, named.weights[1:], strict=False)
-            ),
-            effect.discriminating_test,
-            Location(summary=f"in all {len(self.names)} recordings"),
-        )
-
-    def _contradiction(self, released: Released) -> FoundEffect:
-        """Return what the recordings contradict each other in."""
-        name = _name(released)
-        where = "all" if released.recording is None else self.names[released.recording]
+    def contradiction(self, effect: Differs, found: FoundEffect) -> FoundEffect:
+        """Return what the recordings contradict each other in, with each one's value."""
         values = {
-            each: found
-            for number, each in enumerate(self.names)
-            if (found := self._own(self.together, number, name)) is not None
+            name: self.of_recording(effect.parameter, number)
+            for number, name in enumerate(self.names)
         }
-        gain = self.joint.cost(self.together, released)
-        more = len(self.names) - 1 if released.recording is None else 1
-        return FoundEffect(
-            f"parameter-{name}",
-            f"{name} differs between the recordings",
-            "parameter",
-            name,
-            values,
-            gain,
-            float(chdtrc(more, gain)),
-            1.0,
-            (),
-            "record each of them once more, in another order",
-            Location(summary=f"in {where}"),
+        where = self.names[effect.recording]
+        name = f"{where} contradicts the others in {effect.parameter}"
+        if len(self.names) == 2:
+            name = f"The recordings contradict each other in {effect.parameter}"
+        return replace(
+            found, name=name, parameters=values, location=Location(summary=f"in {where}")
         )
 
-    def _own(self, model: Together, number: int, name: str) -> Estimate | None:
-        """Return one recording's value of a parameter: its own, or the shared one."""
-        index = BASELINE.index(PARAMETERS[name])
-        own = _estimate(model, (number, index), _UNITS[name], name == "frequency")
-        return own or _estimate(model, PARAMETERS[name], _UNITS[name], name == "frequency")
-
-    def _recording(self, number: int) -> dict[str, Any]:
-        outcome, fit = self.outcomes[number], self.together.fits[number]
-        data = outcome.search.data
-        residual = data.residual(fit.at.reading)[data.weight > 0.0]
-        others = [k for k in range(len(self.names)) if k != number]
-        rest = self.joint.joined(
-            self.together.alone,
-            self.together.effects,
-            self.together.released,
-            self.together.fits,
-            others,
-        )
+    def recording(self, number: int) -> dict[str, Any]:
+        """Return what is to be said of one recording."""
+        diagnosis, part = self.outcomes[number].diagnosis, self.law.at.parts[number]
+        used = self._of(number) & (self.found.data.weight > 0.0)
+        white = self.improved.residual[:-1][self._of(number)]
+        prediction = self._prediction(number)
         return {
             "name": self.names[number],
             "alone": {
-                "verdict": outcome.verdict,
-                "effects": [each.identifier for each in outcome.effects],
-                "classes": [sorted(each) for each in _classes(outcome)],
+                "verdict": diagnosis.verdict,
+                "effects": [each.identifier for each in diagnosis.effects],
+                "classes": [
+                    sorted({each.identifier, *(name for name, _ in each.indistinguishable)})
+                    for each in diagnosis.effects
+                ],
             },
-            "amplitude_rad": float(fit.at.span.first_amplitude),
+            "amplitude_rad": float(part.at.span.first_amplitude),
             "parameters": {
-                _name(each): value.as_json()
-                for each in self.together.released
-                if each.recording in (None, number)
-                and (value := self._own(self.together, number, _name(each)))
+                name: self.of_recording(name, number).as_json()
+                for name in MAY_DIFFER
+                if name in {*self.own, *self.differing}
             },
-            "residual_rms_rad": _rms(residual),
-            "chi2_per_dof": fit.chi2 / max(data.used - len(fit.free), 1),
-            "agreement": self._agreement(number, rest),
-            "prediction": self._prediction(number, rest),
+            "residual_rms_rad": _rms(self.found.data.residual(self.improved.at.reading)[used]),
+            "chi2_per_dof": float(white @ white) / max(int(used.sum()) - len(part.value), 1),
+            "agreement": self._agreement(number),
+            "prediction": prediction and prediction._asdict(),
         }
 
-    def _agreement(self, number: int, rest: Together) -> dict[str, Any]:
-        """Compare one recording with what the others say: chi^2 of what they share."""
-        alone = self.joint.chi2_alone(self.together, number)
-        chi2 = max(self.together.chi2 - rest.chi2 - alone, 0.0)
-        freedom = max(self.together.layout.shared - rest.layout.shared, 1)
-        return {"chi2": chi2, "dof": freedom, "p_value": float(chdtrc(freedom, chi2))}
+    def _of(self, number: int) -> BoolArray:
+        """Return which readings are a recording's."""
+        counts = [len(outcome.search.data) for outcome in self.outcomes]
+        return np.asarray(np.repeat(np.arange(len(counts)), counts) == number)
 
-    def _prediction(self, number: int, rest: Together) -> dict[str, Any] | None:
-        """Predict a recording from the others; its start is fitted to its first quarter.
+    def _agreement(self, number: int) -> dict[str, Any]:
+        """Return by how much chi^2 is smaller, to first order, if a recording shares nothing."""
+        mine = np.append(self._of(number), False)
+        free = self.improved.jacobian[:, list(self.improved.free)]
+        free = free / np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+        chi2, rank = 0.0, 0
+        for some, sign in ((mine, 1), (~mine, 1), (mine | ~mine, -1)):
+            basis, sizes, _ = np.linalg.svd(free[some], full_matrices=False)
+            basis = basis[:, sizes > 1e-9 * sizes[0]]
+            chi2 += sign * float(np.sum((basis.T @ self.improved.residual[some]) ** 2))
+            rank += sign * basis.shape[1]
+        chi2 /= self.improved.error_scale**2
+        chi2 = max(chi2, 0.0)
+        return {"chi2": chi2, "dof": rank, "p_value": float(chdtrc(max(rank, 1), chi2))}
 
-        Readings are compared with the band of all values' errors and the noise.
+    def _prediction(self, number: int) -> _Prediction | None:
+        """Predict a recording from the others; what is its own is fitted to its first quarter.
+
+        The rest is compared with the band of all values' errors, its noise, and the misfit that
+        the law leaves in the others.
         """
-        fit, joint = self.together.fits[number], self.joint
-        found, scale = joint.members[number].found, joint.members[number].scale
-        used = np.flatnonzero(found.data.weight > 0.0)
-        head, tail = np.split(used, [int(_HEAD * len(used))])
-        free, noise = list(fit.free), scale * found.noise.rms
-        # Coloured noise moves the motion by its density at the motion's frequency.
-        turns = float(fit.value[OMEGA]) / (2.0 * math.pi) * found.data.interval_s
-        dense = scale * max(found.noise.rms_at(turns), found.noise.rms)
-        columns = jacobian(fit.model, fit.value, fit.at)[:, free] / dense
-        residual = found.data.residual(fit.at.reading) / dense
-        keys = [self.together.layout.keys[k] for k in self.together.layout.slots[number]]
-        mine = [here for here, key in enumerate(keys) if key in rest.layout.keys]
-        theirs = [rest.layout.keys.index(keys[here]) for here in mine]
-        covariance = rest.covariance()[np.ix_(theirs, theirs)]
-        sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        weights = np.linalg.pinv(covariance / np.outer(sd, sd), rcond=1e-10, hermitian=True)
-        weights = weights / np.outer(sd, sd)
-        normal = columns[head].T @ columns[head]
-        right = columns[head].T @ residual[head]
-        normal[np.ix_(mine, mine)] += weights
-        right[mine] += weights @ (rest.values[theirs] - fit.value[free][mine])
-        length = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        inverse = np.linalg.pinv(normal / np.outer(length, length), rcond=1e-13, hermitian=True)
-        inverse = inverse / np.outer(length, length)
-        value = fit.value.copy()
-        value[free] += inverse @ right
-        try:
-            low, high = fit.model.bounds()
-            reading = fit.model.reading(fit.model.settled(np.clip(value, low, high)))
-        except NoMotionError:
+        data, fit = self.found.data, self.improved
+        used = np.flatnonzero(self._of(number) & (data.weight > 0.0))
+        tail = used[int(_HEAD * len(used)) :]
+        hidden = np.isin(np.arange(len(data)), tail)
+        known = data.masked(hidden | (data.weight == 0.0))
+        noise = replace(self.found.noise, weight=known.weight)
+        there = best_fit(fit.model, known, noise, [fit.value], held=self.found.held)
+        if there is None:
             return None
-        off = found.data.residual(reading)[tail] / noise
-        band = np.einsum("ij,jk,ik->i", columns[tail], inverse, columns[tail])
-        band *= (dense / noise) ** 2
-        return {
-            "fitted_readings": len(head),
-            "predicted_readings": len(tail),
-            "rms_rad": _rms(off * noise),
-            "expected_rms_rad": float(noise * np.sqrt(1.0 + band.mean())),
-            "within_95": float(np.mean(np.abs(off) < _Z95 * np.sqrt(1.0 + band))),
-        }
+        there = replace(there, error_scale=remainder_of(there, known, noise).error_scale)
+        noise_sd = np.concatenate([outcome.search.noise.sd for outcome in self.outcomes])
+        off = data.residual(there.at.reading) / noise_sd
+        others = ~self._of(number) & (data.weight > 0.0)
+        sd = max(_rms(off[others]), 1.0) * noise_sd[tail]
+        columns = jacobian(there.model, there.value, there.at)[tail]
+        band = np.einsum("ij,jk,ik->i", columns, there.covariance(), columns) + sd**2
+        off = (off * noise_sd)[tail]
+        return _Prediction(
+            len(used) - len(tail),
+            len(tail),
+            _rms(off),
+            float(np.sqrt(band.mean())),
+            float(np.mean(np.abs(off) < _Z95 * np.sqrt(band))),
+        )
 
-    def _statement(
-        self, recordings: Sequence[Mapping[str, Any]], p_value: float, unexplained: float
-    ) -> str:
-        count, shared = len(self.names), self._shared(self.together)
-        model = BASELINES.get(self.baseline, self.baseline)
-        common = [f"{name} = {value}" for name, value in shared.items() if value]
+    def opening(self) -> str:
+        """Return what was taken together, and what all have."""
+        common = [f"{name} = {value}" for name, value in self.model().parameters.items()]
+        return (
+            f"{len(self.names)} recordings of one pendulum ({_listed(self.names)}) were taken"
+            " together: each has a start, an offset and noise of its own"
+            + (f", and all have {_listed(common)}." if common else ".")
+        )
+
+    def closing(
+        self,
+        differing: Sequence[FoundEffect],
+        events: Sequence[FoundEffect],
+        recordings: Sequence[Mapping[str, Any]],
+    ) -> list[str]:
+        """Return who contradicts whom, what happened to one alone, and how each is predicted."""
         text = [
-            f"{count} recordings of one pendulum ({_listed(self.names)}) were taken together: each"
-            " has a start, an offset and noise of its own"
-            + (f", and all have {_listed(common)}." if common else "."),
+            f"{each.name}: {_listed([f'{v} in {name}' for name, v in each.parameters.items()])}."
+            for each in differing
         ]
-        text.extend(map(self._said_of, self.named))
-        for released in self.released:
-            values = [
-                f"{self._own(self.together, number, _name(released))} in {name}"
-                for number, name in enumerate(self.names)
-            ]
-            who = (
-                "The recordings contradict each other"
-                if released.recording is None
-                else f"{self.names[released.recording]} contradicts the others"
-            )
-            text.append(f"{who} in {_name(released)}: {_listed(values)}.")
-        if not self.named:
-            text.insert(
-                1,
-                f"{model[0].upper()}{model[1:]} describes them, and no effect of the catalogue"
-                f" improves the fit of all more than chance would ({printed(unexplained)}).",
-            )
-        else:
-            text.insert(
-                1, f"{model[0].upper()}{model[1:]} does not describe them ({printed(p_value)})."
-            )
-        if self.events:
-            said = [f"{each.name} in {name}" for name, each in self.events]
-            text.append(f"One recording alone shows {_listed(said)}.")
-        odd = [
-            each["name"] for each in recordings if each["agreement"]["p_value"] < self.level / count
+        text += [
+            f"{each.name[:1].upper()}{each.name[1:]} is {each.location.summary}." for each in events
         ]
-        if odd and count > 2:
-            text.append(f"What {_listed(odd)} says of the shared values contradicts the others.")
-        elif odd:
-            text.append("What the two say of the shared values is not the same.")
-        told = [each for each in recordings if each["prediction"]]
+        told = [(each["name"], each["prediction"]) for each in recordings if each["prediction"]]
+        parts = [
+            f"{100.0 * each['within_95']:.0f} % of {name}"
+            f" ({compact(each['rms_rad'], self.found.data.unit)} rms, expected"
+            f" {compact(each['expected_rms_rad'], self.found.data.unit)})"
+            for name, each in told
+        ]
         if told:
-            parts = [
-                f"{100.0 * each['prediction']['within_95']:.0f} % of {each['name']}"
-                f" ({compact(each['prediction']['rms_rad'], self.unit)} rms, expected"
-                f" {compact(each['prediction']['expected_rms_rad'], self.unit)})"
-                for each in told
-            ]
             text.append(
                 "Predicted from the others, with only its first quarter to fit what is its own,"
                 f" the 95 % band holds {_listed(parts)}."
             )
-        return " ".join(text)
-
-    def _said_of(self, named: Named) -> str:
-        """Return what an effect is, how sure, and what the recordings settle about it."""
-        rival, effect = named.rival, named.rival.lead.effect
-        numbers = [f"{name} = {each}" for name, each in self._effect(named).parameters.items()]
-        facts = [f"probability {100.0 * float(named.weights[0]):.0f} %", *numbers]
-        text = f"Missing: {effect.name} ({'; '.join(facts)})."
-        mates = {mate.identifier for mate in named.mates}
-        if mates:
-            text += (
-                f" Even together they cannot distinguish it from {_listed(sorted(mates), 'or')}."
-            )
-            text += f" What to measure next: {effect.discriminating_test}."
-        alone = [
-            each
-            for outcome in self.outcomes
-            for each in _classes(outcome)
-            if rival.identifier in each
-        ]
-        settled = sorted(set().union(*alone) - mates - {rival.identifier})
-        if settled:
-            text += f" Single recordings leave {_listed(settled)} too; together they exclude it."
-        elif not alone:
-            text += " No single recording shows it."
         return text
-
-
-def _classes(outcome: Outcome) -> list[set[str]]:
-    """Return the class of each effect of a diagnosis, itself included."""
-    return [
-        {effect.identifier, *(name for name, _ in effect.indistinguishable)}
-        for effect in outcome.effects
-    ]
-
-
-def _name(released: Released) -> str:
-    return next(name for name, key in PARAMETERS.items() if key == released.name)
-
-
-def _estimate(model: Together, key: object, unit: str, turns: bool = False) -> Estimate | None:
-    """Return a value of all with its error; None where it is not among them."""
-    if key not in model.layout.keys:
-        return None
-    place = model.layout.keys.index(key)
-    scale = 0.5 / math.pi if turns else 1.0
-    sd = math.sqrt(max(float(model.covariance()[place, place]), 0.0))
-    value = float(model.values[place])
-    half = _Z95 * sd
-    return Estimate(
-        scale * value, scale * sd, unit, (scale * (value - half), scale * (value + half))
-    )
 
 
 def _rms(values: FloatArray | Sequence[float]) -> float:

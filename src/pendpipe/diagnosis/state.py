@@ -134,6 +134,8 @@ def settled(
     fit: Fit, data: Data, noise: Noise, held: Sequence[int], *, red: bool = True
 ) -> tuple[Fit, Data, Noise]:
     """Estimate the noise again if the model is good enough, and refit with it."""
+    if noise.known:
+        return refine(fit.model, data, noise, fit.value, held=held), data, noise
     if data.time_noise and is_gross(fit, data):
         # Rows that come with counts sweep the harmonics: a misfit can't be kept from the noise.
         return fit, data, noise

@@ -11,7 +11,6 @@ from pendpipe.diagnosis.chance import CATALOGUE_SHARE
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.sensor import SoftClipping
@@ -40,16 +39,16 @@ def applicable(
         and (effect.identifier not in used or effect.local)
     ]
     if rare:
-        return named
+        return list(fit.model.admitted(named))
     bent = SoftClipping()
     clipped = any(effect.key == bent.key for effect in fit.model.effects)
-    return [*named, *([] if clipped else [bent]), *undrawn(CURVES, fit)]
+    return [*fit.model.admitted([*named, *([] if clipped else [bent])]), *undrawn(CURVES, fit)]
 
 
-def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Curve]:
+def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Effect]:
     """Return the curves along a fitted motion, without those in its model."""
     present = {effect.key for effect in fit.model.effects}
-    made = [curve(fit.at.span) for curve in curves]
+    made = fit.model.admitted([curve(fit.at.span) for curve in curves])
     return [curve for curve in made if curve.key not in present]
 
 
@@ -70,7 +69,7 @@ class Task:
     """
 
     catalogue: Sequence[Effect]
-    released: Sequence[ReleasedParameter]
+    released: Sequence[Effect]
     baseline: str
     level: float
     seed: int

@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.lock_in import lock_in
+from pendpipe.diagnosis.stacked import StackedData
 from pendpipe.effects.model import Evaluated
 
 _LARGE_DIFFERENCE: Final = 0.15
@@ -65,6 +66,9 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     max_phase_error_rad
         The largest phase difference of model and readings; 0 where it is obviously small.
     """
+    if isinstance(data, StackedData):
+        parts = [unwrapped(one, part.at) for one, part in zip(data.each(), at.parts, strict=True)]
+        return np.concatenate([part for part, _ in parts]), max(slip for _, slip in parts)
     difference = data.residual(at.reading)
     if _in_phase(data, at, difference):
         return difference, 0.0

@@ -40,8 +40,16 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
             continue
         jacobian[:, index] = _slope(fit, early, index, _DERIVATIVE_STEP * sd / fit.error_scale)
     errors = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
-    intervals = _intervals(fit)
-    dress = units(unit)
+    dress, found = units(unit), constants_of(fit, unit)
+    found["amplitude"] = Estimate(float(numbers[0]), float(errors[0]), dress["amplitude"])
+    phase = math.remainder(float(numbers[1]), 2.0 * math.pi)
+    found["phase"] = Estimate(phase, float(errors[1]), dress["phase"])
+    return {name: found[name] for name in PARAMETERS}
+
+
+def constants_of(fit: Fit, unit: str) -> dict[str, Estimate]:
+    """Return a, b, c, offset and frequency."""
+    covariance, intervals, dress = fit.covariance(), _intervals(fit), units(unit)
     found = {}
     for name, index in (("a", A), ("b", B), ("c", C), ("offset", OFFSET)):
         found[name] = _estimate(fit, covariance, index, dress[name], intervals.get(index))
@@ -49,10 +57,7 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     frequency = float(fit.value[OMEGA]) * hertz
     sd = math.sqrt(max(float(covariance[OMEGA, OMEGA]), 0.0)) * hertz
     found["frequency"] = Estimate(frequency, sd, dress["frequency"])
-    found["amplitude"] = Estimate(float(numbers[0]), float(errors[0]), dress["amplitude"])
-    phase = math.remainder(float(numbers[1]), 2.0 * math.pi)
-    found["phase"] = Estimate(phase, float(errors[1]), dress["phase"])
-    return {name: found[name] for name in PARAMETERS}
+    return found
 
 
 def _early(fit: Fit) -> Model:

@@ -24,7 +24,6 @@ from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Fault, Step, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import BASELINE
 from pendpipe.effects.curves import Curve
 
 _CLEAN_CHARGE: Final = 5.0
@@ -104,7 +103,7 @@ def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
             model, value = model.dropping(step.winner.lead.effect, value)
     if model is found.improved.model:
         return found.improved
-    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
+    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare]
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
@@ -207,7 +206,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if isinstance(effect, ReleasedParameter) and effect.index is not None:
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
-    bare = np.concatenate([found.baseline.value, value[len(BASELINE) :]])
+    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare, step.before.value]
     without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
     gain = without.chi2 - found.improved.chi2

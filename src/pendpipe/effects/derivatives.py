@@ -31,6 +31,8 @@ def responses(
     pendulum: Pendulum,
 ) -> FloatArray:
     """Change of the readings for each pair of values, shape (changes, n)."""
+    if at.parts:
+        return np.concatenate([part.responses(effect, changes) for part in at.parts], axis=1)
     sampled, tangent = at.sampled, at.tangent
     total = np.zeros((len(changes), len(sampled.time_s)))
     found = [
@@ -74,6 +76,8 @@ def _change(
 
 def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     """Derivatives of the readings by all values, shape (n, size)."""
+    if at.parts:
+        return np.concatenate([part.own @ part.mixing for part in at.parts])
     sampled, tangent = at.sampled, at.tangent
     pendulum = model.pendulum(value)
     columns = np.empty((len(model.time_s), model.size))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from pendpipe.effects.baseline import (
 )
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
 
+if TYPE_CHECKING:
+    from pendpipe.effects.stack import Part
+
 
 @dataclass(frozen=True)
 class Evaluated:
@@ -39,6 +42,8 @@ class Evaluated:
     sampled: Sampled
     tangent: Tangent
     span: Span
+    parts: tuple[Part, ...] = ()
+    """Of a `pendpipe.effects.stack.Stack`: its recordings."""
 
     @cached_property
     def _start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -137,22 +142,31 @@ class Model:
     parts: Mapping[str, float] = field(default_factory=dict)
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
-    def adding(self, effect: Effect) -> Model:
+    @property
+    def first(self) -> int:
+        """Where the values of effects begin."""
+        return len(BASELINE)
+
+    def admitted(self, effects: Sequence[Effect]) -> Sequence[Effect]:
+        """Return the effects that may be added; in one recording, all."""
+        return effects
+
+    def adding(self, effect: Effect) -> Self:
         """The same with one effect more."""
         return replace(self, effects=(*self.effects, effect), _last=dict(self._last))
 
-    def dropping(self, effect: Effect, value: FloatArray) -> tuple[Model, FloatArray]:
+    def dropping(self, effect: Effect, value: FloatArray) -> tuple[Self, FloatArray]:
         """The same without one effect (if it is in it), and the values that are left."""
         others = [(other, place) for other, place in self.places() if other is not effect]
-        kept = [value[: len(BASELINE)], *(value[place] for _, place in others)]
+        kept = [value[: self.first], *(value[place] for _, place in others)]
         effects = tuple(other for other, _ in others)
         return replace(self, effects=effects, _last=dict(self._last)), np.concatenate(kept)
 
-    def at_times(self, time_s: FloatArray) -> Model:
+    def at_times(self, time_s: FloatArray) -> Self:
         """The same for readings at other times."""
         return replace(self, time_s=time_s, _last={})
 
-    def bare(self) -> Model:
+    def bare(self) -> Self:
         """The baseline alone."""
         return replace(self, effects=(), _last={})
 
@@ -163,11 +177,11 @@ class Model:
     @property
     def size(self) -> int:
         """Number of values."""
-        return len(BASELINE) + sum(effect.count for effect in self.effects)
+        return self.first + sum(effect.count for effect in self.effects)
 
     def places(self) -> list[tuple[Effect, slice]]:
         """Each effect with the place of its values."""
-        found, first = [], len(BASELINE)
+        found, first = [], self.first
         for effect in self.effects:
             found.append((effect, slice(first, first + effect.count)))
             first += effect.count

@@ -1,0 +1,302 @@
+"""Several recordings of one pendulum as one model: values are shared, or a recording's own.
+
+The values of each recording follow linearly from those of all: its Jacobian times that matrix is
+its part of the Jacobian. So whatever fits, scans and weighs one recording does it for several.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final, Self
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.sampling import Sampled
+from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
+from pendpipe.effects.derivatives import jacobian, responses
+from pendpipe.effects.effect import Effect, Parameter, Span
+from pendpipe.effects.model import Evaluated, Model
+
+MAY_DIFFER: Final = {"a": A, "b": B, "c": C, "frequency": OMEGA}
+"""What the recordings of one pendulum share, unless it was changed between them."""
+
+
+class Differs(Effect):
+    """A value that one recording does not share with the others: what it has more than they.
+
+    Parameters
+    ----------
+    parameter
+        Its name in `MAY_DIFFER`.
+    recording
+        The number of the recording.
+    """
+
+    kind = "parameter"
+    prior = -15.0
+    """As of two names, each one of some forty: who gives the recordings says that it is shared."""
+    discriminating_test = "record each of them once more, in another order"
+
+    def __init__(self, parameter: str, recording: int) -> None:
+        self.parameter, self.recording = parameter, recording
+        self.index = MAY_DIFFER[parameter]
+        self.identifier = f"parameter-{parameter}"  # type: ignore[misc]
+        self.name = f"another {parameter} in recording {recording + 1}"  # type: ignore[misc]
+        self.equation = parameter  # type: ignore[misc]
+        self.parameters = (Parameter("difference", "", -math.inf, math.inf),)  # type: ignore[misc]
+
+    @property
+    def key(self) -> str:
+        """The parameter, and in which recording."""
+        return f"{self.identifier}:{self.recording}"
+
+
+def of_each(effect: Effect, recordings: int) -> Effect:
+    """Return an effect with sizes of its own in each recording, and the same shape in all."""
+    found = copy(effect)
+    sizes = effect.parameters[: effect.sizes]
+    found.sizes = recordings * effect.sizes  # type: ignore[misc]
+    found.parameters = (  # type: ignore[misc]
+        *(
+            each._replace(name=f"{each.name} {number + 1}")
+            for number in range(recordings)
+            for each in sizes
+        ),
+        *effect.parameters[effect.sizes :],
+    )
+    found.single = effect  # type: ignore[attr-defined]
+
+    def over(combine: Callable[..., Any], judge: Callable[..., Any]) -> Callable[..., Any]:
+        """Judge each recording's own values, and combine what is said of them."""
+        blocks = [_block(found, number, 0) for number in range(recordings)]
+        return lambda values, *more: combine([judge(block @ values, *more) for block in blocks])
+
+    for name, combine in (("believable", all), ("displacement", max), ("prior_penalty", sum)):
+        setattr(found, name, over(combine, getattr(effect, name)))
+    return found
+
+
+def _single(effect: Effect) -> Effect:
+    """Return the effect as one recording has it."""
+    return getattr(effect, "single", effect)
+
+
+def _block(effect: Effect, recording: int, size: int) -> FloatArray:
+    """Return one recording's values by those of an effect: of the effect's, or of the baseline."""
+    single = _single(effect)
+    if isinstance(effect, Differs):
+        found = np.zeros((size, 1))
+        found[effect.index] = effect.recording == recording
+        return found
+    rows = np.arange(single.count)
+    if single is not effect:
+        rows = np.where(
+            rows < single.sizes,
+            rows + recording * single.sizes,
+            rows + effect.sizes - single.sizes,
+        )
+    return np.eye(effect.count)[rows]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One recording of several, evaluated.
+
+    Parameters
+    ----------
+    number
+        Of the recording.
+    model, value, at
+        Its own model, at its values.
+    mixing
+        Its values by those of all, shape (own values, values of all).
+    """
+
+    number: int
+    model: Model
+    value: FloatArray
+    at: Evaluated
+    mixing: FloatArray
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """Derivatives of its readings by its own values."""
+        return jacobian(self.model, self.value, self.at)
+
+    def responses(
+        self, effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]]
+    ) -> FloatArray:
+        """Change of its readings for each pair of values of an effect, shape (changes, n)."""
+        block = _block(effect, self.number, len(self.value))
+        if isinstance(effect, Differs):
+            return np.array([self.own @ (block @ (high - low)) for low, high in changes])
+        pairs = [(block @ low, block @ high) for low, high in changes]
+        pendulum = self.model.pendulum(self.value)
+        return responses(_single(effect), pairs, self.at, pendulum)
+
+
+@dataclass(frozen=True)
+class Stack(Model):
+    """A model of several recordings.
+
+    Parameters
+    ----------
+    members
+        Each recording's model, the effects of all in it.
+    base
+        Each recording's values (the baseline's, and of what happened in it alone) by the first
+        values of all; a one in each row.
+    same_sensor
+        Whether errors of the sensor have the same sizes in all.
+    """
+
+    members: tuple[Model, ...] = ()
+    base: tuple[FloatArray, ...] = ()
+    same_sensor: bool = False
+
+    @classmethod
+    def of(cls, members: Sequence[Model], own: Sequence[str], *, same_sensor: bool) -> Stack:
+        """Stack models: start and offset are each one's own, and what `own` names."""
+        apart = {TIME, START, OFFSET, *(MAY_DIFFER[name] for name in own)}
+        places, count = [], 0
+        for number, member in enumerate(members):
+            shared = {k for k in range(len(BASELINE)) if number and k not in apart}
+            here = np.arange(member.size)
+            fresh = [k for k in range(member.size) if k not in shared]
+            here[fresh] = count + np.arange(len(fresh))
+            places.append(here)
+            count += len(fresh)
+        base = tuple(np.eye(count)[here] for here in places)
+        time_s = np.concatenate([member.time_s for member in members])
+        interval_s = members[0].interval_s
+        return cls(time_s, interval_s, members=tuple(members), base=base, same_sensor=same_sensor)
+
+    @property
+    def first(self) -> int:
+        """Where the values of effects begin."""
+        return int(self.base[0].shape[1])
+
+    def admitted(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return what may be common: no instant, no tone, nothing drawn against the time.
+
+        Two sizes are an amplitude and a phase, which each release sets anew; so does each
+        recording with the errors of its sensor, unless that was left alone.
+        """
+        found = []
+        for effect in effects:
+            sensor = "measurement" in (effect.kind, effect.identifier.removeprefix("unnamed-"))
+            own = sensor and not self.same_sensor
+            drawn = effect.kind == "unnamed"
+            if effect.local or effect.spectral or effect.in_time or (own and drawn):
+                continue
+            own |= effect.sizes > 1 and not drawn
+            found.append(of_each(effect, len(self.members)) if own else effect)
+        return found
+
+    def adding(self, effect: Effect) -> Self:
+        """The same with one effect more, in each recording."""
+        members = self.members
+        if not isinstance(effect, Differs):
+            members = tuple(member.adding(_single(effect)) for member in members)
+        return replace(self, effects=(*self.effects, effect), members=members)
+
+    def dropping(self, effect: Effect, value: FloatArray) -> tuple[Self, FloatArray]:
+        """The same without one effect, and the values that are left."""
+        _, kept = super().dropping(effect, value)
+        members = tuple(m.dropping(_single(effect), np.zeros(m.size))[0] for m in self.members)
+        effects = tuple(other for other in self.effects if other is not effect)
+        return replace(self, effects=effects, members=members), kept
+
+    def bare(self) -> Self:
+        """The baseline, with what happened in each recording alone."""
+        found = self
+        for effect in self.effects:
+            found, _ = found.dropping(effect, np.zeros(found.size))
+        return found
+
+    def at_times(self, time_s: FloatArray) -> Self:
+        """Several recordings have no times in common."""
+        raise NoMotionError("several recordings have no times in common")
+
+    def mixings(self) -> list[FloatArray]:
+        """Return each recording's values by those of all, shape (own values, values of all)."""
+        found = []
+        for number, (member, base) in enumerate(zip(self.members, self.base, strict=True)):
+            matrix = np.zeros((member.size, self.size))
+            matrix[: len(base), : self.first] = base
+            places = {id(effect): place for effect, place in member.places()}
+            for effect, place in self.places():
+                rows = slice(None) if isinstance(effect, Differs) else places[id(_single(effect))]
+                matrix[rows, place] = _block(effect, number, member.size)
+            found.append(matrix)
+        return found
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest values."""
+        ends = [np.zeros(self.size), np.zeros(self.size)]
+        for member, base in zip(self.members, self.base, strict=True):
+            for end, own in zip(ends, member.bounds(), strict=True):
+                end[np.argmax(base, axis=1)] = own[: len(base)]
+        duration = max(float(np.ptp(member.time_s)) for member in self.members)
+        for effect, place in self.places():
+            ends[0][place], ends[1][place] = np.array(effect.bounds(duration)).T
+        return ends[0], ends[1]
+
+    def held(self) -> list[int]:
+        """Indices that are never fitted."""
+        return [*super().held(), *self.held_of([member.held() for member in self.members])]
+
+    def held_of(self, own: Sequence[Sequence[int]]) -> list[int]:
+        """Return where values stand that each recording holds, of those before the effects'."""
+        pairs = zip(self.base, own, strict=True)
+        return [base[k].tolist().index(1.0) for base, held in pairs for k in held if k < len(base)]
+
+    def evaluate(self, value: FloatArray) -> Evaluated:
+        """Return the readings of all, one recording after the other."""
+        parts = []
+        for number, (member, mixing) in enumerate(zip(self.members, self.mixings(), strict=True)):
+            own = np.clip(mixing @ value, *member.bounds())
+            parts.append(Part(number, member, own, member.evaluate(own), mixing))
+        spans = [part.at.span for part in parts]
+        loudest = max(parts, key=lambda part: part.at.span.first_amplitude).at
+        span = Span(
+            min(each.start_s for each in spans),
+            max(each.stop_s for each in spans),
+            loudest.span.interval_s,
+            loudest.span.pendulum,
+            loudest.span.first_amplitude,
+            min(each.last_amplitude for each in spans),
+            loudest.span.offset,
+            loudest.span.fold,
+        )
+        reading = np.concatenate([part.at.reading for part in parts])
+        return Evaluated(reading, _sampled(parts), loudest.tangent, span, tuple(parts))
+
+
+def _sampled(parts: Sequence[Part]) -> Sampled:
+    """Return the motions one after the other, each in cycles of its own."""
+    first = parts[0].at.sampled
+    phases, cosines, sines = [first.phase], [first.cosine], [first.sine]
+    for part in parts[1:]:
+        one = part.at.sampled
+        sign = one.motion.upwards * first.motion.upwards
+        pace = one.motion.angular_frequency / first.motion.angular_frequency
+        phase = one.phase + (0.0 if sign > 0.0 else math.pi)
+        turns = math.ceil((phases[-1][-1] - phase[0]) / (2.0 * math.pi))
+        phases.append(phase + 2.0 * math.pi * turns)
+        cosines.append(sign * one.cosine)
+        sines.append(sign * pace * one.sine)
+    return replace(
+        first,
+        time_s=np.concatenate([part.at.sampled.time_s for part in parts]),
+        phase=np.concatenate(phases),
+        amplitude=np.concatenate([part.at.sampled.amplitude for part in parts]),
+        cosine=np.concatenate(cosines),
+        sine=np.concatenate(sines),
+    )
