@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import io
+import json
 import lzma
 import math
 import os
@@ -21,7 +22,7 @@ from scipy.io import savemat
 
 from pendpipe.cli import main
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.formats import ReadOptions, containers, inspect, read, trees
 from pendpipe.recording import Recording
 
 from .decays import Floats, swing
@@ -707,9 +708,40 @@ def test_an_opendocument_table_with_its_empty_rest(tmp_path: Path) -> None:
     recording = read_text(tmp_path, content, "a.ods")
     same(recording)
     assert recording.unit == "rad"
-    hostile = opendocument("<table:table-row/>" * 1_300_000)
-    with pytest.raises(InputError, match="more than 600000 cells"):
-        read_text(tmp_path, hostile, "b.ods")
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "<table:table-row/>" * 5000,
+        "<a>" * 5000 + "</a>" * 5000,
+        "<table:table-row>"
+        + "<table:table-cell office:value='1' table:number-columns-repeated='99999'/>" * 20
+        + "</table:table-row>",
+    ],
+)
+def test_the_cells_of_an_opendocument_table_are_counted_as_they_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str
+) -> None:
+    monkeypatch.setattr(containers, "_MOST_CELLS", 1000)
+    with pytest.raises(InputError, match="more than 1000 cells"):
+        read_text(tmp_path, opendocument(rows), "b.ods")
+
+
+def test_records_of_json_with_texts_are_a_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records = [
+        {"at": f"2024-05-01T12:00:{t:09.6f}Z", "arm": {"theta_rad": x, "bob": "brass"}}
+        for t, x in zip(TIME[:1400], ANGLE, strict=False)
+    ]
+    content = json.dumps([{"device": "logger 3"}, *records])
+    recording = read_text(tmp_path, content, "a.json")
+    same(recording, ANGLE[:1400], TIME[:1400])
+    assert recording.unit == "rad"
+    monkeypatch.setattr(trees, "_MOST_CELLS", 1000)
+    with pytest.raises(InputError, match="more than 1000 cells"):
+        read_text(tmp_path, content, "b.json")
 
 
 def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:

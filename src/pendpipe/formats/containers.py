@@ -112,23 +112,26 @@ def _sheets_of_opendocument(archive: zipfile.ZipFile) -> _Sheets:
     rows: list[list[Any]] = []
     row: list[str] = []
     cells = 0
-    for nodes, (_, node) in enumerate(ET.iterparse(archive.open("content.xml"))):
+    for nodes, (at, node) in enumerate(ET.iterparse(archive.open("content.xml"), ("start", "end"))):
+        if cells + nodes // 4 > _MOST_CELLS:
+            raise ValueError(f"it has more than {_MOST_CELLS} cells")
+        if at == "start":
+            continue
         kind = node.tag.rpartition("}")[2]
         if kind == "table-cell":
             told = {name.rpartition("}")[2]: value for name, value in node.attrib.items()}
             values = (told.get(name) for name in ("value", "date-value", "time-value"))
             value = next(filter(None, values), " ".join("".join(node.itertext()).split()))
             value = re.sub(r"^PT(\d+)H(\d+)M([\d.]+)S$", r"\1:\2:\3", value)
-            row += [value] * min(int(told.get("number-columns-repeated", 1)), _MOST_REPEATED)
+            many = min(int(told.get("number-columns-repeated", 1)), _MOST_REPEATED)
+            row += [value] * many
+            cells += many if value else 1
         elif kind == "table-row":
-            cells += len(row)
             rows.append("\t".join(row).rstrip("\t").split("\t"))
             row = []
             node.clear()
         elif kind == "table":
             sheets[f"{len(sheets) + 1}"], rows = rows, []
-        if cells + nodes // 2 > _MOST_CELLS:
-            raise ValueError(f"it has more than {_MOST_CELLS} cells")
     return sheets
 
 

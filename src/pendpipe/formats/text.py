@@ -40,6 +40,8 @@ _LARGEST: Final = 512 << 20
 """Bytes of a table: ten million rows. Its lines and cells take some five times that."""
 _LONGEST_LINE: Final = 1 << 20
 _LONGEST_HEADER: Final = 5000
+_LONGEST_ROW: Final = 1000
+"""Letters of a row with words in it."""
 _MOST_KEYS: Final = 20
 """Runs or quantities that a long table may name."""
 
@@ -278,7 +280,7 @@ def _without_words(lines: list[str]) -> list[str]:
     So serial monitors, logs and printed lists have it: ``t = 12 ms, theta: 0.5 deg``,
     ``12:03:04.5 -> 0.3``, ``(0.1, 0.2),``. The words become the names.
     """
-    some = [line for line in lines[:100] if line.strip()]
+    some = [line for line in lines[:100] if line.strip() and len(line) < _LONGEST_ROW]
     shapes = Counter(" ".join(_TOKEN.sub("\0", line).split()) for line in some)
     shape, many = shapes.most_common(1)[0] if shapes else ("", 0)
     if 2 * many <= len(some) or not _WORDS.search(shape):
@@ -289,7 +291,7 @@ def _without_words(lines: list[str]) -> list[str]:
     names = "\t".join(each[1] if each else "" for each in said)
     rows, first = list(lines), len(lines)
     for row, line in enumerate(lines):
-        if " ".join(_TOKEN.sub("\0", line).split()) == shape:
+        if len(line) < _LONGEST_ROW and " ".join(_TOKEN.sub("\0", line).split()) == shape:
             cells = zip(_TOKEN.findall(line), units, strict=True)
             rows[row] = "\t".join(
                 f"{cell.replace(' ', 'T').replace('*^', 'e')} {unit}".strip()

@@ -45,6 +45,8 @@ _INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat
 _MOST: Final = 1 << 27
 """Numbers that an array may hold."""
 _LARGEST_JSON: Final = 64 << 20
+_MOST_CELLS: Final = 1_500_000
+"""Of records with texts: half a gigabyte."""
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
 _AUDIO_HZ: Final = 4000.0
 """Rate from which on a file of sound may hold a tone that the swing modulates."""
@@ -230,11 +232,24 @@ def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
         except (ValueError, RecursionError):
             raise NotThisFormatError("it is no JSON") from None
     if isinstance(tree, list) and tree and all(isinstance(record, dict) for record in tree):
-        from pandas import json_normalize
-
-        table = json_normalize(tree, max_level=8).to_csv(sep="\t", index=False)
-        return table_of_text(place, table, replace(options, delimiter="\t", decimal="."), form)
+        # Records with texts (times of day, "0.12", names of sensors) are a table of text.
+        worded = any(isinstance(value, str) for record in tree for value in record.values())
+        rows = [_flat(record) for record in tree] if worded else []
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        if len(names) * len(rows) > _MOST_CELLS:
+            raise InputError(place, f"its records hold more than {_MOST_CELLS} cells", "export CSV")
+        if rows:
+            cells = (names, *([row.get(name, "") for name in names] for row in rows))
+            text = "\n".join("\t".join(map(str, row)) for row in cells)
+            plain = replace(options, delimiter="\t", decimal=".")
+            return table_of_text(place, text, plain, form)
     return table_of_tree(place, tree, form, options)
+
+
+def _flat(record: dict[str, Any]) -> dict[str, Any]:
+    """Take a record apart that holds records: ``acc.x``."""
+    parts = ((k, v if isinstance(v, dict) else {"": v}) for k, v in record.items())
+    return {f"{k}.{j}".strip("."): w for k, v in parts for j, w in v.items() if w is not None}
 
 
 def _of_tdms(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
