@@ -18,7 +18,7 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Scale
 from pendpipe.diagnosis.faults import Forensics
-from pendpipe.diagnosis.moves import FURTHER, price
+from pendpipe.diagnosis.moves import price
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.run import Outcome
@@ -90,43 +90,6 @@ def search_together(
     NoMotionError
         If the recordings have no motion in common.
     """
-    task = Task(CATALOGUE, (), baseline, level, seed, _TestedAlone(), progress)
-    doubted = [_might_be_a_law(outcome) for outcome in outcomes]
-    some = [_searched(outcomes, doubted, own, task, same_sensor=same_sensor)]
-    if any(doubted) and some[0][0].remainder.systematic:
-        progress("with what each shows alone")
-        some.append(_searched(outcomes, [set()] * len(doubted), own, task, same_sensor=same_sensor))
-    return min(some, key=lambda each: _score(each[0]))
-
-
-def _score(found: Search) -> float:
-    """Return the score of a model, what happened in one recording alone included."""
-    model = found.improved.model
-    assert isinstance(model, Stack)
-    events = sum(happened(effect) for member in model.members for effect in member.effects)
-    return found.improved.chi2 + price(found.steps) + FURTHER * events
-
-
-def _might_be_a_law(outcome: Outcome) -> set[str]:
-    """Return what seems to have happened in a recording, and may as well be a law."""
-    events = {each.identifier for each in outcome.search.named.model.effects if happened(each)}
-    laws = {each.identifier for each in CATALOGUE if not happened(each)}
-    return {
-        each.identifier
-        for each in outcome.effects
-        if each.identifier in events and laws.intersection(dict(each.indistinguishable))
-    }
-
-
-def _searched(
-    outcomes: Sequence[Outcome],
-    doubted: Sequence[set[str]],
-    own: Sequence[str],
-    task: Task,
-    *,
-    same_sensor: bool,
-) -> tuple[Search, tuple[Weighed, ...]]:
-    """Search without what is doubted to have happened in each recording alone."""
     searches = [outcome.search for outcome in outcomes]
     data = StackedData.of([found.data for found in searches])
     misfits = [_misfit(found) for found in searches]
@@ -137,7 +100,7 @@ def _searched(
             for found, misfit in zip(searches, misfits, strict=True)
         ]
     )
-    members = [_member(*pair) for pair in zip(searches, doubted, strict=True)]
+    members = [_member(outcome) for outcome in outcomes]
     model = Stack.of(members, own, same_sensor=same_sensor)
     held = model.held_of([_of_baseline(found) for found in searches])
     fit = _fitted(model, data, noise, searches, held)
@@ -152,15 +115,23 @@ def _searched(
         if name not in own
         for number in range(len(searches) == 2, len(searches))
     ]
-    task = replace(task, released=differing)
+    task = Task(CATALOGUE, differing, baseline, level, seed, _TestedAlone(), progress)
     state = State(fit, data, noise, held, fit.value, fit.value)
     state.settle(fit)
     _known_first(state, task, searches)
-    return swap_in_likelier(grown(state, task, beginning), beginning, task.progress)
+    return swap_in_likelier(grown(state, task, beginning), beginning, progress)
 
 
-def _member(found: Search, doubted: set[str]) -> Model:
-    """Return a recording's baseline, with what happened in it alone."""
+def _member(outcome: Outcome) -> Model:
+    """Return a recording's baseline, with what happened in it alone.
+
+    What may as well be a law of the pendulum did not.
+    """
+    found = outcome.search
+    laws = {each.identifier for each in CATALOGUE if not happened(each)}
+    doubted = {
+        e.identifier for e in outcome.effects if laws.intersection(dict(e.indistinguishable))
+    }
     model = found.baseline.model.bare().at_times(found.data.time_s)
     for effect in found.improved.model.effects:
         if happened(effect) and effect.identifier not in doubted:
@@ -195,12 +166,12 @@ def _fitted(
     searches: Sequence[Search],
     held: Sequence[int],
 ) -> Fit | None:
-    """Fit each recording by itself, combine the values as linear models do, and fit all."""
+    """Fit each recording by itself, then all from there."""
     sizes = [
         {effect.key: fit.value[place] for effect, place in fit.model.places()}
         for fit in (found.improved for found in searches)
     ]
-    rows, right, fits = [], [], []
+    fits = []
     of_each = zip(model.members, model.mixings(), searches, sizes, strict=True)
     for member, mixing, found, own in of_each:
         known = ChainMap(own, *sizes)
@@ -215,18 +186,11 @@ def _fitted(
         fit = best_fit(member, found.data, found.noise, starts, held=_of_baseline(found))
         if fit is None:
             return None
-        length = np.maximum(np.linalg.norm(fit.jacobian, axis=0), 1e-300)
-        triangle = np.linalg.qr(fit.jacobian / length, mode="r") * length
-        rows.append(triangle @ mixing)
-        right.append(triangle @ fit.value)
         fits.append((mixing, fit))
-    stacked = np.concatenate(rows)
-    length = np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
-    value = np.linalg.lstsq(stacked / length, np.concatenate(right), rcond=1e-11)[0] / length
-    # Where that is no motion: the shared values of one recording after the other.
-    values = [np.clip(value, *model.bounds())]
+    # The shared values of one recording after the other, the best first.
+    values = []
     for last in fits:
-        values.append(value.copy())
+        values.append(np.zeros(model.size))
         for mixing, fit in sorted(fits, key=lambda pair: pair is last):
             values[-1][np.argmax(mixing, axis=1)] = fit.value
     starts = [each.copy() for each in values for _ in LESS_FRICTION]

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
-from scipy.special import chdtrc
 
 from pendpipe.analysis.fit.result import Baseline, units
 from pendpipe.arrays import BoolArray, FloatArray
@@ -147,6 +146,11 @@ def diagnose_several(
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
     law = law_of(found, weighed)
+    if law.model.size < found.improved.model.size:
+        # What the law leaves to a curve, or to a doubtful name, shifts its values.
+        more = found.improved.model.size - law.model.size
+        left = math.sqrt(max(law.chi2 - found.improved.chi2, 0.0) / more)
+        law = replace(law, error_scale=max(law.error_scale, left))
     after = _Answer(found, found.improved, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []
@@ -221,16 +225,6 @@ def _of_several(text: str) -> str:
     return text.replace("this recording", "them").replace("of the record (", "of the records (")
 
 
-class _Prediction(NamedTuple):
-    """How a recording is predicted from the others (`recordings` of ``diagnosis.json``)."""
-
-    fitted_readings: int
-    predicted_readings: int
-    rms_rad: float
-    expected_rms_rad: float
-    within_95: float
-
-
 @dataclass(frozen=True)
 class _Answer:
     """What a fit of all recordings says of each."""
@@ -287,7 +281,6 @@ class _Answer:
         diagnosis, part = self.outcomes[number].diagnosis, self.law.at.parts[number]
         used = self._of(number) & (self.found.data.weight > 0.0)
         white = self.improved.residual[:-1][self._of(number)]
-        prediction = self._prediction(number)
         return {
             "name": self.names[number],
             "alone": {
@@ -306,8 +299,7 @@ class _Answer:
             },
             "residual_rms_rad": _rms(self.found.data.residual(self.improved.at.reading)[used]),
             "chi2_per_dof": float(white @ white) / max(int(used.sum()) - len(part.value), 1),
-            "agreement": self._agreement(number),
-            "prediction": prediction and prediction._asdict(),
+            "prediction": self._prediction(number),
         }
 
     def _of(self, number: int) -> BoolArray:
@@ -315,22 +307,7 @@ class _Answer:
         counts = [len(outcome.search.data) for outcome in self.outcomes]
         return np.asarray(np.repeat(np.arange(len(counts)), counts) == number)
 
-    def _agreement(self, number: int) -> dict[str, Any]:
-        """Return by how much chi^2 is smaller, to first order, if a recording shares nothing."""
-        mine = np.append(self._of(number), False)
-        free = self.improved.jacobian[:, list(self.improved.free)]
-        free = free / np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-        chi2, rank = 0.0, 0
-        for some, sign in ((mine, 1), (~mine, 1), (mine | ~mine, -1)):
-            basis, sizes, _ = np.linalg.svd(free[some], full_matrices=False)
-            basis = basis[:, sizes > 1e-9 * sizes[0]]
-            chi2 += sign * float(np.sum((basis.T @ self.improved.residual[some]) ** 2))
-            rank += sign * basis.shape[1]
-        chi2 /= self.improved.error_scale**2
-        chi2 = max(chi2, 0.0)
-        return {"chi2": chi2, "dof": rank, "p_value": float(chdtrc(max(rank, 1), chi2))}
-
-    def _prediction(self, number: int) -> _Prediction | None:
+    def _prediction(self, number: int) -> dict[str, float] | None:
         """Predict a recording from the others; what is its own is fitted to its first quarter.
 
         The rest is compared with the band of all values' errors, its noise, and the misfit that
@@ -353,13 +330,13 @@ class _Answer:
         columns = jacobian(there.model, there.value, there.at)[tail]
         band = np.einsum("ij,jk,ik->i", columns, there.covariance(), columns) + sd**2
         off = (off * noise_sd)[tail]
-        return _Prediction(
-            len(used) - len(tail),
-            len(tail),
-            _rms(off),
-            float(np.sqrt(band.mean())),
-            float(np.mean(np.abs(off) < _Z95 * np.sqrt(band))),
-        )
+        return {
+            "fitted_readings": len(used) - len(tail),
+            "predicted_readings": len(tail),
+            "rms_rad": _rms(off),
+            "expected_rms_rad": float(np.sqrt(band.mean())),
+            "within_95": float(np.mean(np.abs(off) < _Z95 * np.sqrt(band))),
+        }
 
     def opening(self) -> str:
         """Return what was taken together, and what all have."""
