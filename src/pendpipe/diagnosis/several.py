@@ -27,7 +27,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import Search
-from pendpipe.diagnosis.statement import statement
+from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import effect_named, law_of
 from pendpipe.dynamics.any_law import NoMotionError
@@ -42,6 +42,8 @@ from pendpipe.recording import Recording
 _HEAD: Final = 0.25
 """Part of a predicted recording to which its own values (its start) are fitted."""
 _Z95: Final = 1.959963984540054
+_NOT_ZERO_SD: Final = 2.0
+"""Standard deviations, with all that widens them, from which a size is not zero."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,6 +161,9 @@ def diagnose_several(
         if isinstance(effect, Differs):
             differing.append(after.contradiction(effect, one))
         else:
+            if each.gain < (_NOT_ZERO_SD * found.named.error_scale) ** 2:
+                # By the errors that are quoted it is no different from zero.
+                one = replace(one, probability=min(one.probability, DOUBTFUL))
             everywhere = Location(summary=f"it shows in all {len(names)} recordings together")
             named.append(replace(one, location=everywhere))
     events = [

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""
-_DOUBTFUL: Final = 0.05
+DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
 _CERTAIN: Final = 0.95
 """Probability from which an effect without rivals needs no further measurement."""
@@ -141,7 +141,7 @@ _CONFIRMED: Final = 0.01
 
 def _has_a_name(effect: FoundEffect) -> bool:
     """Whether the effect's name deserves a sentence of its own."""
-    return effect.kind != "unnamed" and effect.probability > _DOUBTFUL
+    return effect.kind != "unnamed" and effect.probability > DOUBTFUL
 
 
 def _effect(effect: FoundEffect) -> str:
