@@ -246,7 +246,12 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     ):
         notes += [note] * bool(said)
     quality = np.where(missing | drawn, MISSING, GOOD).astype(np.uint8)
-    metadata = {**_kept(table), **base.metadata, **_markers(table.markers)}
+    kept = {key: value for key, value in table.metadata.items() if key in _KEPT}
+    marks = {
+        f"marker_{number}": f"{mark.sample}; {mark.time_s!r} s; {mark.comment}"
+        for number, mark in enumerate(table.markers, start=1)
+    }
+    metadata = {**kept, **base.metadata, **marks}
     if found.quantity == "reading":
         metadata["unit"] = found.unit
     own_step = choice.readings[0].resolution
@@ -305,18 +310,8 @@ def _refuse_infinite(table: Table, values: FloatArray, base: TimeBase) -> None:
         raise InputError(where, problem, "drop the rows, or leave the cells blank")
 
 
-def _kept(table: Table) -> dict[str, str]:
-    """Keep of a file's own remarks those that the plain form knows."""
-    known = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "recorded_at")
-    return {key: value for key, value in table.metadata.items() if key in known}
-
-
-def _markers(markers: tuple[Marker, ...]) -> dict[str, str]:
-    """Carry markers as metadata ``marker_1: sample; time; comment``."""
-    return {
-        f"marker_{number}": f"{mark.sample}; {mark.time_s!r} s; {mark.comment}"
-        for number, mark in enumerate(markers, start=1)
-    }
+_KEPT: Final = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "recorded_at")
+"""Of a file's own remarks those that the plain form knows."""
 
 
 def _check_scale(place: str | Path, recording: Recording) -> None:
@@ -384,18 +379,12 @@ def table_of_plain(place: Path, recording: Recording) -> Table:
 
 def markers_of(recording: Recording) -> list[Marker]:
     """Read back the markers that ``convert`` has kept as metadata."""
-    found = []
-    for key, value in recording.metadata.items():
-        if not key.startswith("marker_"):
-            continue
-        sample, time, comment = [*value.split(";", 2), "", ""][:3]
-        try:
-            found.append(
-                Marker(int(sample), float(time.strip().removesuffix("s")), comment.strip())
-            )
-        except ValueError:
-            continue
-    return found
+    kept = (value for key, value in recording.metadata.items() if key.startswith("marker_"))
+    found = (re.fullmatch(rf"\s*(\d+)\s*;\s*({_NUMBER}) *s?\s*(?:;(.*))?", value) for value in kept)
+    return [Marker(int(m[1]), float(m[2]), (m[3] or "").strip()) for m in found if m]
+
+
+_NUMBER: Final = r"[+-]?\d+(?:\.\d*)?(?:e[+-]?\d+)?"
 
 
 @dataclass(frozen=True)
