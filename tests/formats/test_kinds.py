@@ -639,6 +639,14 @@ def test_runs_that_a_column_numbers_stand_side_by_side(tmp_path: Path) -> None:
     assert any("several runs" in note for note in recording.notes)
 
 
+def test_samples_that_a_radio_numbers_within_a_packet_are_one_recording(tmp_path: Path) -> None:
+    row = np.arange(1500)
+    content = text(TIME[row // 10 * 10], row % 10.0, ANGLE, head="time_s,seq,theta_rad\n")
+    recording = read_text(tmp_path, content)
+    assert len(recording) == 1500
+    np.testing.assert_allclose(recording.values, ANGLE, atol=1e-6)
+
+
 def test_a_flag_beside_times_that_rise_makes_no_long_table(tmp_path: Path) -> None:
     flags = "".join(
         f"{t:.4f},{x:.6f},{'ok' if row % 7 else 'late'}\n"

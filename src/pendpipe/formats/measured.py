@@ -199,7 +199,7 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
         base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
         base.time_s = base.time_s - start
-    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _sorted):
+    for repaired in (_count_rows, _keep_last, _spread, _drop_repeats, _first_of_stacked, _sorted):
         if np.diff(base.time_s).min(initial=1.0) > 0:
             return base
         repaired(choice, base)
@@ -228,6 +228,27 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
             "time stamps are rounded and repeat: rows are counted at"
             f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with"
         )
+
+
+def _values(choice: Choice, base: TimeBase) -> FloatArray:
+    """Give the readings of the rows that are kept; none where there are fewer."""
+    values = choice.readings[0].values if choice.readings else np.empty(0)
+    return values[base.rows] if len(values) > base.rows.max(initial=0) else np.empty(0)
+
+
+def _spread(choice: Choice, base: TimeBase) -> None:
+    """Spread rows that a radio sends in packets, all of a packet with its time."""
+    stamps, first, many = np.unique(base.time_s, return_index=True, return_counts=True)
+    rising = len(stamps) > 8 and np.all(np.diff(base.time_s) >= 0)
+    values = _values(choice, base)
+    # Rows that are sent twice are copies.
+    alive = len(values) > 0 and np.any(np.diff(values)[np.diff(base.time_s) == 0] != 0)
+    if rising and alive and np.all(many[:-1] == many[0]) and many[-1] <= many[0]:
+        # The last packet lasts as long as the others do.
+        ends = np.append(stamps, stamps[-1] + np.median(np.diff(stamps)))
+        places = np.append(first, first[-1] + many[0])
+        base.time_s = np.interp(np.arange(len(base.time_s)), places, ends)
+        base.notes.append(f"{many[0]} rows have each time: packets, spread up to the next one")
 
 
 def _drop_repeats(choice: Choice, base: TimeBase) -> None:
@@ -267,14 +288,11 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
 def _sorted(choice: Choice, base: TimeBase) -> None:
     """Sort rows that came out of order (threads, radio), where that makes the motion smooth."""
     order = np.argsort(base.time_s, kind="stable")
-    steps = np.diff(base.time_s[order])
-    values = choice.readings[0].values if choice.readings else np.empty(0)
-    if np.all(np.diff(order) == 1) or len(values) <= base.rows.max(initial=0):
+    steps, values = np.diff(base.time_s[order]), _values(choice, base)
+    if np.all(np.diff(order) == 1) or not len(values):
         return
     even = float(np.mean(np.abs(steps - np.median(steps)) <= 0.2 * np.median(steps)))
-    before, after = (
-        float(np.nansum(np.abs(np.diff(values[rows])))) for rows in (base.rows, base.rows[order])
-    )
+    before, after = (float(np.nansum(np.abs(np.diff(some)))) for some in (values, values[order]))
     if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
         return
     moved = int(np.sum(order != np.arange(len(order))))
@@ -353,11 +371,8 @@ def _frames(time: FloatArray, digit: FloatArray, interval: float) -> FloatArray 
 
 def _keep_last(choice: Choice, base: TimeBase) -> None:
     """For one row a count: of the rows in one tick of the clock keep the last."""
-    values = choice.readings[0].values if choice.readings else np.empty(0)
-    if len(values) <= base.rows.max() or np.any(np.diff(base.time_s) < 0):
-        return
-    jumps = np.abs(np.diff(values[base.rows]))
-    count = float(np.median(jumps))
+    jumps = np.abs(np.diff(_values(choice, base)))
+    count = float(np.median(jumps)) if len(jumps) and np.all(np.diff(base.time_s) >= 0) else 0.0
     if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:
         last = np.append(np.diff(base.time_s) > 0, True)
         base.time_s, base.rows = base.time_s[last], base.rows[last]
