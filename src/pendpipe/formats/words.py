@@ -33,6 +33,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("angle", _DEGREE, "rad", "deg degs degree degrees ° º grad grado grados gradi degré degrés"),
     ("angle", _DEGREE, "rad", "degre graden stopnie grader град 度 degr dg altgrad graus grau"),
     ("angle", _DEGREE, "rad", "stopni derece µοίρες stupně"),
+    ("angle", _DEGREE * 1e-3, "rad", "mdeg millidegree millidegrees"),
     ("angle", pi / 200, "rad", "gon gons"),
     ("angle", _DEGREE / 60, "rad", "arcmin ' ′"),
     ("angle", _DEGREE / 3600, "rad", "arcsec ″"),
