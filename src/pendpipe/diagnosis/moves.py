@@ -110,7 +110,7 @@ def _drops(state: State) -> Iterator[Proposed]:
         effect = step.winner.lead.effect
         if isinstance(effect, ReleasedParameter):
             continue
-        without = _without(state, [step])
+        without = refit_without(state, [step])
         if without is not None:
             others = tuple(other for other in state.steps if other is not step)
             yield Proposed(without, others, f"{effect.name} is no longer needed")
@@ -131,7 +131,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         if len(replaced) < 2 or replaced in tried or any(s.winner.drawn for s in state.steps):
             continue
         tried.append(replaced)
-        bare = _without(state, replaced)
+        bare = refit_without(state, replaced)
         if bare is None:
             continue
         curves = [(curve, np.zeros(curve.count)) for curve in _curves(bare, state)]
@@ -152,7 +152,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         )
 
 
-def _without(state: State, steps: Sequence[Step]) -> Fit | None:
+def refit_without(state: State, steps: Sequence[Step]) -> Fit | None:
     """Refit the model without some effects, from the present values and from the baseline's.
 
     None where it has no such motion: they are needed.

@@ -255,8 +255,11 @@ class Refining:
             expected = _expected(here, here.columns, step)
             there = steps.moved(here, step)
             if tries == 0 and len(still) < len(free) and (not there or there.chi2 > here.chi2):
-                tries, free = 1, still
-                continue
+                # Along a place chi^2 has many minima: it stays, unless the gain is its own.
+                shorter, _ = steps.step(here, still, self._radius)
+                if _expected(here, here.columns, shorter) > _POOR * expected:
+                    tries, free = 1, still
+                    continue
             there = self._corrected(there, free, expected)
             gained = here.chi2 - there.chi2 if there else -math.inf
             if gained < _POOR * expected:

@@ -19,7 +19,14 @@ from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
-from pendpipe.diagnosis.moves import describe, improve, prefer_rare, prefer_two_names, price
+from pendpipe.diagnosis.moves import (
+    describe,
+    improve,
+    prefer_rare,
+    prefer_two_names,
+    price,
+    refit_without,
+)
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
@@ -32,7 +39,7 @@ from pendpipe.diagnosis.wrong_parameters import prefer_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
-from pendpipe.effects.curves import FOLLOW_UP_CURVES
+from pendpipe.effects.curves import FOLLOW_UP_CURVES, Curve
 from pendpipe.quantities import compact
 
 _MOST_EFFECTS: Final = 4
@@ -173,7 +180,10 @@ def _grow(state: State, task: Task) -> None:
 
 
 def _described(state: State, task: Task) -> Fit | None:
-    """Describe what the names leave by rare names and a curve; return the fit without the curve."""
+    """Describe what the names leave by rare names and a curve; return the fit without the curve.
+
+    None where there is no curve, or no name beside it.
+    """
     task.scanned(state)
     remainder = remainder_of(state.fit, state.data, state.noise)
     while remainder.systematic and not _ends_with_curve(state):
@@ -186,7 +196,19 @@ def _described(state: State, task: Task) -> Fit | None:
         if _ends_with_curve(state):
             return named
         remainder = remainder_of(state.fit, state.data, state.noise)
-    return None
+    return _without_curve(state)
+
+
+def _without_curve(state: State) -> Fit | None:
+    """Fit the names without a curve that can follow anything, and would imitate them."""
+    last = state.steps[-1].winner.lead.effect if state.steps else None
+    if len(state.steps) < 2 or not isinstance(last, Curve) or not last.of_anything:
+        return None
+    without = refit_without(state, state.steps[-1:])
+    if without is None:
+        return None
+    remainder = remainder_of(without, state.data, state.noise)
+    return replace(without, error_scale=remainder.error_scale)
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
@@ -13,6 +14,11 @@ from pendpipe.diagnosis.noise import Noise
 
 _OVERSAMPLING: Final = 2
 """Frequencies in an interval of 1/duration."""
+_BESIDE: Final = 12.0
+_LINE: Final = 2.0
+"""Frequencies beside a line, in 1/duration: how far they reach, and how far the line does."""
+_LOUD: Final = 3.0
+"""Standard deviations by which they are louder than the noise explains."""
 _VISIBLE: Final = 0.02
 """Part of a tone's power that must remain after the projection."""
 
@@ -51,10 +57,32 @@ class ToneScan:
     def p_values(self, scores: FloatArray) -> FloatArray:
         """Return the probability that chance alone does better at each frequency by itself.
 
-        It is that of `scores.local_p_values` for two degrees of freedom.
+        It is that of `scores.local_p_values` for two degrees of freedom. Where the frequencies
+        beside one are louder than the noise should be, it is compared with them.
         """
-        half = np.maximum(0.5 * self.log_scale_variance, 1e-12)
-        return np.asarray(np.exp(-0.5 / half * np.log1p(half * scores)))
+        level, beside = self._beside(scores)
+        variance = np.where(level > 1.0, np.maximum(1.0 / beside, self.log_scale_variance), 0.0)
+        half = np.maximum(0.5 * np.maximum(variance, self.log_scale_variance), 1e-12)
+        return np.asarray(np.exp(-0.5 / half * np.log1p(half * scores / level)))
+
+    def _beside(self, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the level of the frequencies beside each one, over the noise, and their number.
+
+        A spectrum that is smooth over many cosines misses the resonance of a stand. A level is 1
+        where chance explains it.
+        """
+        seen = self.inverse.any(axis=1)
+        resolved = self.size / len(self.envelope)
+
+        def sums(cosines: float) -> FloatArray:
+            width = 2 * round(cosines * resolved) + 1
+            pair = np.stack([0.5 * scores * seen, seen.astype(np.float64)])
+            return np.asarray(width * uniform_filter1d(pair, width, mode="constant"))
+
+        total, number = sums(_BESIDE) - sums(_LINE)
+        beside = np.maximum(number / resolved, 1.0)
+        mean = total / np.maximum(number, 1.0)
+        return np.where(mean > 1.0 + _LOUD / np.sqrt(beside), mean, 1.0), beside
 
     def scores(self, weights: FloatArray) -> FloatArray:
         """Return chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
