@@ -178,6 +178,22 @@ def test_recording_with_another_damping_is_named_with_its_value() -> None:
     assert "150 mrad contradicts the others in b" in str(found)
 
 
+def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None:
+    knock = {"id": "impulse", "dv": 5e-3, "time": 40.3}
+    releases = {
+        name: swing(amplitude, 60 + number, *([knock] if number == 1 else []))
+        for number, (name, amplitude) in enumerate({"first": 0.2, "second": 0.3}.items())
+    }
+    found = pp.diagnose(releases, volts_per_radian=1.0)
+    assert isinstance(found, JointOutcome)
+    (effect,) = found.effects
+    assert effect.location.summary == "in second alone"
+    values = found.to_dict()["improved"]["parameters"]
+    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
+        assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]
+    assert found.to_dict()["recordings"][1]["prediction"]["within_95"] > 0.9
+
+
 def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Path) -> None:
     files = []
     for number, amplitude in enumerate((0.1, 0.3)):

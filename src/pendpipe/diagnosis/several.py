@@ -164,7 +164,7 @@ def diagnose_several(
             if each.gain < (_NOT_ZERO_SD * found.named.error_scale) ** 2:
                 # By the errors that are quoted it is no different from zero.
                 one = replace(one, probability=min(one.probability, DOUBTFUL))
-            everywhere = Location(summary=f"it shows in all {len(names)} recordings together")
+            everywhere = Location(summary="it shows in all recordings together")
             named.append(replace(one, location=everywhere))
     events = [
         replace(each, location=replace(each.location, summary=f"in {name} alone"))
@@ -363,9 +363,9 @@ class _Answer:
             f"{each.name}: {_listed([f'{v} in {name}' for name, v in each.parameters.items()])}."
             for each in differing
         ]
-        text += [
-            f"{each.name[:1].upper()}{each.name[1:]} is {each.location.summary}." for each in events
-        ]
+        for name in self.names:
+            shown = [each.name for each in events if each.location.summary == f"in {name} alone"]
+            text += [f"{name} alone shows {_listed(shown)}."] if shown else []
         told = [(each["name"], each["prediction"]) for each in recordings if each["prediction"]]
         parts = [
             f"{100.0 * each['within_95']:.0f} % of {name}"
