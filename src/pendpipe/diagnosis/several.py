@@ -33,7 +33,7 @@ from pendpipe.diagnosis.weighing import effect_named, law_of
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.derivatives import jacobian
-from pendpipe.effects.stack import MAY_DIFFER, Differs
+from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact
@@ -161,8 +161,9 @@ def diagnose_several(
         if isinstance(effect, Differs):
             differing.append(after.contradiction(effect, one))
         else:
-            if each.gain < (_NOT_ZERO_SD * found.named.error_scale) ** 2:
-                # By the errors that are quoted it is no different from zero.
+            sizes = [one.parameters[each.name] for each in effect.parameters[: effect.sizes]]
+            known = effect.parameter_free or effect.kind == "unnamed"
+            if not known and all(abs(e.value) < _NOT_ZERO_SD * e.sd for e in sizes):
                 one = replace(one, probability=min(one.probability, DOUBTFUL))
             everywhere = Location(summary="it shows in all recordings together")
             named.append(replace(one, location=everywhere))
@@ -324,7 +325,9 @@ class _Answer:
         hidden = np.isin(np.arange(len(data)), tail)
         known = data.masked(hidden | (data.weight == 0.0))
         noise = replace(self.found.noise, weight=known.weight)
-        there = best_fit(fit.model, known, noise, [fit.value], held=self.found.held)
+        assert isinstance(fit.model, Stack)
+        model = fit.model.guessing(fit.at)
+        there = best_fit(model, known, noise, [fit.value], held=self.found.held)
         if there is None:
             return None
         there = replace(there, error_scale=remainder_of(there, known, noise).error_scale)
@@ -373,6 +376,8 @@ class _Answer:
             f" {compact(each['expected_rms_rad'], self.found.data.unit)})"
             for name, each in told
         ]
+        lost = [each["name"] for each in recordings if not each["prediction"]]
+        text += [f"The others do not settle how {_listed(lost)} moves."] if lost else []
         if told:
             text.append(
                 "Predicted from the others, with only its first quarter to fit what is its own,"

@@ -220,6 +220,12 @@ class Stack(Model):
             found, _ = found.dropping(effect, np.zeros(found.size))
         return found
 
+    def guessing(self, at: Evaluated) -> Self:
+        """The same, its next motions solved from those of an evaluation."""
+        known = [{"motion": part.at.tangent.motion} for part in at.parts]
+        pairs = zip(self.members, known, strict=True)
+        return replace(self, members=tuple(replace(m, _last=last) for m, last in pairs))
+
     def at_times(self, time_s: FloatArray) -> Self:
         """Several recordings have no times in common."""
         raise NoMotionError("several recordings have no times in common")
