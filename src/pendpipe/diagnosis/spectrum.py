@@ -17,7 +17,7 @@ _OVERSAMPLING: Final = 2
 _BESIDE: Final = 12.0
 _LINE: Final = 2.0
 """Frequencies beside a line, in 1/duration: how far they reach, and how far the line does."""
-_LOUD: Final = 3.0
+_LOUD: Final = 2.0
 """Standard deviations by which they are louder than the noise explains."""
 _VISIBLE: Final = 0.02
 """Part of a tone's power that must remain after the projection."""
