@@ -848,3 +848,27 @@ def test_of_equal_columns_the_first_that_swings_a_third_as_far(
     path = tmp_path / "a.csv"
     path.write_text(text(TIME, share * ANGLE, ANGLE, head="t_s,ch1,ch2\n"))
     assert inspect(path).chosen == chosen
+
+
+def test_headers_of_more_instruments(tmp_path: Path) -> None:
+    volts = np.round(2.5 * ANGLE, 3)
+    times = text(TIME, volts)
+    counted = text(np.arange(1500.0), volts, sign=",").replace("\n", ",\n")
+    bench = "".join(
+        f"{n},03/12/2024 10:11:{t:06.3f}".replace(".", ":") + f",{x:.4f},0\n"
+        for n, (t, x) in enumerate(zip(TIME[:1400], volts, strict=False))
+    )
+    for name, content in {
+        "LeCroy": "LECROYWS3024z,64012,Waveform\nSegments,1,SegmentSize,1500\nTime,Ampl\n" + times,
+        "Moku": "% Moku:Go Data Logger\n% Acquisition rate: 30 Hz\n% Time (s), Input 1 (V)\n"
+        + times,
+        "Rigol": "X,CH1,Start,Increment,\nSequence,Volt,0.0e+00,3.3333333e-02\n" + counted,
+        "BenchLink": "Scan,Time,101 (VDC),Alarm 101\n" + bench,
+        "Keithley": "Reading,Unit,Relative Time\n"
+        + "".join(f"{x:.4f},Volt DC,{t:.5f}\n" for t, x in zip(TIME, volts, strict=True)),
+    }.items():
+        recording = read_text(tmp_path, content, f"{name}.csv")
+        assert recording.unit == "V", name
+        same(recording, volts[: len(recording)], TIME[: len(recording)])
+    head = "channel names:\nDev1_ai0\nstart times:\n12.03.2024 10:23:11\ndt:\n0,033333333\ndata:\n"
+    same(read_text(tmp_path, head + text(ANGLE).replace(".", ","), "SignalExpress.txt"))

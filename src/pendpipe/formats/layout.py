@@ -170,7 +170,8 @@ def _is_one_column(sample: Sequence[str]) -> bool:
     if not all(re.fullmatch(r"[+-]?\d+", a) and re.fullmatch(r"\d+", b) for a, b in pairs):
         return False
     first = [int(a) for a, _ in pairs]
-    return any(b < a for a, b in pairwise(first))
+    # "0,49" and "-0,47" all begin with the same number.
+    return any(b < a for a, b in pairwise(first)) or len(set(first)) == 1
 
 
 def _wanted(option: str, given: str | None, names: dict[str, str], usual: str, fit: str) -> str:
