@@ -341,9 +341,16 @@ def page(rows: Sequence[dict[str, Any]]) -> str:
         text += ["## Real pendulums", ""]
     for row in shown:
         text += [f"**{row['real']}.** {row.get('statement', row.get('refused'))}", ""]
+        if row.get("recordings"):
+            text += ["| recording | alone | band of 95 % holds | error, rms (expected) |"]
+            text += ["|---|---|---|---|"]
         for each in row.get("recordings", []):
             classes = "; ".join(", ".join(one) for one in each["alone"]["classes"]) or "nothing"
-            text.append(f"* {each['name']} alone: {classes}.")
+            told = each["prediction"]
+            held = f"{100 * told['within_95']:.0f} %" if told else "not predicted"
+            sizes = (told["rms_rad"], told["expected_rms_rad"]) if told else ()
+            error = " (".join(f"{1e3 * size:.3g} mrad" for size in sizes) + ")" * bool(told)
+            text.append(f"| {each['name']} | {classes} | {held} | {error} |")
         text.append("")
     return "\n".join(text).rstrip() + "\n"
 
