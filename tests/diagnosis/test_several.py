@@ -108,6 +108,7 @@ def test_derivatives_of_two_recordings_are_those_of_each_by_what_it_has() -> Non
     at = stack.evaluate(value)
     found = jacobian(stack, value, at)
     assert len(at.reading) == 180
+    assert at.parts[0].value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx([2e-3, 5e-3, 1e-3])
     assert at.parts[1].value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx([2e-3, 7e-3, 1.2e-3])
     for index in range(len(value)):
         step = np.zeros_like(value)
