@@ -414,16 +414,21 @@ class _Guess:
     weak: bool = False
 
 
-def readings(table: Table, choice: Choice, options: ReadOptions, time_s: FloatArray) -> Readings:
+def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase) -> Readings:
     """Turn the chosen column, or the pair x, y, into one of the quantities.
 
-    Parameters
-    ----------
-    time_s
-        Times of all rows, NaN where a row is left out.
+    Raises
+    ------
+    InputError
+        When the columns have fewer rows than the times, or the column is no motion.
     """
+    rows = len(choice.readings[0].values)
+    if any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows:
+        raise InputError(table.place, "the columns are of unequal length", "choose with --column")
     if len(choice.readings) == 2:
         return _position(choice.readings[0], choice.readings[1])
+    time_s = np.full(rows, np.nan)
+    time_s[base.rows] = base.time_s
     column = choice.readings[0]
     guess = _unit(table, choice, column, options, time_s)
     unit, values, notes = guess.unit, column.values * guess.unit.factor, tuple[str, ...]()

@@ -20,8 +20,8 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats.choose import Choice, choose
-from pendpipe.formats.measured import Readings, TimeBase, readings, refuse_text, time_base
+from pendpipe.formats.choose import choose
+from pendpipe.formats.measured import TimeBase, readings, refuse_text, time_base
 from pendpipe.formats.samples import (
     Gap,
     clipped_samples,
@@ -230,10 +230,10 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     for column in choice.readings:
         refuse_text(table, column, "correct the row, or leave it blank")
     base = time_base(table, choice, options)
-    found = converted(table, choice, base, options)
+    found = readings(table, choice, options, base)
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
     values = _without_marks(found.values[base.rows] / found.factor, notes) * found.factor
-    _refuse_infinite(table, values, base)
+    _refuse_absurd(table, base, values)
     missing, drawn = np.isnan(values), made_up(base.time_s, values)
     start = base.time_s[0] if base.time_s.size else 0.0
     for said, note in (
@@ -266,7 +266,6 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
     )
     check(table.place, recording)
-    _check_scale(table.place, recording)
     return recording
 
 
@@ -292,35 +291,21 @@ def _where(time_s: FloatArray, rows: BoolArray) -> str:
     return f"{rows.sum()} rows ({', '.join(spans)}{', ...' if len(edges) > 6 else ''})"
 
 
-def converted(table: Table, choice: Choice, base: TimeBase, options: ReadOptions) -> Readings:
-    """Turn the chosen columns into readings, the unit judged by the times as well."""
-    rows = len(choice.readings[0].values)
-    if any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows:
-        raise InputError(table.place, "the columns are of unequal length", "choose with --column")
-    time_s = np.full(rows, np.nan)
-    time_s[base.rows] = base.time_s
-    return readings(table, choice, options, time_s)
-
-
-def _refuse_infinite(table: Table, values: FloatArray, base: TimeBase) -> None:
+def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:
+    """Refuse readings that are infinite, and what leaves the range of numbers when squared."""
     odd = np.flatnonzero(np.isinf(values))
     if odd.size:
         where = table.where(int(base.rows[odd[0]]))
         problem = f"{odd.size} reading(s) that are infinite"
         raise InputError(where, problem, "drop the rows, or leave the cells blank")
+    for name, some in (("times", base.time_s), ("readings", values[~np.isnan(values)])):
+        if some.size and np.ptp(some) and not 1e-30 < np.ptp(some) < 1e30:
+            problem = f"the {name} span {np.ptp(some):.3g}, which no pendulum does"
+            raise InputError(table.place, problem, "check their unit")
 
 
 _KEPT: Final = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "recorded_at")
 """Of a file's own remarks those that the plain form knows."""
-
-
-def _check_scale(place: str | Path, recording: Recording) -> None:
-    """Refuse times and readings whose squares leave the range of numbers."""
-    usable = recording.values[recording.usable]
-    for name, some in (("times", recording.time_s), ("readings", usable)):
-        if some.size and np.ptp(some) and not 1e-30 < np.ptp(some) < 1e30:
-            problem = f"the {name} span {np.ptp(some):.3g}, which no pendulum does"
-            raise InputError(place, problem, "check their unit")
 
 
 _STEERING: Final = ("channel", "column", "unit", "sample_rate", "decimal", "delimiter")
