@@ -141,7 +141,19 @@ def test_a_name_that_leaves_noise_stays() -> None:
 def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
     found = diagnose_recording(recording(with_effects("frequency-drift") + CHIRP, 5))
     named = [effect for effect in found.effects if effect.kind != "unnamed"]
-    assert all(effect.probability < 0.5 for effect in named)
+    others = [effect for effect in named if effect.identifier != "coloured-noise"]
+    assert all(effect.probability < 0.5 for effect in others)
+
+
+@pytest.mark.parametrize("first_hz", [0.86, 1.76])
+def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float) -> None:
+    """A line that sweeps by the fundamental, or the second harmonic, and is in no catalogue."""
+    sweep = 1e-3 * np.sin(2.0 * np.pi * (first_hz + 4e-4 * TIME_S) * TIME_S)
+    found = diagnose_recording(recording(other_engine(TRUTH) + sweep, 5)).diagnosis
+    assert found.p_value < 0.01
+    assert found.verdict == "missing-physics"
+    assert found.effects
+    assert all(effect.probability <= 0.5 for effect in found.effects)
 
 
 def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
@@ -219,7 +231,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
     state = State(fit, data, noise, [], TRUTH, fit.value)
-    assert not describe(state, 1e-9, task_for(recording(data.values, 6)))
+    assert not describe(state, 0.1, task_for(recording(data.values, 6)))
     assert state.fit is fit
 
 

@@ -22,7 +22,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 
-_INCOMPLETE: Final = 1.14
+INCOMPLETE: Final = 1.14
 """Residual over noise (chi^2 of 1.3 per degree of freedom) above which a model is incomplete:
 the noise itself is known much better, from between the harmonics."""
 _HARMONICS: Final = 4
@@ -57,7 +57,7 @@ class Remainder:
     @property
     def systematic(self) -> bool:
         """Whether the model is incomplete."""
-        return self.over_noise > _INCOMPLETE
+        return self.over_noise > INCOMPLETE
 
     @property
     def error_scale(self) -> float:
@@ -82,7 +82,7 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     freedom = max(data.used - len(fit.free), 1)
     excess = max(fit.chi2 - freedom, 0.0)
     over = math.sqrt(fit.chi2 / freedom)
-    if over <= _INCOMPLETE:
+    if over <= INCOMPLETE:
         return Remainder(excess, over, float(freedom))
     series, rest = by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
     powers = [_powers(row) for row in series.T] + [_powers(rest)]

@@ -17,6 +17,7 @@ from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.remainder import INCOMPLETE
 from pendpipe.effects.baseline import OMEGA
 
 GROSS: Final = 2.0
@@ -145,7 +146,11 @@ def settled(
     turns = fit.value[OMEGA] / (2.0 * np.pi) * float(data.time_s[-1] - data.time_s[0])
     finer = replace(finer, noise_rms=left.rms_at(turns / (len(data) - 1)))
     if is_gross(fit, data) and fit.model.effects:
-        return fit, data, noise
+        # Beside named effects it is noise if it is steady, and by the harmonics as between them.
+        whitened = left.whiten(finer.residual(fit.at.reading))
+        changes = left.level is not None
+        if loses_phase(fit) or changes or left.misfit(whitened) > INCOMPLETE**2:
+            return fit, data, noise
     better = refine(fit.model, finer, left, fit.value, held=held)
     # A misfit that is gross for the first estimate of the noise may itself be noise.
     gross = is_gross(better, finer) or left.misfit(better.residual) > GROSS
