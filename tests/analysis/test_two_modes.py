@@ -50,3 +50,14 @@ def test_a_mode_without_loss_is_driven() -> None:
     modes = two_modes(TIME, free + 0.2 * np.cos(5.3 * TIME) + noise, 0.62)
     assert modes is not None
     assert [mode.driven for mode in modes] == [False, True]
+
+
+def test_a_knock_is_not_two_modes_where_one_decay_may_do() -> None:
+    # Half of the amplitude is regained at once: one mode explains most of it, and so do two.
+    one = 0.3 * np.exp(-0.05 * TIME) * np.cos(5.0 * TIME)
+    later = np.maximum(TIME - 30.0, 0.0)
+    knocked = one + 0.05 * (TIME > 30.0) * np.exp(-0.05 * later) * np.sin(5.0 * later)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(TIME))
+    assert two_modes(TIME, knocked + noise, 0.62, may_be_one=True) is None
+    beat = motion(TIME) + noise
+    assert two_modes(TIME, beat, 0.61, may_be_one=True) is not None

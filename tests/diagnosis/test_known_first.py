@@ -12,11 +12,13 @@ from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.known_first import known_law_first
 from pendpipe.diagnosis.refine import misfit, refine
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.state import State, first_noise
 from pendpipe.diagnosis.task import Task
 from pendpipe.effects.baseline import OMEGA, START
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
 
 from .records import INTERVAL_S, TIME_S, TRUTH, beginning_of, recording
 
@@ -57,5 +59,26 @@ def test_sin_x_leads_and_its_imitators_are_fitted_to_the_same_noise() -> None:
 
 def test_a_linear_torque_is_not_taken_for_a_pendulum() -> None:
     begun, state = searched(swinging())
-    assert begun.sine is None
+    assert begun.known is None
     assert not state.steps
+
+
+def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
+    # x'' = -omega^2 x - kappa (x - z) and z'' = -omega^2 z - kappa (z - x), released at x alone.
+    omega, kappa, loss = 4.5, 0.9, 0.015
+    time_s = np.arange(0.0, 80.0, 0.05)
+    low, high = omega, np.sqrt(omega**2 + 2.0 * kappa)
+    envelope = 0.06 * np.exp(-loss * time_s)
+    angle_rad = envelope * (np.cos(low * time_s) + np.cos(high * time_s))
+    noise = 3e-4 * np.random.default_rng(4).standard_normal(len(time_s))
+    found = diagnose_recording(Recording(time_s, angle_rad + noise, "angle_rad"))
+    assert [each.identifier for each in found.effects] == ["second-mode"]
+    own, other = (
+        found.diagnosis.improved.parameters["frequency"],
+        found.effects[0].parameters["f_2"],
+    )
+    modes = sorted((2.0 * np.pi * each.value, 2.0 * np.pi * each.sd) for each in (own, other))
+    for (value, sd), truth in zip(modes, (low, high), strict=True):
+        # Damping lowers a frequency by loss^2/(2 omega).
+        assert value == pytest.approx(truth, abs=4.0 * sd + loss**2 / (2.0 * truth))
+    assert found.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.1)

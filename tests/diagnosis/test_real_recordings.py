@@ -54,7 +54,7 @@ def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
     """Eq. 8 with some effects (underscores for hyphens) from start values, to a recording."""
     found = beginning_of(name)
     model, noise = found.model, first_noise(found)
-    value = found.value if found.sine is None else found.sine
+    value = found.value if found.known is None else found.known[1][:-1]
     for identifier, start in effects.items():
         model = model.adding(by_identifier(identifier.replace("_", "-")))
         value = np.append(value, start)

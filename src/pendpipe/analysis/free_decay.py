@@ -10,6 +10,7 @@ A decay is a run of half cycles that follow one another.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -364,10 +365,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     rivals = sum(entry[3].path > 0.2 * told[3].path for entry in found) - 1 if told else 0
     used = [] if told is None else _chained(found, told)
     beside = sum(entry[3].path for entry in found) - sum(entry[3].path for entry in used)
-    if told is None or beside > 0.3 * told[3].path or not _falls(told[2], told[3], least):
-        beat = _beating(time, values, least, half_period, place)
-        if beat is not None:
-            return beat
+    alone = told and beside <= 0.3 * told[3].path and _falls(told[2], told[3], least)
+    beat = _beating(time, values, least, half_period, place, driven=not alone)
+    if beat is not None:
+        return beat
     if told is None:
         raise NotAnalysableError(
             place,
@@ -476,14 +477,20 @@ def _rise(swing: FloatArray) -> float:
 
 
 def _beating(
-    time: FloatArray, values: FloatArray, least: float, half_period: float, place: str | Path
+    time: FloatArray,
+    values: FloatArray,
+    least: float,
+    half_period: float,
+    place: str | Path,
+    *,
+    driven: bool,
 ) -> FreeDecay | None:
     """Find two free modes that beat; None where nothing beats.
 
     Raises
     ------
     NotAnalysableError
-        When one of the modes does not decay, but is driven.
+        When one of the modes does not decay, but is `driven` (else that is no beat).
     """
     cycles = half_cycles(time, values, least, half_period)
     if len(cycles) < _MANY:
@@ -502,10 +509,13 @@ def _beating(
         return None
     start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
     inside = (time >= start) & (time <= stop)
-    modes = two_modes(time[inside], values[inside], float(np.median(half)))
+    usual = float(np.median(half))
+    modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven)
     if modes is None:
         return None
     steadily = [mode for mode in modes if mode.driven]
+    if steadily and not driven:
+        return None
     if steadily:
         raise NotAnalysableError(
             place,
@@ -516,6 +526,7 @@ def _beating(
     each = " and ".join(
         f"{mode.frequency.value:.6g} Hz, which loses"
         f" {with_error(mode.loss.value, mode.loss.sd, short=True)} 1/s"
+        f" (Q = {math.pi * mode.frequency.value / mode.loss.value:.3g})"
         for mode in modes
     )
     cuts = stretches(

@@ -20,7 +20,11 @@ _STEPS: Final = 12
 _APART: Final = 0.3
 """Of the frequency: farther apart they do not beat, and the half period says little."""
 _EXPLAINED: Final = 0.9
-"""Part of the motion's variance that two modes must explain."""
+"""Part of the variance that two modes must explain: of the motion, of what one mode leaves, and in
+each third of the record where it swings."""
+_THIRDS: Final = 3
+_STILL: Final = 0.01
+"""Part of the variance below which a third of the record does not count."""
 
 
 class Mode(NamedTuple):
@@ -32,6 +36,8 @@ class Mode(NamedTuple):
     """Relative loss of amplitude, 1/s."""
     amplitude: Estimate
     """At the first reading, in the unit of the readings."""
+    phase_rad: float
+    """At the first reading; 0 at a turning point on the positive side."""
 
     @property
     def driven(self) -> bool:
@@ -40,7 +46,7 @@ class Mode(NamedTuple):
 
 
 def two_modes(
-    time_s: FloatArray, values: FloatArray, half_period_s: float
+    time_s: FloatArray, values: FloatArray, half_period_s: float, *, may_be_one: bool = False
 ) -> tuple[Mode, Mode] | None:
     """Fit two damped modes and a level to readings.
 
@@ -50,11 +56,14 @@ def two_modes(
         The readings, shape (n,); times may be uneven.
     half_period_s
         The half period, roughly.
+    may_be_one
+        Whether one decay might explain the readings as well: then two modes must explain most of
+        what one leaves, and each third of the record.
 
     Returns
     -------
     tuple of Mode or None
-        The stronger first; None where two modes leave more than a tenth of the motion's variance.
+        The stronger first; None where two modes leave more than a tenth of the variance.
 
     Notes
     -----
@@ -68,26 +77,20 @@ def two_modes(
     amplitude = _slow_amplitude(time, values, slow, width)
     if len(amplitude) < _FEWEST:
         return None
-    rows = np.lib.stride_tricks.sliding_window_view(amplitude, len(amplitude) // 2 + 1)
-    space = np.linalg.svd(rows, full_matrices=False)[2][:2].T
-    step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
-    rates = np.log(np.linalg.eigvals(step)) / width + 1j * slow
-    for _ in range(_STEPS):
-        waves = np.exp(np.outer(time, rates))
-        columns = [np.ones_like(time), *waves.real.T, *waves.imag.T]
-        level, one, two, one_im, two_im = np.linalg.lstsq(
-            np.stack(columns, axis=1), values, rcond=None
-        )[0]
-        size = np.array([one - 1j * one_im, two - 1j * two_im])
-        by_rate = time[:, None] * waves * size
-        design = np.stack([*columns, *by_rate.real.T, *(-by_rate.imag).T], axis=1)
-        residual = values - level - (waves * size).real.sum(axis=1)
-        change = np.linalg.lstsq(design, residual, rcond=None)[0]
-        rates = rates + change[5:7] + 1j * change[7:9]
-        if not np.all(np.abs(rates - 1j * slow) < _APART * slow):
-            return None
-    if not np.var(residual) < (1.0 - _EXPLAINED) * np.var(values):
+    found = _fitted(time, values, amplitude, width, slow, 2)
+    if found is None or not _explained(found.residual, values):
         return None
+    rates, size, design, residual = found
+    if may_be_one:
+        one = _fitted(time, values, amplitude, width, slow, 1)
+        thirds = [np.array_split(each, _THIRDS) for each in (residual, values)]
+        still = _STILL * float(np.var(values))
+        if one and not _explained(residual, one.residual):
+            return None
+        if not all(
+            _explained(*third) for third in zip(*thirds, strict=True) if np.var(third[1]) > still
+        ):
+            return None
     inverse = np.linalg.pinv(design)
     # What two modes leave is smooth: its neighbours tell the same.
     alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)
@@ -99,10 +102,47 @@ def two_modes(
             Estimate(float(rates[k].imag) / (2.0 * math.pi), error[7 + k] / (2.0 * math.pi), "Hz"),
             Estimate(-float(rates[k].real), float(error[5 + k]), "1/s"),
             Estimate(float(abs(size[k])), float(error[1 + k]), ""),
+            float(np.angle(size[k])),
         )
         for k in np.argsort(-np.abs(size))
     ]
     return modes[0], modes[1]
+
+
+def _explained(residual: FloatArray, values: FloatArray) -> bool:
+    return bool(np.var(residual) < (1.0 - _EXPLAINED) * np.var(values))
+
+
+class _Fitted(NamedTuple):
+    """Complex rates and sizes (k,), the derivatives of the readings, and what is left (n,)."""
+
+    rates: AnyArray
+    size: AnyArray
+    design: FloatArray
+    residual: FloatArray
+
+
+def _fitted(
+    time: FloatArray, values: FloatArray, amplitude: AnyArray, width: float, slow: float, count: int
+) -> _Fitted | None:
+    """Fit some modes and a level; None where one of them does not beat with the motion."""
+    rows = np.lib.stride_tricks.sliding_window_view(amplitude, len(amplitude) // 2 + 1)
+    space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
+    step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
+    rates = np.log(np.linalg.eigvals(step)) / width + 1j * slow
+    for _ in range(_STEPS):
+        waves = np.exp(np.outer(time, rates))
+        columns = [np.ones_like(time), *waves.real.T, *waves.imag.T]
+        level, *sizes = np.linalg.lstsq(np.stack(columns, axis=1), values, rcond=None)[0]
+        size = np.array(sizes[:count]) - 1j * np.array(sizes[count:])
+        by_rate = time[:, None] * waves * size
+        design = np.stack([*columns, *by_rate.real.T, *(-by_rate.imag).T], axis=1)
+        residual = values - level - (waves * size).real.sum(axis=1)
+        change = np.linalg.lstsq(design, residual, rcond=None)[0][-2 * count :]
+        rates = rates + change[:count] + 1j * change[count:]
+        if not np.all(np.abs(rates - 1j * slow) < _APART * slow):
+            return None
+    return _Fitted(rates, size, design, residual)
 
 
 def _slow_amplitude(

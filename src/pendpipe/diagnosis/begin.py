@@ -14,10 +14,12 @@ from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.fit.start import start_of, start_values, usable_span
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.two_modes import BEAT, two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Evaluated, Model
@@ -51,8 +53,9 @@ class Beginning:
         First estimate of one reading's noise.
     points
         The turning points.
-    sine
-        Start values with sin x, where the half swings ask for it.
+    known
+        An effect that the half swings ask for, sin x or a second mode, with start values of the
+        model with it.
     """
 
     data: Data
@@ -61,7 +64,7 @@ class Beginning:
     held: tuple[int, ...]
     noise_rms: float
     points: TurningPoints
-    sine: FloatArray | None = None
+    known: tuple[Effect, FloatArray] | None = None
 
 
 def begin(
@@ -82,16 +85,21 @@ def begin(
     value = start.value.copy()
     if "offset" in fixed:
         value[OFFSET] = fixed["offset"]
-    sine = None
-    if not fixed and samples.unit == "rad":
-        known = start_of(points, stated=stated)
-        if known.sine and known.favoured == "sine" and known.linear.slip_rad > LARGE_PHASE_ERROR:
+    sine = known = None
+    if not fixed and any(note.startswith(BEAT) for note in points.notes):
+        # The turning points of a beat tell nothing of either mode.
+        span = slice(None)
+        value, second = _modes_start(samples, value)
+        known = by_identifier("second-mode"), np.append(value, second)
+    elif not fixed and samples.unit == "rad":
+        laws = start_of(points, stated=stated)
+        if laws.sine and laws.favoured == "sine" and laws.linear.slip_rad > LARGE_PHASE_ERROR:
             # Both laws begin at the first turning point, so that they count the same half cycles.
-            value, sine = known.linear.value, known.sine.value
+            value, sine = laws.linear.value, laws.sine.value
             value[TIME] = sine[TIME]
             if baseline == "viscous":
                 value[[A, C]] = sine[[A, C]] = 0.0
-            first = int(np.searchsorted(samples.time_s, known.sine.time_s))
+            first = int(np.searchsorted(samples.time_s, laws.sine.time_s))
             span = slice(max(first, span.start), span.stop)
     omega, angle = float(value[OMEGA]), float(value[START])
     data = gather(
@@ -115,12 +123,29 @@ def begin(
     )
     data, model, at = _before_the_stop(data, model, value)
     if sine is not None:
-        law = model.adding(by_identifier(SINE))
-        data, law, at = _before_the_stop(data, law, np.append(sine, 1.0))
+        known = by_identifier(SINE), np.append(sine, 1.0)
+        data, _, at = _before_the_stop(data, model.adding(known[0]), known[1])
         model = model.at_times(data.time_s)
-    data = replace(data, anchor=anchored(data, at))
+    if sine is not None or known is None:
+        data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
-    return Beginning(data, model, value, held, data.noise_rms, points, sine)
+    return Beginning(data, model, value, held, data.noise_rms, points, known)
+
+
+def _modes_start(samples: Samples, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Start values of Eq. 8 for the stronger of two modes that beat, and of the other beside it."""
+    modes = two_modes(samples.time_s, samples.values, math.pi / float(value[OMEGA]))
+    assert modes is not None
+    own, other = modes
+    omega = 2.0 * math.pi * own.frequency.value
+    turn = (-own.phase_rad % (2.0 * math.pi)) / omega
+    start = value.copy()
+    start[[A, B, C, OMEGA]] = 0.0, own.loss.value, 0.0, omega
+    start[START] = own.amplitude.value * math.exp(-own.loss.value * turn)
+    start[TIME] = samples.time_s[0] + turn
+    size, phase = other.amplitude.value, other.phase_rad
+    sizes = size * math.cos(phase), -size * math.sin(phase)
+    return start, np.array([*sizes, other.frequency.value, 1.0 / other.loss.value])
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

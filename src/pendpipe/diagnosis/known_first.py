@@ -1,7 +1,8 @@
-"""The known law of a pendulum, sin x, first: wherever the half swings ask for it.
+"""What the half swings ask for is fitted first: sin x, or a second mode that beats with the first.
 
-Over a long record at large amplitude the linear law loses the phase by many turns, and what is
-fitted to it there means little. The half swings, which are counted, tell sin x and its start.
+Over a long record at large amplitude the linear law loses the phase by many turns, and where two
+modes beat one alone has no phase; what is fitted to them there means little. The half swings, which
+are counted, tell sin x and its start; the slow amplitude tells the modes.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, SINE, Beginning
+from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
@@ -22,31 +23,30 @@ from pendpipe.diagnosis.scores import Candidate, build_bank, whitened
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 
 _IMITATORS: Final = 3
-"""Effects that are refitted in the place of sin x."""
+"""Effects that are refitted in its place."""
 
 
 def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
-    """Fit sin x from its own start, and take it as the first effect if it lowers chi^2.
+    """Fit it from its own start, and take it as the first effect if it lowers chi^2.
 
     Parameters
     ----------
     beginning
-        Its `sine` is the start; None where the half swings do not ask for sin x, or the linear
-        law keeps the phase: then the scan finds sin x as it finds others.
+        Its `known` is the effect and the start; None where the half swings ask for nothing, or
+        the linear law keeps the phase: then the scan finds sin x as it finds others.
     state
         After the baseline's fit; updated.
     task
-        Its catalogue holds what might imitate sin x.
+        Its catalogue holds what might imitate it.
     """
-    if beginning.sine is None:
+    if beginning.known is None:
         return
-    effect = by_identifier(SINE)
-    task.progress("the half swings ask for sin x: fitting it first")
-    before, start = state.fit, np.append(beginning.sine, 1.0)
+    effect, start = beginning.known
+    task.progress(f"the half swings ask for {effect.name}: fitting it first")
+    before = state.fit
     fit = fitted_from(before.model, state, effect, start)
     if fit is None or not _leads(fit, before, effect, state):
         return
@@ -63,7 +63,7 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
 
 
 def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
-    """Whether sin x leaves less than x, or what it loses is worth less than that it is known.
+    """Whether it leaves less than without, or what it loses is worth less than that it is known.
 
     Where a model has lost the phase its chi^2 is taken along the motion, and says less than the
     squares of the readings less the model.
@@ -78,11 +78,13 @@ def _leads(fit: Fit, before: Fit, effect: Effect, state: State) -> bool:
 
 
 def _imitated(fit: Fit, effect: Effect, state: State, task: Task) -> list[tuple[Lead, Fit]]:
-    """Refit what changes the readings as sin x does, each from the values that imitate it."""
+    """Refit what changes the readings as it does, each from the values that imitate it."""
     noise = state.noise
-    change = whitened(fit, noise, effect, [()])[0]
+    own = fit.value[len(fit.value) - effect.count :]
+    shape = tuple(own[effect.sizes :].tolist())
+    change = own[: effect.sizes] @ whitened(fit, noise, effect, [shape])
     others = applicable(task.catalogue, fit, task.baseline, state.data.unit)
-    names = [other for other in others if other.kind == "dynamics" and other.sizes == 1]
+    names = [each for each in others if each.kind == "dynamics" and each.sizes == effect.sizes]
     bank = build_bank(fit, noise, names)
     scores = bank.scores(change - bank.basis @ (bank.basis.T @ change))
     found: dict[str, tuple[float, Candidate]] = {}
@@ -92,12 +94,12 @@ def _imitated(fit: Fit, effect: Effect, state: State, task: Task) -> list[tuple[
     near = sorted(found.values(), key=lambda pair: -pair[0])[:_IMITATORS]
     fits = []
     for score, (other, shape, _, _) in near:
-        column = whitened(fit, noise, other, [shape])[0]
-        columns = np.column_stack([fit.jacobian[:, list(fit.free)], column])
-        moved = np.linalg.lstsq(columns, change, rcond=1e-11)[0]
         model, start = fit.model.dropping(effect, fit.value)
-        start[list(fit.free)] += moved[:-1]
-        start = np.concatenate([start, moved[-1:], shape])
+        free = [k for k in fit.free if k < len(start)]
+        columns = np.column_stack([fit.jacobian[:, free], *whitened(fit, noise, other, [shape])])
+        moved = np.linalg.lstsq(columns, change, rcond=1e-11)[0]
+        start[free] += moved[: len(free)]
+        start = np.concatenate([start, moved[len(free) :], shape])
         imitated = fitted_from(model, state, other, start)
         if imitated is not None:
             fits.append((Lead(other, shape, score, 0.0), imitated))

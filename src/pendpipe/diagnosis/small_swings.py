@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from scipy.special import stdtr
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import between, cycles, span_ends
@@ -20,8 +21,8 @@ from pendpipe.quantities import with_error
 
 _FEWEST_SPANS: Final = 8
 """Spans of cycles needed to estimate their scatter."""
-_SIGNIFICANT_SD: Final = 5.0
-"""Standard deviations (reading error and scatter of the other spans) that are significant."""
+_SIGNIFICANT: Final = 0.001
+"""Probability by chance (Student's, for the scatter of the other spans) that is significant."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +35,20 @@ class SmallSwings:
         In the middle of that span, rad (or m).
     excess, excess_sd
         (f - f_model)/f_model, and its error from the readings and the scatter of the others.
+    others
+        The number of other spans.
     """
 
     amplitude: float
     excess: float
     excess_sd: float
+    others: int
 
     @property
     def significant(self) -> bool:
         """Whether it exceeds the scatter."""
-        return abs(self.excess) > _SIGNIFICANT_SD * self.excess_sd
+        by_chance = 2.0 * stdtr(self.others, -abs(self.excess) / self.excess_sd)
+        return bool(by_chance < _SIGNIFICANT)
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
@@ -76,4 +81,4 @@ def small_swings(fit: Fit, data: Data, noise: Noise) -> SmallSwings | None:
     off: FloatArray = one.frequency_hz / other.frequency_hz - 1.0
     scatter = float(np.sqrt(np.mean(off[:-1] ** 2)))
     sd = float(np.hypot(one.frequency_sd_hz[-1] / other.frequency_hz[-1], scatter))
-    return SmallSwings(float(one.amplitude[-1]), float(off[-1]), sd)
+    return SmallSwings(float(one.amplitude[-1]), float(off[-1]), sd, len(off) - 1)

@@ -79,7 +79,9 @@ def fit_recording(
     result = _fit(recording, method, restoring, baseline, fixed, points, place)
     beats = [note for note in points.notes if note.startswith(BEAT)] if points else []
     if beats:
-        return replace(result, light="red", light_reason=f"{beats[0]}; Eq. 8 has one")
+        # What its turning points lose is no mode's loss.
+        why = f"{beats[0]}; Eq. 8 has one"
+        return replace(result, light="red", light_reason=why, decrement_check=())
     if result.settled:
         return result
     raise NotAnalysableError(

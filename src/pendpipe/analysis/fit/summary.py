@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.by_points import swing_phase
 from pendpipe.analysis.fit.decrement import loss_of
+from pendpipe.analysis.two_modes import BEAT
 from pendpipe.dynamics import Release, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
@@ -191,6 +192,8 @@ def quotable(result: FitResult) -> str:
     """Advise which of the numbers to quote."""
     if result.light == "green":
         return "Quote these numbers with their errors."
+    if result.light_reason.startswith(BEAT):
+        return "Quote the frequency and the loss of each mode; pendpipe diagnose fits both."
     if result.light == "red":
         what = "Q alone" if seen_qualities(result) else "none of these numbers"
         return f"Quote {what}, not a, b or c: run pendpipe diagnose to learn what the law lacks."
