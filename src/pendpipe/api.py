@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -358,8 +358,7 @@ def diagnose(
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
 
-        if fixed:
-            raise InputError("fixed", "nothing is held in several recordings", "leave it out")
+        refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each

@@ -40,6 +40,18 @@ class InputError(Exception):
         return type(self), (self.place, self.problem, self.remedy)
 
 
+def refuse_if(wrong: object, place: str | Path, problem: str, remedy: str) -> None:
+    """Refuse the input where something is wrong with it.
+
+    Raises
+    ------
+    InputError
+        Where `wrong` is true.
+    """
+    if wrong:
+        raise InputError(place, problem, remedy)
+
+
 class NotAnalysableError(InputError):
     """The recording can be read, but holds no free decay that could be analysed."""
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
 
-from pendpipe.errors import DamagedError, InputError, UnwritableError
+from pendpipe.errors import DamagedError, InputError, UnwritableError, refuse_if
 
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
 
@@ -40,8 +40,7 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     make_folder(target.parent)
     text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
     try:
-        if target.is_dir():
-            raise InputError(target, "this is a folder", "name a file in it")
+        refuse_if(target.is_dir(), target, "this is a folder", "name a file in it")
         if target.exists() and not target.is_file():
             # A device or a pipe is written to: it is not for us to replace it.
             with target.open(mode, **text) as stream:  # type: ignore[call-overload]

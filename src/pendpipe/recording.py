@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import replaced
 
 Quantity = Literal["angle_rad", "volts", "displacement_m", "reading"]
@@ -118,12 +118,12 @@ class Recording:
                 "Recording", f"values of quantity {quantity!r}", f"use {', '.join(QUANTITIES)}"
             )
         times, readings = _column("time_s", time_s), _column(quantity, values)
-        if len(times) != len(readings):
-            raise InputError(
-                "Recording",
-                f"{len(times)} times and {len(readings)} readings",
-                "give one time for each reading",
-            )
+        refuse_if(
+            len(times) != len(readings),
+            "Recording",
+            f"{len(times)} times and {len(readings)} readings",
+            "give one time for each reading",
+        )
         told = notes, weak_guesses
         fields = (times, readings, quantity, quality, metadata, resolution, *told)
         for name, value in zip(self.__dataclass_fields__, fields, strict=True):
@@ -217,10 +217,12 @@ class Recording:
             if guess in self.weak_guesses:
                 return self
             return replace(self, weak_guesses=(*self.weak_guesses, guess))
-        if not constant:
-            raise InputError(
-                place, "the sensor constant is 0", "give --volts-per-radian (see calibrate)"
-            )
+        refuse_if(
+            not constant,
+            place,
+            "the sensor constant is 0",
+            "give --volts-per-radian (see calibrate)",
+        )
         return replace(
             self,
             values=self.values / constant,
@@ -291,8 +293,9 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
         column = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("Recording", f"{name} holds no numbers", "give numbers") from None
-    if column.ndim != 1:
-        raise InputError("Recording", f"{name} has {column.ndim} dimensions", "give one column")
+    refuse_if(
+        column.ndim != 1, "Recording", f"{name} has {column.ndim} dimensions", "give one column"
+    )
     return column
 
 
@@ -352,8 +355,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
         if value:
             metadata[key.strip()] = value.strip()
         first += 1
-    if first == len(lines):
-        raise InputError(place, "the file is empty", "record again, or give another file")
+    refuse_if(first == len(lines), place, "the file is empty", "record again, or give another file")
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, picked, len(names))
@@ -394,17 +396,19 @@ def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
     """Find the columns of the plain form in its header."""
     where = f"{place}, line {line}"
-    if "time_s" not in names:
-        raise InputError(
-            where, f"the column time_s is missing (found {', '.join(names)})", "name it time_s"
-        )
+    refuse_if(
+        "time_s" not in names,
+        where,
+        f"the column time_s is missing (found {', '.join(names)})",
+        "name it time_s",
+    )
     found = [name for name in QUANTITIES if name in names]
-    if len(found) != 1:
-        raise InputError(
-            where,
-            f"exactly one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
-            "rename the column, or run pendpipe convert",
-        )
+    refuse_if(
+        len(found) != 1,
+        where,
+        f"exactly one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
+        "rename the column, or run pendpipe convert",
+    )
     picked = [names.index("time_s"), names.index(found[0])]
     if "quality" in names:
         picked.append(names.index("quality"))
@@ -416,8 +420,7 @@ def _numbers(
 ) -> FloatArray:
     """Turn the rows into numbers, quickly; on a fault go through them one by one."""
     rows = [line for line in lines[start:] if line.strip()]
-    if not rows:
-        raise InputError(place, "there are no samples", "record again, or give another file")
+    refuse_if(not rows, place, "there are no samples", "record again, or give another file")
     try:
         return np.loadtxt(rows, delimiter=",", usecols=picked, ndmin=2, dtype=np.float64)
     except ValueError:
@@ -427,8 +430,12 @@ def _numbers(
             continue
         cells = line.split(",")
         where = f"{place}, line {number}"
-        if len(cells) < width:
-            raise InputError(where, f"{len(cells)} cells, not {width}", "complete or drop the row")
+        refuse_if(
+            len(cells) < width,
+            where,
+            f"{len(cells)} cells, not {width}",
+            "complete or drop the row",
+        )
         for index in picked:
             try:
                 float(cells[index])
@@ -465,8 +472,7 @@ def check(place: str | Path, recording: Recording, *, first_line: int | None = N
     row = f"{place}, sample" if first_line is None else f"{place}, line"
     first = first_line or 0
     time, values = recording.time_s, recording.values
-    if len(time) == 0:
-        raise InputError(place, "there are no samples", "record again, or give another file")
+    refuse_if(len(time) == 0, place, "there are no samples", "record again, or give another file")
     marked = np.zeros(len(time), dtype=bool)
     if recording.quality is not None:
         marked = recording.quality == MISSING

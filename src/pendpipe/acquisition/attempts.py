@@ -24,7 +24,7 @@ from pendpipe.acquisition.raw import (
     is_being_recorded,
     read_raw,
 )
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
 _STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
@@ -107,8 +107,12 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
     for path in sorted(paths):
         if not path.is_file():
             continue
-        if is_being_recorded(path):
-            raise InputError(path, "another process is recording into it", "wait for its end")
+        refuse_if(
+            is_being_recorded(path),
+            path,
+            "another process is recording into it",
+            "wait for its end",
+        )
         try:
             raw = read_raw(path)
             decode_recording(raw)

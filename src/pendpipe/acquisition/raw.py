@@ -32,7 +32,7 @@ from typing import IO, Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 _FORMAT: Final = "pendpipe-raw"
 _BEGINNING: Final = b'{"format": "pendpipe-raw"'
@@ -305,8 +305,12 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         if content.startswith(_BEGINNING):
             problem = "the description of the recording is damaged"
         raise InputError(place, problem, "give another copy")
-    if header.get("version") not in (1, 2):
-        raise InputError(place, "it was made by a newer version", "install a newer pendpipe")
+    refuse_if(
+        header.get("version") not in (1, 2),
+        place,
+        "it was made by a newer version",
+        "install a newer pendpipe",
+    )
     return header, end + 1
 
 

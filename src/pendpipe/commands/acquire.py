@@ -23,7 +23,7 @@ from types import FrameType
 from typing import Any, Final
 
 from pendpipe.arguments import Flags, add, declare, load
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 _FLAGS: Final[Flags] = {
     "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
@@ -89,8 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
             return _serve(arguments)
         if arguments.campaign:
             return _stage(arguments)
-        if not arguments.out:
-            raise InputError("--out", "no file is named", "give --out FILE.csv")
+        refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
         return _record(arguments)
 
 
@@ -160,8 +159,7 @@ def _check_place(out: Path) -> None:
     """Refuse, before anything is recorded, a place where no recording can be written."""
     from pendpipe.files import check_writable
 
-    if out.is_dir():
-        raise InputError(out, "this is a folder", "name a file in it")
+    refuse_if(out.is_dir(), out, "this is a folder", "name a file in it")
     if out.is_file() or not out.exists():  # else it is a device or a pipe
         check_writable(out.parent)
 
@@ -169,8 +167,9 @@ def _check_place(out: Path) -> None:
 def _check_length(arguments: argparse.Namespace) -> None:
     """Let ``--samples`` give the length, where it is there."""
     if arguments.samples is not None:
-        if arguments.samples < 1:
-            raise InputError("--samples", "it must be positive", "give a whole number above 0")
+        refuse_if(
+            arguments.samples < 1, "--samples", "it must be positive", "give a whole number above 0"
+        )
         if arguments.rate > 0:
             arguments.duration = arguments.samples / arguments.rate
 
@@ -183,8 +182,7 @@ def _stage(arguments: argparse.Namespace) -> int:
         from pendpipe.manifest import job
         from pendpipe.stages.acquire import run_caliper
 
-        if not arguments.out:
-            raise InputError("--out", "no file is named", "give --out FILE.csv")
+        refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
         out, source = Path(arguments.out), caliper_source(campaign)
         with job(out.parent, "caliper", sources=[source] if source else []) as running:
             run_caliper(campaign, out)
@@ -236,12 +234,12 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         from pendpipe.acquisition.simulated import acquire_simulated, example_signal
 
         where, _, kind = arguments.device.partition(":")
-        if where != "simulated" or not kind:
-            raise InputError(
-                f"--device {arguments.device}",
-                "only simulated devices go here",
-                "give simulated:di2108",
-            )
+        refuse_if(
+            where != "simulated" or not kind,
+            f"--device {arguments.device}",
+            "only simulated devices go here",
+            "give simulated:di2108",
+        )
         constant = arguments.volts_per_radian or 3.85
         acquire_simulated(
             kind,
@@ -288,8 +286,12 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 def _clock_scale(arguments: argparse.Namespace) -> float:
     scale = float(arguments.clock_scale)
-    if not (math.isfinite(scale) and scale > 0):
-        raise InputError("--clock-scale", "it must be positive", "give 1 for real time")
+    refuse_if(
+        not (math.isfinite(scale) and scale > 0),
+        "--clock-scale",
+        "it must be positive",
+        "give 1 for real time",
+    )
     return scale
 
 

@@ -122,12 +122,13 @@ def _statement(calibration: Calibration) -> str:
 
 def _record(arguments: argparse.Namespace) -> int:
     """Pick the constant that holds for one record of a campaign."""
-    from pendpipe.errors import InputError
+    from pendpipe.errors import refuse_if
     from pendpipe.stages.calibrate import calibrate_record
     from pendpipe.stages.refusal import run_stage
 
-    if arguments.out is None:
-        raise InputError("--out", "it is missing", "give the file for the record's constant")
+    refuse_if(
+        arguments.out is None, "--out", "it is missing", "give the file for the record's constant"
+    )
     return run_stage(
         "calibrate",
         arguments.record,

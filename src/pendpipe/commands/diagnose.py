@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
-from pendpipe.errors import DamagedError, InputError
+from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 
 if TYPE_CHECKING:
@@ -100,8 +100,12 @@ def run(arguments: argparse.Namespace) -> int:
         return _diagnose_several(arguments)
     arguments.file, given = arguments.files[0], arguments.calibration
     arguments.calibration = given[0] if given else None
-    if arguments.record is not None and arguments.out is None:
-        raise InputError("--record", "a campaign's record needs a folder", "add --out DIR")
+    refuse_if(
+        arguments.record is not None and arguments.out is None,
+        "--record",
+        "a campaign's record needs a folder",
+        "add --out DIR",
+    )
     keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     if arguments.out is not None and Path(arguments.file).is_file():
@@ -166,8 +170,12 @@ def _diagnose_several(arguments: argparse.Namespace) -> int:
             option = f"--{single.replace('_', '-')}"
             raise InputError(option, "it is for one recording", "give one FILE, or leave it out")
     recordings, made, given = {}, [], arguments.calibration
-    if len(given) not in (0, 1, len(arguments.files)):
-        raise InputError("--calibration", f"{len(given)} are given", "give one, or one for each")
+    refuse_if(
+        len(given) not in (0, 1, len(arguments.files)),
+        "--calibration",
+        f"{len(given)} are given",
+        "give one, or one for each",
+    )
     names = distinct_names(arguments.files)
     for number, (file, name) in enumerate(zip(arguments.files, names, strict=True)):
         if Path(file).with_name("refused.json").exists():

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit import FitResult
@@ -87,8 +87,7 @@ def _stage(arguments: argparse.Namespace) -> int:
     """Fit one record of a campaign; a red light stands in the result and stops nothing."""
     from pendpipe.stages.refusal import run_stage
 
-    if not arguments.out:
-        raise InputError("--out", "a record's fit needs a file", "give --out fit.json")
+    refuse_if(not arguments.out, "--out", "a record's fit needs a file", "give --out fit.json")
     return run_stage(
         "fit",
         arguments.record,
@@ -140,8 +139,12 @@ def _write(arguments: argparse.Namespace, result: FitResult) -> None:
 
 def _check_figure(path: Path | None) -> None:
     """Refuse a form that nobody can draw before the file is written."""
-    if path is not None and path.suffix not in (".svg", ".png"):
-        raise InputError(f"--figure {path}", "its form is unknown", "end its name in .svg or .png")
+    refuse_if(
+        path is not None and path.suffix not in (".svg", ".png"),
+        f"--figure {path}",
+        "its form is unknown",
+        "end its name in .svg or .png",
+    )
 
 
 def _draw(path: Path, result: FitResult) -> None:
@@ -164,8 +167,12 @@ def _gravity_or_length(arguments: argparse.Namespace, result: FitResult) -> str:
     from pendpipe.analysis.fit.summary import gravity_line
 
     for option, value in (("--length", arguments.length), ("--gravity", arguments.gravity)):
-        if value is not None and not 0.0 < value < float("inf"):
-            raise InputError(option, f"{value} is no length or acceleration", "give one above 0")
+        refuse_if(
+            value is not None and not 0.0 < value < float("inf"),
+            option,
+            f"{value} is no length or acceleration",
+            "give one above 0",
+        )
     return gravity_line(result, length_m=arguments.length, gravity=arguments.gravity)
 
 

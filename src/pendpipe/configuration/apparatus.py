@@ -12,7 +12,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.models import Apparatus, Fluid
 from pendpipe.configuration.records import Record
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 
 class Pendulum(NamedTuple):
@@ -46,10 +46,12 @@ def pendulum(campaign: Campaign, record: Record) -> Pendulum:
         settings.apparatus.gravity_m_per_s2,
         plain_added_mass=settings.apparatus.added_mass == "plain",
     )
-    if not np.isfinite(moving.angular_frequency_per_s):
-        raise InputError(
-            f"geometry {record.geometry}", "the pendulum turns over", "move a weight down"
-        )
+    refuse_if(
+        not np.isfinite(moving.angular_frequency_per_s),
+        f"geometry {record.geometry}",
+        "the pendulum turns over",
+        "move a weight down",
+    )
     return Pendulum(parts, fluid, geometry.sphere, moving)
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from pendpipe.configuration.faults import as_input_error, nearest, read_text
 from pendpipe.configuration.models import Configuration, Geometry
 from pendpipe.configuration.records import Record, read_records
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_json
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
@@ -99,17 +99,24 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
 def _check_results(results: str, place: str | Path) -> None:
     """Refuse a folder whose name shells, Snakemake's wildcards or Windows read otherwise."""
     where = f"{place}, results"
-    if not results.strip() or results.startswith("-"):
-        raise InputError(where, f"'{results}' is no folder", "name one, such as results")
+    refuse_if(
+        not results.strip() or results.startswith("-"),
+        where,
+        f"'{results}' is no folder",
+        "name one, such as results",
+    )
     wrong = next((sign for sign in results if sign in _NOT_IN_A_FOLDER or sign < " "), None)
-    if wrong is not None:
-        raise InputError(
-            where, f"{wrong!r} can't stand in its name", "use letters, digits, spaces, / . _ -"
-        )
+    refuse_if(
+        wrong is not None,
+        where,
+        f"{wrong!r} can't stand in its name",
+        "use letters, digits, spaces, / . _ -",
+    )
     folder = Path(results)
     existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not existing.is_dir():
-        raise InputError(where, f"{existing} is a file, not a folder", "name another folder")
+    refuse_if(
+        not existing.is_dir(), where, f"{existing} is a file, not a folder", "name another folder"
+    )
 
 
 def _check_record(campaign: Campaign, entry: Record) -> None:
@@ -121,10 +128,15 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
         "geometry": (entry.geometry, configuration.geometries),
     }
     for column, (name, names) in known.items():
-        if name and name not in names:
-            raise InputError(where, f"unknown {column} '{name}'", nearest(name, names))
-    if entry.start_s is not None and entry.stop_s is not None and entry.stop_s <= entry.start_s:
-        raise InputError(where, "stop_s is not after start_s", "fix or blank the cells")
+        refuse_if(
+            name and name not in names, where, f"unknown {column} '{name}'", nearest(name, names)
+        )
+    refuse_if(
+        entry.start_s is not None and entry.stop_s is not None and entry.stop_s <= entry.start_s,
+        where,
+        "stop_s is not after start_s",
+        "fix or blank the cells",
+    )
     if entry.source != "simulated":
         return
     missing = [
@@ -137,12 +149,15 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
         }.items()
         if not there
     ]
-    if missing:
-        raise InputError(where, f"a simulated record needs {', '.join(missing)}", "add it")
+    refuse_if(missing, where, f"a simulated record needs {', '.join(missing)}", "add it")
     assert configuration.simulated is not None
     releases = configuration.simulated.release
-    if entry.record not in releases and entry.fluid not in releases:
-        raise InputError(where, "its release is not described", "add it to simulated.release")
+    refuse_if(
+        entry.record not in releases and entry.fluid not in releases,
+        where,
+        "its release is not described",
+        "add it to simulated.release",
+    )
 
 
 def _check_geometries(configuration: Configuration, place: str | Path) -> None:
@@ -153,9 +168,15 @@ def _check_geometries(configuration: Configuration, place: str | Path) -> None:
     for name, geometry in configuration.geometries.items():
         where = f"{place}, geometries.{name}"
         for weight in geometry.weights_m:
-            if weight not in apparatus.weights:
-                raise InputError(
-                    where, f"unknown weight '{weight}'", nearest(weight, apparatus.weights)
-                )
-        if geometry.sphere and apparatus.sphere is None:
-            raise InputError(where, "the apparatus has no sphere", "add it, or set sphere: false")
+            refuse_if(
+                weight not in apparatus.weights,
+                where,
+                f"unknown weight '{weight}'",
+                nearest(weight, apparatus.weights),
+            )
+        refuse_if(
+            geometry.sphere and apparatus.sphere is None,
+            where,
+            "the apparatus has no sphere",
+            "add it, or set sphere: false",
+        )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.configuration.faults import nearest, read_text
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 COLUMNS: Final = (
     "record",
@@ -104,22 +104,22 @@ def read_records(path: str | Path) -> list[Record]:
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.startswith("#")
     ]
-    if not rows:
-        raise InputError(
-            place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}"
-        )
+    refuse_if(not rows, place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}")
     names = [name.strip() for name in rows[0][1].split("\t")]
     _check_columns(f"{place}, line {rows[0][0]}", names)
     records: list[Record] = []
     for number, line in rows[1:]:
         cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
         where = f"{place}, line {number}"
-        if len(cells) > len(names):
-            raise InputError(where, f"{len(cells)} cells, not {len(names)}", "separate by one tab")
+        refuse_if(
+            len(cells) > len(names),
+            where,
+            f"{len(cells)} cells, not {len(names)}",
+            "separate by one tab",
+        )
         cells += [""] * (len(names) - len(cells))
         records.append(_record(where, dict(zip(names, cells, strict=True))))
-    if not records:
-        raise InputError(place, "the table has no records", "add a row a record")
+    refuse_if(not records, place, "the table has no records", "add a row a record")
     _check_names(place, records)
     return records
 
@@ -132,15 +132,15 @@ def _check_columns(where: str, names: list[str]) -> None:
             (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
             (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
         ):
-            if wrong:
-                raise InputError(where, problem, remedy)
+            refuse_if(wrong, where, problem, remedy)
 
 
 def _record(where: str, row: dict[str, str]) -> Record:
     """Make a record from the cells of a row."""
     _check_name(where, row["record"])
-    if not row["source"]:
-        raise InputError(where, "the source is blank", "write simulated, dataq:<port> or a file")
+    refuse_if(
+        not row["source"], where, "the source is blank", "write simulated, dataq:<port> or a file"
+    )
     if row.get("pendulum"):
         _check_name(where, row["pendulum"])
     cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS if name not in _NUMBERS}
@@ -172,8 +172,7 @@ def _check_name(where: str, name: str) -> None:
             "rename the record",
         ),
     ):
-        if wrong:
-            raise InputError(where, problem, remedy)
+        refuse_if(wrong, where, problem, remedy)
 
 
 def _number(where: str, row: dict[str, str], name: str) -> float | None:
@@ -183,8 +182,12 @@ def _number(where: str, row: dict[str, str], name: str) -> float | None:
         value = float(text) if text else None
     except ValueError:
         raise InputError(where, f"{name} '{text}' is no number", "fix or blank the cell") from None
-    if value is not None and not math.isfinite(value):
-        raise InputError(where, f"{name} is not finite", "fix or blank the cell")
+    refuse_if(
+        value is not None and not math.isfinite(value),
+        where,
+        f"{name} is not finite",
+        "fix or blank the cell",
+    )
     return value
 
 

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.samples import Swing, derivative_slope, swing_of
 from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Role, plain, role_of, unit_of
@@ -118,8 +118,9 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     InputError
         When a named column does not exist, or no column can be the reading.
     """
-    if not table.columns:
-        raise InputError(table.place, "there is no column of numbers", "give time and readings")
+    refuse_if(
+        not table.columns, table.place, "there is no column of numbers", "give time and readings"
+    )
     roles = {column.number: meaning(column) for column in table.columns}
     for column in table.columns:
         # "run1" counts nothing where it swings.
@@ -198,8 +199,9 @@ def _parts(table: Table, options: ReadOptions) -> list[str]:
     if any(column.name == key for column in table.columns) or "," not in key:
         return [key]
     parts = [part.strip() for part in key.split(",")]
-    if len(parts) != 2:
-        raise InputError("--column", f"'{key}' names {len(parts)} columns", "give one, or x,y")
+    refuse_if(
+        len(parts) != 2, "--column", f"'{key}' names {len(parts)} columns", "give one, or x,y"
+    )
     return parts
 
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
 from pendpipe.formats.text import read_table as read_text
 from pendpipe.formats.text import table_of_text
@@ -60,12 +60,13 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str, bytes]:
     """Unpack the members that may hold samples; phyphox puts remarks into ``meta/``."""
-    if any(name.lower().endswith((".cap", "main.xml")) for name in names) or any(
-        re.match(r"data/.*\.tmp$", name) for name in names
-    ):
-        raise InputError(
-            place, "this is a project of PASCO Capstone", "export its data as CSV or text"
-        )
+    refuse_if(
+        any(name.lower().endswith((".cap", "main.xml")) for name in names)
+        or any(re.match(r"data/.*\.tmp$", name) for name in names),
+        place,
+        "this is a project of PASCO Capstone",
+        "export its data as CSV or text",
+    )
     wanted = (".csv", ".tsv", ".txt", ".dat", ".trk")
     return {
         name: archive.read(name)
@@ -86,8 +87,7 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
             tables[name] = reader(place, content, options)
         except (NotThisFormatError, InputError) as fault:
             reason = f"{name}: {getattr(fault, 'problem', fault)}"
-    if not tables:
-        raise InputError(place, f"the archive has no table ({reason})", "give the file in it")
+    refuse_if(not tables, place, f"the archive has no table ({reason})", "give the file in it")
     best = max(tables, key=lambda name: len(tables[name].columns[0].values))
     return _noted(tables[best], f"'{best}' of the archive", [n for n in tables if n != best])
 
@@ -142,8 +142,9 @@ def _of_sheets(place: Path, sheets: _Sheets, options: ReadOptions) -> Table:
         for title, sheet in sheets.items()
     }
     best = max(numbers, key=lambda title: numbers[title], default="")
-    if not numbers.get(best):
-        raise InputError(place, "no sheet holds numbers", "give the workbook with the samples")
+    refuse_if(
+        not numbers.get(best), place, "no sheet holds numbers", "give the workbook with the samples"
+    )
     text = "\n".join("\t".join(map(_written, row)) for row in sheets[best]) + "\n"
     try:
         table = table_of_text(place, text, replace(options, delimiter="\t"), "excel")
@@ -228,8 +229,7 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     else:
         raise NotThisFormatError("the XML is none of CASSY Lab's, Logger Pro's or Tracker's")
     found = [(title, unit, values) for title, unit, values in found if len(values) > 3]
-    if not found:
-        raise InputError(place, "the project holds no samples", "export the data as CSV")
+    refuse_if(not found, place, "the project holds no samples", "export the data as CSV")
     # Runs side by side are of unlike length: the shorter end in empty cells.
     values = np.array([*zip_longest(*(each[2] for each in found), fillvalue=np.nan)], np.float64)
     columns = tuple(
@@ -287,8 +287,7 @@ def _of_tracker(place: Path, root: ET.Element) -> list[_Named]:
             of[kind].append(_frames(track, f"{kind}$FrameData"))
     mass, axes = max(of["PointMass"], key=len), next(filter(None, of["ImageCoordSystem"]), {})
     for wrong, what in ((not mass, "has no point mass"), (not step_ms > 0, "gives no frame rate")):
-        if wrong:
-            raise InputError(place, f"the project {what}", "export its data as text")
+        refuse_if(wrong, place, f"the project {what}", "export its data as text")
     numbers = [number for number in sorted(mass) if {"x", "y"} <= mass[number].keys()]
     # The axes of a frame are those that were set last.
     known = sorted(axes)

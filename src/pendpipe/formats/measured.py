@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.choose import Choice, one_way
 from pendpipe.formats.samples import (
     derivative_slope,
@@ -423,8 +423,12 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
         When the columns have fewer rows than the times, or the column is no motion.
     """
     rows = len(choice.readings[0].values)
-    if any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows:
-        raise InputError(table.place, "the columns are of unequal length", "choose with --column")
+    refuse_if(
+        any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows,
+        table.place,
+        "the columns are of unequal length",
+        "choose with --column",
+    )
     if len(choice.readings) == 2:
         return _position(choice.readings[0], choice.readings[1])
     time_s = np.full(rows, np.nan)
@@ -465,13 +469,13 @@ def _unit(
         return _contradicted(column, written, time_s) or _Guess(written)
     if column.unit and written is None:
         return _Guess(Unit("own", 1.0, column.unit), f"is in {column.unit}, analysed as it stands")
-    if written is not None or role in ("none", "time", "index"):
-        raise InputError(
-            table.place,
-            f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
-            " motion is read from",
-            "choose another with --column, or give its unit with --unit",
-        )
+    refuse_if(
+        written is not None or role in ("none", "time", "index"),
+        table.place,
+        f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
+        " motion is read from",
+        "choose another with --column, or give its unit with --unit",
+    )
     finite = column.values[np.isfinite(column.values)]
     whole = bool(len(finite)) and bool(np.all(finite == np.rint(finite)))
     reach = _reach(finite)

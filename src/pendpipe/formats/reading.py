@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.choose import choose
 from pendpipe.formats.measured import TimeBase, readings, refuse_text, time_base
 from pendpipe.formats.samples import (
@@ -139,8 +139,9 @@ def file_bytes(place: Path) -> bytes:
         standard = str(place) in ("-", "/dev/stdin")
         found = None if standard else place.stat()
         for is_kind, what, remedy in _NO_FILES:
-            if found is not None and is_kind(found.st_mode):
-                raise InputError(place, f"this is a {what}", remedy)
+            refuse_if(
+                found is not None and is_kind(found.st_mode), place, f"this is a {what}", remedy
+            )
         _refuse_size(place, found.st_size if found else 0)
         data = _standard_input() if standard else place.read_bytes()
     except FileNotFoundError:
@@ -148,8 +149,13 @@ def file_bytes(place: Path) -> bytes:
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
         raise InputError(place, f"the file can't be read ({reason})", "check it") from None
-    if not data[:1024].strip(b"\0 \t\r\n\xef\xbb\xbf") and not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
-        raise InputError(place, "the file is empty", "record again, or give another file")
+    refuse_if(
+        not data[:1024].strip(b"\0 \t\r\n\xef\xbb\xbf")
+        and not data.strip(b"\0 \t\r\n\xef\xbb\xbf"),
+        place,
+        "the file is empty",
+        "record again, or give another file",
+    )
     return data
 
 
@@ -180,28 +186,28 @@ def _unpacked(place: Path, data: bytes) -> bytes:
         content = bytes(unpacker.decompress(data, most_unpacked(len(data))))
     except (OSError, ValueError, EOFError, zlib.error, lzma.LZMAError) as fault:
         raise InputError(place, f"it can't be unpacked ({fault})", "pack it again") from None
-    if not unpacker.eof:
-        raise InputError(
-            place, "what is packed in it is cut short, or too large", "give the file in it"
-        )
+    refuse_if(
+        not unpacker.eof,
+        place,
+        "what is packed in it is cut short, or too large",
+        "give the file in it",
+    )
     return content
 
 
 def _refuse_size(place: Path, size: int) -> None:
-    if size > _LARGEST:
-        raise InputError(
-            place,
-            f"the file holds {size / 1e9:.1f} GB, more than the {_LARGEST / 1e9:.1f} GB of a"
-            " recording",
-            "give a part of it",
-        )
+    refuse_if(
+        size > _LARGEST,
+        place,
+        f"the file holds {size / 1e9:.1f} GB, more than the {_LARGEST / 1e9:.1f} GB of a recording",
+        "give a part of it",
+    )
 
 
 def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Try the readers in turn."""
     for mark, what, remedy in _OTHERS:
-        if data.startswith(mark):
-            raise InputError(place, f"this is {what}", remedy)
+        refuse_if(data.startswith(mark), place, f"this is {what}", remedy)
     reason: NotThisFormatError | None = None
     for name, (module, _, function) in ((name, where.partition(".")) for name, where in READERS):
         reader: Reader = getattr(import_module(f"pendpipe.formats.{module}"), function)
@@ -461,8 +467,12 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     plain = read_if_plain(place, data, options)
     table = table_of_plain(place, plain) if plain is not None else table_of(place, data, options)
     choice = choose(table, options, reading=False)
-    if not choice.readings and not choice.channels:
-        raise InputError(place, "there is no column but the time", "give readings beside it")
+    refuse_if(
+        not choice.readings and not choice.channels,
+        place,
+        "there is no column but the time",
+        "give readings beside it",
+    )
     choice = replace(choice, readings=choice.readings or choice.channels[:1])
     column, weak = choice.readings[0], tuple[str, ...]()
     try:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 
 
 class NotThisFormatError(Exception):
@@ -148,12 +148,25 @@ class ReadOptions:
             ("--sample-rate", self.sample_rate),
             ("--volts-per-radian", self.volts_per_radian),
         ):
-            if value is not None and not (value == value and abs(value) not in (0.0, float("inf"))):
-                raise InputError(option, f"{value} can't be used", "give a finite number, not 0")
-        if self.sample_rate is not None and self.sample_rate < 0:
-            raise InputError("--sample-rate", "it is negative", "give samples a second")
-        if self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s:
-            raise InputError("--stop", "it does not lie after --start", "swap the two")
+            refuse_if(
+                value is not None
+                and not (value == value and abs(value) not in (0.0, float("inf"))),
+                option,
+                f"{value} can't be used",
+                "give a finite number, not 0",
+            )
+        refuse_if(
+            self.sample_rate is not None and self.sample_rate < 0,
+            "--sample-rate",
+            "it is negative",
+            "give samples a second",
+        )
+        refuse_if(
+            self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s,
+            "--stop",
+            "it does not lie after --start",
+            "swap the two",
+        )
 
     @property
     def time_column(self) -> str | None:

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.layout import (
     COMMENT,
     Layout,
@@ -84,10 +84,12 @@ def _unified(text: str) -> str:
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read a table from a text file, whatever its layout."""
-    if len(data) > _LARGEST:
-        raise InputError(
-            place, f"the table holds more than {_LARGEST >> 20} MB", "give a part of it"
-        )
+    refuse_if(
+        len(data) > _LARGEST,
+        place,
+        f"the table holds more than {_LARGEST >> 20} MB",
+        "give a part of it",
+    )
     return table_of_text(place, decode(data), options, "csv")
 
 
@@ -102,12 +104,12 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         lines = form_of(lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
-    if first > _LONGEST_HEADER:
-        raise InputError(
-            place,
-            f"no row of numbers stands in the first {_LONGEST_HEADER} lines",
-            "give a table with a row a sample",
-        )
+    refuse_if(
+        first > _LONGEST_HEADER,
+        place,
+        f"no row of numbers stands in the first {_LONGEST_HEADER} lines",
+        "give a table with a row a sample",
+    )
     header = read_header(place, lines[: first + 1], layout)
     lines, cut = _without_cut_row(lines, first, layout)
     found, keys = _at_once(lines, first, layout, header), list[list[str]]()
@@ -115,8 +117,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     numbers = np.arange(first + 1, first + 1 + (len(found[0].values) if found else 0))
     if found is None:
         rows, numbers, notes = _rows(lines, first, layout)
-        if not rows:
-            raise InputError(place, "there are no samples", "record again, or give another file")
+        refuse_if(not rows, place, "there are no samples", "record again, or give another file")
         found, keys = _columns(place, rows, numbers, layout, header)
     for words in (*keys, *(c.values.tolist() for c in found if _numbers_runs(c))):
         found, numbers = _by_key(found, numbers, words)
@@ -336,12 +337,12 @@ _FEW_LINES: Final = 12
 
 def _refuse_long(place: Path, lines: Sequence[str]) -> None:
     longest = max(range(len(lines)), key=lambda number: len(lines[number]))
-    if len(lines[longest]) > _LONGEST_LINE:
-        raise InputError(
-            f"{place}, line {longest + 1}",
-            f"the line is {len(lines[longest])} letters long",
-            "give a table with a row a sample",
-        )
+    refuse_if(
+        len(lines[longest]) > _LONGEST_LINE,
+        f"{place}, line {longest + 1}",
+        f"the line is {len(lines[longest])} letters long",
+        "give a table with a row a sample",
+    )
 
 
 def _without_cut_row(

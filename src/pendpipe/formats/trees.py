@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 from pendpipe.formats.layout import column_of_clock_times
 from pendpipe.formats.samples import swing_of
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
@@ -72,8 +72,9 @@ def table_of_tree(
     """
     arrays = dict(_numbers(tree))
     columns = {name: values for name, values in arrays.items() if values.size > 3}
-    if not columns:
-        raise InputError(place, "there is no array of numbers in it", "save the time and the angle")
+    refuse_if(
+        not columns, place, "there is no array of numbers in it", "save the time and the angle"
+    )
     length = _length(columns, options)
     left = [name for name, values in columns.items() if len(values) != length]
     chosen = _one_clock({name: values for name, values in columns.items() if name not in left})
@@ -221,8 +222,12 @@ def _of_numpy(place: Path, data: bytes, form: str, options: ReadOptions) -> Tabl
 
 def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
     """Read a document, or one record a line."""
-    if len(data) > _LARGEST_JSON:
-        raise InputError(place, f"the JSON holds more than {_LARGEST_JSON >> 20} MB", "export CSV")
+    refuse_if(
+        len(data) > _LARGEST_JSON,
+        place,
+        f"the JSON holds more than {_LARGEST_JSON >> 20} MB",
+        "export CSV",
+    )
     text = data.decode("utf-8-sig", errors="replace")
     try:
         tree = json.loads(text)
@@ -236,8 +241,12 @@ def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
         worded = any(isinstance(value, str) for record in tree for value in record.values())
         rows = [_flat(record) for record in tree] if worded else []
         names = list(dict.fromkeys(name for row in rows for name in row))
-        if len(names) * len(rows) > _MOST_CELLS:
-            raise InputError(place, f"its records hold more than {_MOST_CELLS} cells", "export CSV")
+        refuse_if(
+            len(names) * len(rows) > _MOST_CELLS,
+            place,
+            f"its records hold more than {_MOST_CELLS} cells",
+            "export CSV",
+        )
         if rows:
             cells = (names, *([row.get(name, "") for name in names] for row in rows))
             text = "\n".join("\t".join(map(str, row)) for row in cells)

@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.layout import Layout
 from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
 from pendpipe.formats.text import decode, table_of_text
@@ -421,12 +421,12 @@ def _checked(place: Path, data: bytes, header: WindaqHeader) -> tuple[WindaqHead
             f"the header is damaged ({seen}): repaired to {found.scans} scans, which agree with"
             " the trailers"
         ]
-    if header.data_bytes > 64 * max(available, 1) or available < unit:
-        raise InputError(
-            place,
-            f"the WinDaq header is damaged ({seen}) and nothing in the file tells the true one",
-            "repair it with the vendor's tool, or give another copy",
-        )
+    refuse_if(
+        header.data_bytes > 64 * max(available, 1) or available < unit,
+        place,
+        f"the WinDaq header is damaged ({seen}) and nothing in the file tells the true one",
+        "repair it with the vendor's tool, or give another copy",
+    )
     whole, left = available // unit * unit, available % unit
     cause = "is still being written" if not header.data_bytes else "is cut short"
     note = f"the file {cause}: {whole // unit} whole scans are there (of {header.scans} promised)"
@@ -647,8 +647,7 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
     if not width or len(rows[last]) != width:
         notes.append(f"the last scan (line {last}) is cut short and left out")
         del rows[last]
-    if not rows:
-        raise InputError(place, "there is no whole scan", "record again, or give another file")
+    refuse_if(not rows, place, "there is no whole scan", "record again, or give another file")
     for number, row in rows.items():
         if not row or len(row) != width:
             problem = f"'{scans[number][:60]}' is no whole scan"

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 from pendpipe.files import replaced
 from pendpipe.formats.reading import markers_of
 from pendpipe.formats.windaq import MOST_SAMPLES, Channel, Event, gap_comment, pack
@@ -46,8 +46,7 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
         When there is none, or they are not evenly spaced.
     """
     rows = np.flatnonzero(recording.usable)
-    if not len(rows):
-        raise InputError(place, "there are no samples", "record again, or give another file")
+    refuse_if(not len(rows), place, "there are no samples", "record again, or give another file")
     time_s = recording.time_s[rows]
     if len(rows) == 1:
         return Grid(rows, recording.interval_s if len(recording) > 1 else 1.0, (), ())
@@ -66,12 +65,12 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
     )
     worst = float(np.abs(off).max()) / interval_s
     # A step of the times that is not seen as a break would be a silent shift.
-    if worst > _UNEVEN:
-        raise InputError(
-            place,
-            f"the samples are not evenly spaced (by up to {worst:.2g} of an interval)",
-            "this form has no times: write OUT.csv instead",
-        )
+    refuse_if(
+        worst > _UNEVEN,
+        place,
+        f"the samples are not evenly spaced (by up to {worst:.2g} of an interval)",
+        "this form has no times: write OUT.csv instead",
+    )
     pauses = tuple((int(at) + 1, float(steps[at]) - interval_s) for at in breaks)
     notes = []
     if pauses:
@@ -103,8 +102,12 @@ def check_name(path: str | Path) -> None:
     InputError
         On .WDQ, .WDC, .WHC, .mat and .xlsx.
     """
-    if Path(path).suffix.lower() in _READ_ONLY:
-        raise InputError(path, "this form is read, not written", "name it OUT.csv or OUT.wdh")
+    refuse_if(
+        Path(path).suffix.lower() in _READ_ONLY,
+        path,
+        "this form is read, not written",
+        "name it OUT.csv or OUT.wdh",
+    )
 
 
 def write(path: str | Path, recording: Recording) -> tuple[str, ...]:
@@ -150,8 +153,7 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         (np.abs(values).max() > _LARGEST, "the readings are too large", "check their unit"),
         (length_s > _LONGEST_S, f"{length_s:.3g} s are too long", "check the time's unit"),
     ):
-        if wrong:
-            raise InputError(place, f"{problem} for a .WDH", remedy)
+        refuse_if(wrong, place, f"{problem} for a .WDH", remedy)
     slope, intercept, counts, notes = _scaled(recording, values)
     number = recording.metadata.get("channel", "1")
     channel = Channel(

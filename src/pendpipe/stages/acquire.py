@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign
 from pendpipe.configuration.records import Record
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import replaced
 from pendpipe.manifest import SET_ASIDE
 from pendpipe.recording import Recording, read_plain, write_plain
@@ -101,10 +101,12 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     )
     from pendpipe.acquisition.recorder import record as record_from
 
-    if record.channel and not record.channel.isdecimal():
-        raise InputError(
-            f"record {record.record}", f"channel '{record.channel}' is no number", "fix the cell"
-        )
+    refuse_if(
+        record.channel and not record.channel.isdecimal(),
+        f"record {record.record}",
+        f"channel '{record.channel}' is no number",
+        "fix the cell",
+    )
     channel = int(record.channel) if record.channel else None
     folder = out.parent / "raw"
     attempts = read_attempts(folder.glob("*.raw"))

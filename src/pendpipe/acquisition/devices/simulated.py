@@ -17,7 +17,7 @@ import numpy as np
 
 from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 
 DEVICES: Final[dict[str, type[Dialect]]] = {}
 """The simulated instruments: what may follow ``simulated:``."""
@@ -235,12 +235,12 @@ class SimulatedDevice:
         rate_error: float = 0.0,
         clock: SimulatedClock | None = None,
     ) -> None:
-        if kind not in DEVICES:
-            raise InputError(
-                f"device simulated:{kind}",
-                "there is no such simulated device",
-                f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
-            )
+        refuse_if(
+            kind not in DEVICES,
+            f"device simulated:{kind}",
+            "there is no such simulated device",
+            f"choose from {', '.join(f'simulated:{name}' for name in DEVICES)}",
+        )
         self.kind = kind
         self.dialect = DEVICES[kind]()
         self.clock = clock or SimulatedClock(clock_scale)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Final
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.drivers.decoders import Decoder, SyncBitDecoder
 from pendpipe.acquisition.line import Line
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 DRIVERS: Final[dict[str, type[Driver]]] = {}
 """The driver of each model, by the name used on the command line (``di154rs``, ``di2108``)."""
@@ -121,10 +121,12 @@ class Driver(ABC):
             If nothing answers, or another model does.
         """
         found = self.hello()
-        if plain_name(found.model) != plain_name(self.model):
-            raise InputError(
-                self.line.port, f"this is a {found.model}, no {self.model}", "give its --model"
-            )
+        refuse_if(
+            plain_name(found.model) != plain_name(self.model),
+            self.line.port,
+            f"this is a {found.model}, no {self.model}",
+            "give its --model",
+        )
         return found
 
     def configure(
@@ -148,12 +150,12 @@ class Driver(ABC):
         full_scale = self.range_volts
         if range_volts is not None:
             enough = [high for high in self.ranges if high >= range_volts > 0]
-            if not enough:
-                raise InputError(
-                    self.line.port,
-                    f"the {self.model} has no range of +-{range_volts:g} V",
-                    f"choose from {', '.join(f'{high:g}' for high in sorted(self.ranges))}",
-                )
+            refuse_if(
+                not enough,
+                self.line.port,
+                f"the {self.model} has no range of +-{range_volts:g} V",
+                f"choose from {', '.join(f'{high:g}' for high in sorted(self.ranges))}",
+            )
             full_scale = min(enough)
         self.setup = Setup(chosen, self._set(chosen, rate_hz, full_scale), full_scale)
         return self.setup
