@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 
 from .lock_in import Lines, lock_in
 from .pendulums import OMEGA, baseline, reading, times
@@ -84,3 +88,13 @@ def test_added_mass_and_friction_are_what_remains_of_the_history_force() -> None
     assert found.decay == pytest.approx(0.5 * h * math.sqrt(0.5 * OMEGA), rel=0.01)
     shift = found.angular_frequency / OMEGA - 1.0
     assert shift == pytest.approx(-0.5 * h / math.sqrt(2.0 * OMEGA), rel=0.01)
+
+
+def test_a_mean_of_readings_is_followed_in_all_harmonics() -> None:
+    """At 2.2 rad sin x bends the motion: the mean of neighbours is x + h^2 (x'')/24, not less."""
+    values = np.append(baseline(b=0.01, c=0.002, start=2.2), 1.0)
+    fine = times(24.0, 0.005)
+    effects = (by_identifier("circular-error"),)
+    every = Model(fine, 0.005, effects, order=48).reading(values)
+    means = Model(fine.reshape(-1, 4).mean(axis=1), 0.02, effects, order=48, fold=4).reading(values)
+    assert means == pytest.approx(every.reshape(-1, 4).mean(axis=1), abs=3e-6)

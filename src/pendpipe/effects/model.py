@@ -335,7 +335,12 @@ class Model:
     def read(self, sampled: Sampled, value: FloatArray) -> FloatArray:
         """What the sensor makes of the sampled motion, shape (n,)."""
         pendulum = self.pendulum(value)
-        reading = np.asarray(value[OFFSET] + self._averaging(value) * sampled.angle)
+        left = self._averaging(value)
+        reading = np.asarray(value[OFFSET] + left * sampled.angle)
+        if self.fold > 1:
+            # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
+            bent = sampled.at_nodes(self.acceleration(sampled.motion, value))
+            reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * bent
         for effect, place in self.places():
             extra = effect.reading(sampled, pendulum, value[place])
             if extra is not None:
