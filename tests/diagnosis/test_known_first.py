@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
@@ -82,3 +83,30 @@ def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
         # Damping lowers a frequency by loss^2/(2 omega).
         assert value == pytest.approx(truth, abs=4.0 * sd + loss**2 / (2.0 * truth))
     assert found.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("omega", "amplitude", "duration_s"), [(3.0464, 0.4634, 72), (5.22, 1.0, 34)]
+)
+def test_a_gyroscope_shows_sin_x_and_no_lost_samples(
+    omega: float, amplitude: float, duration_s: int
+) -> None:
+    # At large amplitude the phase bends so fast at first that samples seem to be lost there.
+    loss, drag = 0.0027, 0.0322
+
+    def motion(_: float, state: FloatArray) -> list[float]:
+        x, v = state
+        return [v, -(omega**2) * np.sin(x) - 2.0 * loss * v - drag * abs(v) * v]
+
+    time_s = np.arange(0.0, duration_s, 0.01)
+    found = solve_ivp(
+        motion, (0.0, duration_s), [amplitude, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-9
+    )
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(time_s))
+    readings = Recording(time_s, found.y[1] + noise, "reading", metadata={"unit": "rad/s"})
+    answer = diagnose_recording(readings)
+    names = {each.identifier: each.probability for each in answer.effects}
+    assert names.pop("circular-error") > 0.95
+    assert "dropped-samples" not in names
+    value = answer.diagnosis.improved.parameters["frequency"].value
+    assert 2.0 * np.pi * value == pytest.approx(omega, rel=2e-4)

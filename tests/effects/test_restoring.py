@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import ellipj
 
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue.restoring import circular_error_of_rate
 from pendpipe.effects.model import Model
 
 from .lock_in import Lines, lock_in
@@ -98,3 +100,13 @@ def test_a_mean_of_readings_is_followed_in_all_harmonics() -> None:
     every = Model(fine, 0.005, effects, order=48).reading(values)
     means = Model(fine.reshape(-1, 4).mean(axis=1), 0.02, effects, order=48, fold=4).reading(values)
     assert means == pytest.approx(every.reshape(-1, 4).mean(axis=1), abs=3e-6)
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 0.8, 1.4])
+def test_the_angular_velocity_of_a_pendulum_is_a_jacobi_cn(amplitude: float) -> None:
+    """It is 2 omega k cn(omega t, k), k = sin(y/2), from the passage through the middle."""
+    k = math.sin(0.5 * amplitude)
+    values = np.append(baseline(start=2.0 * OMEGA * k), 1.0)
+    model = Model(TIME, 0.02, (circular_error_of_rate,), order=48)
+    exact = 2.0 * OMEGA * k * ellipj(OMEGA * TIME, k * k)[1]
+    assert model.reading(values) == pytest.approx(exact, abs=1e-5)

@@ -116,7 +116,7 @@ def begin(
     model = Model(
         data.time_s,
         data.interval_s,
-        order=order_for(abs(angle), samples.unit),
+        order=order_for(abs(angle) / (omega if samples.unit == "rad/s" else 1.0), samples.unit),
         fold=data.fold,
         first_s=float(data.time_s[0]),
         parts=parts,
@@ -174,8 +174,11 @@ def _before_the_stop(data: Data, model: Model, value: FloatArray) -> tuple[Data,
 
 
 def order_for(amplitude: float, unit: str) -> int:
-    """Return the number of nodes in a half cycle: more where sin x differs more from x."""
-    if unit != "rad" or amplitude < 0.8:
+    """Return the number of nodes in a half cycle: more where sin x differs more from x.
+
+    `amplitude` is that of the angle, rad, or of the angular velocity over omega.
+    """
+    if unit not in ("rad", "rad/s") or amplitude < 0.8:
         return 14
     if amplitude < 1.6:
         return 20

@@ -13,6 +13,7 @@ from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.restoring import circular_error_of_rate
 from pendpipe.effects.catalogue.sensor import SoftClipping
 from pendpipe.effects.curves import CURVES, Curve
 
@@ -40,9 +41,10 @@ def applicable(
     ]
     if rare:
         return list(fit.model.admitted(named))
-    bent = SoftClipping()
-    clipped = any(effect.key == bent.key for effect in fit.model.effects)
-    return [*fit.model.admitted([*named, *([] if clipped else [bent])]), *undrawn(CURVES, fit)]
+    keys = {effect.key for effect in fit.model.effects}
+    forms = [SoftClipping(), *([circular_error_of_rate] if unit == "rad/s" else [])]
+    named += [form for form in forms if form.key not in keys]
+    return [*fit.model.admitted(named), *undrawn(CURVES, fit)]
 
 
 def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Effect]:

@@ -35,6 +35,29 @@ def circular_error(motion: Motion, pendulum: Pendulum, size: float) -> FloatArra
 
 @enters(
     "acceleration",
+    identifier="circular-error",
+    key="circular-error:rate",
+    name="circular error",
+    equation=r"\omega^2 u \to \omega^2 u \cos x, \quad \sin x = -\dot u/\omega^2",
+    parameter_free=True,
+    expected=True,
+    prior=12.0,
+    example=(1.0,),
+    discriminating_test=circular_error.discriminating_test,
+)
+def circular_error_of_rate(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
+    """The form of `circular-error` in readings of the angular velocity u (rad/s), up to pi/2.
+
+    The time derivative of x'' = -omega^2 sin x is u'' = -omega^2 u cos x, with
+    sin x = -u'/omega^2.
+    """
+    omega = pendulum.angular_frequency
+    sine = np.clip(motion.velocity / (omega * omega), -1.0, 1.0)
+    return np.asarray(size * omega * omega * motion.angle * (1.0 - np.sqrt(1.0 - sine * sine)))
+
+
+@enters(
+    "acceleration",
     identifier="cubic-stiffness",
     name="cubic restoring torque",
     equation=r"\omega^2 x \to \omega^2 (x + k_3 x^3)",
