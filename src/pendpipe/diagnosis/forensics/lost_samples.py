@@ -118,10 +118,10 @@ def _scatter(step: FloatArray) -> FloatArray:
 
 def _trend(step: FloatArray) -> FloatArray:
     """Return the running median of the steps, which go on at the ends as they are there."""
-    odd = (
-        {"mode": "reflect", "reflect_type": "odd"} if len(step) > _TREND_STEPS else {"mode": "edge"}
-    )
-    padded = np.pad(step, _TREND_STEPS, **odd)
+    if len(step) > _TREND_STEPS:
+        padded = np.pad(step, _TREND_STEPS, mode="reflect", reflect_type="odd")
+    else:
+        padded = np.pad(step, _TREND_STEPS, mode="edge")
     return np.asarray(
         np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _TREND_STEPS + 1), axis=1)
     )
