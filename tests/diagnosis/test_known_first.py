@@ -110,3 +110,26 @@ def test_a_gyroscope_shows_sin_x_and_no_lost_samples(
     assert "dropped-samples" not in names
     value = answer.diagnosis.improved.parameters["frequency"].value
     assert 2.0 * np.pi * value == pytest.approx(omega, rel=2e-4)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("m", 9.81 / 4.1**2), ("pixels", 300.0)])
+def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor(
+    unit: str, scale: float
+) -> None:
+    omega, loss, drag = 4.1, 0.004, 0.015
+    time_s = np.arange(0.0, 40.0, 0.02)
+
+    def motion(_: float, state: FloatArray) -> list[float]:
+        x, v = state
+        return [v, -(omega**2) * np.sin(x) - 2.0 * loss * v - drag * abs(v) * v]
+
+    found = solve_ivp(motion, (0.0, 40.0), [0.4, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-9)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time_s))
+    values = scale * (0.1 + np.sin(found.y[0]) + noise)
+    quantity = "displacement_m" if unit == "m" else "reading"
+    answer = diagnose_recording(Recording(time_s, values, quantity, metadata={"unit": unit}))
+    names = [each.identifier for each in answer.effects]
+    assert names[0] == "circular-error"
+    assert not {"cubic-stiffness", "sensor-cubic"} & set(names)
+    curvature = answer.effects[0].parameters["inverse_length_squared"]
+    assert curvature.value**-0.5 == pytest.approx(scale, rel=0.02)

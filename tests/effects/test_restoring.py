@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ellipj
 
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.catalogue.restoring import circular_error_of_rate
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error_of_rate
 from pendpipe.effects.model import Model
 
 from .lock_in import Lines, lock_in
@@ -110,3 +110,23 @@ def test_the_angular_velocity_of_a_pendulum_is_a_jacobi_cn(amplitude: float) -> 
     model = Model(TIME, 0.02, (circular_error_of_rate,), order=48)
     exact = 2.0 * OMEGA * k * ellipj(OMEGA * TIME, k * k)[1]
     assert model.reading(values) == pytest.approx(exact, abs=1e-5)
+
+
+@pytest.mark.parametrize("amplitude", [0.2, 0.6, 1.0])
+def test_a_pendulum_seen_from_the_side_is_the_sine_of_its_angle(amplitude: float) -> None:
+    """Seen so, x = L sin(theta); viscous friction 2 b theta' is 2 b x'."""
+    length = 0.31
+    theta = reading("circular-error", (1.0,), baseline(b=0.02, start=amplitude), TIME, 48)
+    side = Model(TIME, 0.02, (CIRCULAR_ERROR_IN["m"],), order=48)
+    values = np.append(baseline(b=0.02, start=length * math.sin(amplitude)), 1.0 / length**2)
+    assert side.reading(values) == pytest.approx(length * np.sin(theta), abs=2e-6)
+
+
+def test_the_length_of_a_pendulum_in_metres_is_expected_about_g_over_omega_squared() -> None:
+    form = CIRCULAR_ERROR_IN["m"]
+    span = Model(TIME, 0.02).evaluate(baseline(start=0.1)).span
+    length = 9.81 / OMEGA**2
+    penalties = [form.prior_penalty(np.array([1.0 / (k * length) ** 2]), span) for k in (1, 1.2, 3)]
+    assert penalties[0] == pytest.approx(0.0, abs=1e-12)
+    assert penalties[1] < 1.0 < 20.0 < penalties[2]
+    assert CIRCULAR_ERROR_IN["pixels"].prior_penalty(np.array([1e-6]), span) == 0.0

@@ -252,7 +252,7 @@ def diagnose_decay(
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     law = law_of(found, weighed)
     after = before if same else _fitted_model(found.improved, found, law)
-    if not fixed and [each.identifier for each in found.improved.model.effects] == [SINE]:
+    if not fixed and [each.key for each in found.improved.model.effects] == [SINE]:
         after = _as_fit_prints(after, part, points, baseline, "sine", place)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:

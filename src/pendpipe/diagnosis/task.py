@@ -13,7 +13,7 @@ from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.restoring import circular_error_of_rate
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.catalogue.sensor import SoftClipping
 from pendpipe.effects.curves import CURVES, Curve
 
@@ -42,8 +42,8 @@ def applicable(
     if rare:
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
-    forms = [SoftClipping(), *([circular_error_of_rate] if unit == "rad/s" else [])]
-    named += [form for form in forms if form.key not in keys]
+    forms = SoftClipping(), CIRCULAR_ERROR_IN.get(unit)
+    named += [form for form in forms if form and form.key not in keys]
     return [*fit.model.admitted(named), *undrawn(CURVES, fit)]
 
 

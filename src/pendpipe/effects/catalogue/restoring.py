@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendpipe.effects.effect import Parameter, Pendulum, enters
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -54,6 +55,53 @@ def circular_error_of_rate(motion: Motion, pendulum: Pendulum, size: float) -> F
     omega = pendulum.angular_frequency
     sine = np.clip(motion.velocity / (omega * omega), -1.0, 1.0)
     return np.asarray(size * omega * omega * motion.angle * (1.0 - np.sqrt(1.0 - sine * sine)))
+
+
+_GRAVITY: Final = 9.81
+_LENGTH_SD: Final = 0.2
+"""Of ln L about g/omega^2: physical pendulums, and marks that are not at their centre."""
+
+
+def _unlike_a_pendulum(values: FloatArray, span: Span) -> float:
+    length = _GRAVITY / span.pendulum.angular_frequency**2
+    return float((0.5 * np.log(max(values[0], 1e-300) * length**2) / _LENGTH_SD) ** 2)
+
+
+def _from_the_side(motion: Motion, pendulum: Pendulum, curvature: float) -> FloatArray:
+    """The form of `circular-error` in the horizontal displacement x = L sin(theta).
+
+    x'' = -x [omega^2 cos(theta) + theta'^2], with x' = L cos(theta) theta'. In metres L is
+    expected about g/omega^2.
+    """
+    x, v = motion.angle, motion.velocity
+    square = np.minimum(curvature * x * x, 0.99)
+    bent = pendulum.angular_frequency**2 * (1.0 - np.sqrt(1.0 - square))
+    return np.asarray(x * (bent - curvature * v * v / (1.0 - square)))
+
+
+def _seen_from_the_side(unit: str, **more: Any) -> Effect:
+    return enters(
+        "acceleration",
+        Effect,
+        identifier="circular-error",
+        key=f"circular-error:{unit}",
+        name="circular error",
+        equation=r"x = L \sin\theta, \quad \ddot\theta = -\omega^2 \sin\theta",
+        parameters=(Parameter("inverse_length_squared", "1/rad^2", 0.0, math.inf),),
+        expected=True,
+        prior=circular_error.prior,
+        discriminating_test=circular_error.discriminating_test,
+        **more,
+    )(_from_the_side)
+
+
+CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
+    "rad/s": circular_error_of_rate,
+    "m": _seen_from_the_side("m", prior_penalty=_unlike_a_pendulum),
+    "pixels": _seen_from_the_side("pixels"),
+    "1": _seen_from_the_side("1"),
+}
+"""Its forms in readings that are no angles, by their unit."""
 
 
 @enters(
