@@ -311,9 +311,9 @@ def _days(date: tuple[str | None, ...], slashed: bool) -> int:
     """Count the days since 1970; 0 without a date, -1 where there is no such day."""
     import datetime as dt
 
+    parts = [int(part or 0) for part in date]
     if not any(date):
         return 0
-    parts = [int(part or 0) for part in date]
     year, month, day = parts[:3] if date[0] else parts[:2:-1]
     if not date[0] and (month > 12 or (slashed and day <= 12)):
         day, month = month, day

@@ -74,9 +74,8 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.arange(len(reading.values))
     if options.sample_rate is not None:
-        time: FloatArray = every.astype(np.float64) / options.sample_rate
         note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
-        return TimeBase(time, every, [note])
+        return TimeBase(every.astype(np.float64) / options.sample_rate, every, [note])
     if reading.time_s is not None:
         return TimeBase(reading.time_s, every)
     column = choice.time
@@ -93,8 +92,8 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     if column is None:
         return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
     _refuse_missing_times(table, column, np.ones(len(every), dtype=bool))
-    time = (column.values - column.values[0]) * table.interval_s
-    base = TimeBase(time, every, [f"{note} and '{column.label}'"])
+    time_s = (column.values - column.values[0]) * table.interval_s
+    base = TimeBase(time_s, every, [f"{note} and '{column.label}'"])
     return _in_order(table, choice, base, table.interval_s)
 
 
@@ -200,9 +199,8 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
         base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
         base.time_s = base.time_s - start
     for repaired in (_count_rows, _keep_last, _spread, _drop_repeats, _first_of_stacked, _sorted):
-        if np.diff(base.time_s).min(initial=1.0) > 0:
-            return base
-        repaired(choice, base)
+        if np.diff(base.time_s).min(initial=1.0) <= 0:
+            repaired(choice, base)
     steps = np.diff(base.time_s)
     if steps.min(initial=1.0) > 0:
         return base
@@ -318,13 +316,11 @@ def _rounded(time: FloatArray) -> FloatArray | None:
         return even if even[-1] > even[0] else None
     # The first stamps are the finest.
     early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
-    best: FloatArray | None = None
-    for change in (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2):
-        found = _frames(time, digit, (1.0 + change) * float(np.median(np.diff(early))))
-        # Fewest frames in all is the longest interval.
-        if found is not None and (best is None or np.diff(found).min() > np.diff(best).min()):
-            best = found
-    return best
+    changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
+    tried = [_frames(time, digit, (1.0 + c) * float(np.median(np.diff(early)))) for c in changes]
+    # Fewest frames in all is the longest interval.
+    counted = [even for even in tried if even is not None]
+    return max(counted, key=lambda even: np.diff(even).min(), default=None)
 
 
 def _last_digit(time: FloatArray) -> FloatArray:
@@ -349,23 +345,19 @@ def _frames(time: FloatArray, digit: FloatArray, interval: float) -> FloatArray 
         ``None`` where some stamp contradicts the count, or more than 2 % are missing: of
         so many any interval would do.
     """
-    if not interval > 0:
-        return None
-    index = np.arange(len(time), dtype=np.float64)
-    start = float(time[0])
-    for _ in range(8):
+    index, start, tries = np.arange(len(time), dtype=np.float64), float(time[0]), 8
+    while interval > 0 and tries:
         # At least one more than the row above, and at least what the stamp asks for.
         least = np.ceil((time - start - 0.6 * digit) / interval - 1e-9)
         count = index + np.maximum.accumulate(np.maximum(least - index, 0.0))
-        if count[-1] > 1.02 * len(time) + 3:
-            return None
         even: FloatArray = start + interval * count
+        if count[-1] > 1.02 * len(time) + 3:
+            break
         if np.all(np.abs(even - time) <= 0.6 * digit):
             return even
         fitted = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
-        start, interval = float(fitted.coef[0]), float(fitted.coef[1])
-        if not interval > 0:
-            return None
+        start, interval = fitted.coef.tolist()
+        tries -= 1
     return None
 
 
@@ -499,15 +491,14 @@ def _unit(
     if sensed or role in ("velocity", "acceleration", "signal"):
         what = "one of x, y, z" if sensed else role
         return _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", weak=True)
-    if role == "length":
-        if reach <= 2.0:
-            grown = _by_period(column, time_s, named=False)
-            if grown is not None and not grown.weak:
-                return grown
-            return _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
+    if role == "length" and reach > 2.0:
         return _Guess(
             _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
         )
+    if role == "length":
+        grown = _by_period(column, time_s, named=False)
+        metres = _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
+        return grown if grown and not grown.weak else metres
     bare = [other.values for other in choice.channels if not other.name]
     levels = [np.median(values) for values in bare if np.isfinite(values).all()]
     if not column.name and any(9.6 < abs(level) < 10.1 for level in levels):
@@ -621,19 +612,15 @@ def _by_step(finite: FloatArray, named: bool) -> _Guess | None:
             (_RADIAN, 180 / np.pi, "radians", "degrees"),
             (_DEGREE, np.pi / 180, "degrees", "radians"),
         ):
-            digit = _printed_digit(finite, scale)
-            if digit is not None:
+            if digit := _printed_digit(finite, scale):
                 why = f"converted to {other}, its values are multiples of {digit:.4g}"
                 return _Guess(unit, f"is taken to be in {name} ({why})")
     step = resolution(finite)
-    if step is None or _is_round(step):
-        return None
-    if not named and abs(float(f"{step:.3g}") / step - 1.0) < 2e-5:
+    if step is None or _is_round(step, named=named):
         return None
     for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
-        parts = turn / step
-        whole = round(parts)
-        near = abs(parts - whole) < 1e-6 * whole + 1e-4
+        whole = round(turn / step)
+        near = abs(turn / step - whole) < 1e-6 * whole + 1e-4
         if near and 100 <= whole <= 1 << 20 and (whole % 4 == 0 or whole % 50 == 0):
             return _Guess(unit, f"is taken to be in {name} (its step is a turn over {whole})")
     return None
@@ -654,10 +641,14 @@ def _printed_digit(finite: FloatArray, scale: float) -> float | None:
     return None
 
 
-def _is_round(step: float) -> bool:
-    """Say whether a step is 1, 2, 2.5 or 5 of some decimal place: a printed digit."""
+def _is_round(step: float, *, named: bool) -> bool:
+    """Say whether a step is 1, 2, 2.5 or 5 of some decimal place: a printed digit.
+
+    In a column that is not `named` an angle any step of three digits is round.
+    """
     leading = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
-    return bool(np.min(np.abs(leading - np.array([1.0, 2.0, 2.5, 5.0, 10.0])) / leading) < 2e-5)
+    digits = [1.0, 2.0, 2.5, 5.0, 10.0] + ([] if named else [float(f"{leading:.3g}")])
+    return bool(np.min(np.abs(leading - np.array(digits)) / leading) < 2e-5)
 
 
 def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
@@ -695,8 +686,6 @@ def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
 def _position(x: Column, y: Column) -> Readings:
     """Turn a position seen from the pivot into an angle: atan2(x, -y), 0 straight down."""
-    down = -1.0 if float(np.nanmedian(y.values)) < 0 else 1.0
-    angle = np.arctan2(x.values, down * y.values)
-    sign = "-" if down < 0 else ""
+    down, sign = (-1.0, "-") if float(np.nanmedian(y.values)) < 0 else (1.0, "")
     note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
-    return Readings(angle, "angle_rad", 1.0, "rad", (note,))
+    return Readings(np.arctan2(x.values, down * y.values), "angle_rad", 1.0, "rad", (note,))

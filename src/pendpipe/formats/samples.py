@@ -93,25 +93,21 @@ def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     periods, amplitudes
         From each crossing to the next but one, shape (n,); empty where there are few.
     """
-    good = np.isfinite(values) & np.isfinite(time)
+    good, none = np.isfinite(values) & np.isfinite(time), np.empty(0)
     time, values = time[good], values[good]
-    none = np.empty(0)
     if len(values) < 8 or np.abs(values).max() > _ABSURD:
         return none, none
     low, middle, high = np.percentile(values, (0.5, 50, 99.5))
     rest = values - middle
-    reach = 0.1 * max(float(high - middle), float(middle - low))
-    outside = np.flatnonzero(np.abs(rest) > reach)
-    if not reach > 0.0 or len(outside) < 8:
-        return none, none
+    outside = np.flatnonzero(np.abs(rest) > 0.1 * max(high - middle, middle - low))
     turns = np.flatnonzero(np.diff(np.signbit(rest[outside]).astype(np.int8)))
+    if not high > low or len(outside) < 8 or len(turns) < 5:
+        return none, none
     before, after = outside[turns], outside[turns + 1]
     part = rest[before] / (rest[before] - rest[after])
     crossings = time[before] + part * (time[after] - time[before])
-    if len(crossings) < 5:
-        return none, none
-    edges = before[:-2], before[2:]
-    largest = np.array([np.ptp(rest[a : b + 1]) for a, b in zip(*edges, strict=True)])
+    edges = zip(before[:-2], before[2:], strict=True)
+    largest = np.array([np.ptp(rest[a : b + 1]) for a, b in edges])
     lasted = crossings[2:] - crossings[:-2]
     usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
     return lasted[usual], 0.5 * largest[usual]
@@ -236,10 +232,8 @@ def sample_rate(time_s: FloatArray) -> float:
     """Samples a second, gaps left out; of uneven samples the reciprocal median interval."""
     steps = np.diff(time_s)
     middle = float(np.median(steps)) if len(steps) else 0.0
-    if not middle > 0:
-        return float("nan")
-    usual = steps[np.abs(steps - middle) <= 0.5 * middle]
-    return 1.0 / float(usual.mean() if is_uniform(time_s) else middle)
+    usual = steps[np.abs(steps - middle) <= 0.5 * middle] if is_uniform(time_s) else middle
+    return 1.0 / float(np.mean(usual)) if middle > 0 else float("nan")
 
 
 def find_gaps(time_s: FloatArray) -> list[Gap]:
@@ -274,11 +268,7 @@ def resolution(values: FloatArray) -> float | None:
         return None
     smallest = float(jumps[min(2, len(jumps) - 1)])
     near = float(jumps[jumps <= 1.35 * smallest].mean())
-    for start in (near, smallest):
-        found = _refined(jumps, start)
-        if found is not None:
-            return found
-    return None
+    return _refined(jumps, near) or _refined(jumps, smallest)
 
 
 def _refined(jumps: FloatArray, step: float) -> float | None:
@@ -286,20 +276,17 @@ def _refined(jumps: FloatArray, step: float) -> float | None:
 
     The reach of the fit grows, since an error of the step adds up over many steps.
     """
-    reach, full = 4.0 * step, float(jumps[-1])
+    reach, full = 2.0 * step, float(jumps[-1])
     while True:
+        reach *= 2.0
         near = jumps[jumps <= reach]
         multiples = np.rint(near / step)
-        weight = float(multiples @ multiples)
-        if weight > 0:
-            step = float(near @ multiples) / weight
-        misfit = np.abs(near - multiples * step)
+        step = float(near @ multiples) / (float(multiples @ multiples) or np.inf) or step
         # Jumps that belong to no ladder are spread evenly: 40 % of them within 0.2.
-        if np.mean(misfit < 0.2 * step) < 0.9:
+        if np.mean(np.abs(near - multiples * step) < 0.2 * step) < 0.9:
             return None
         if reach >= full:
             return step
-        reach *= 2.0
 
 
 def clipped_samples(
@@ -312,8 +299,8 @@ def clipped_samples(
     smooth motion would have it.
     """
     if limits is not None:
-        tolerance = 0.5 * (step or 0.0)
-        return int(np.sum((values <= limits[0] + tolerance) | (values >= limits[1] - tolerance)))
+        low, high = np.array(limits) + 0.5 * (step or 0.0) * np.array([1.0, -1.0])
+        return int(np.sum((values <= low) | (values >= high)))
     finite = values[np.isfinite(values)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
     off = max(4.0 * (step or 0.0), 1e-3 * span)

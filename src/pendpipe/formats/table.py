@@ -97,9 +97,9 @@ class Table:
 
     def where(self, row: int) -> str:
         """Name a row for a message."""
-        if self.lines is None:
-            return f"{self.place}, sample {row}"
-        return f"{self.place}, line {self.lines[row]}"
+        return f"{self.place}, " + (
+            f"sample {row}" if self.lines is None else f"line {self.lines[row]}"
+        )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import dataclass
+from itertools import chain
 from math import pi
 from typing import Final, Literal
 
@@ -113,6 +114,9 @@ _BRACKETED: Final = re.compile(r"^(.*?)\s*[\[({<]\s*([^\])}>]*)\s*[\])}>]\s*(.*)
 _SLASHED: Final = re.compile(r"^(.+?)\s*/\s*(\S.*)$")
 _SPACED: Final = re.compile(r"^(.+?)(?:\s+in\s+|\s*[,;:]\s*|\s+(?=\S\S))(\S+)$")
 _SUFFIX: Final = re.compile(r"^(.+?)[_\-.]([A-Za-zµ°]+)$")
+_LIKELY: Final = re.compile(
+    r".*([^_\-.]{2}|[_\-.][sV°])|(?i:s|x|y|z|pos|position|displacement)[_\-.]m"
+)
 _CAMEL: Final = re.compile(
     r"^(.*[a-z])(Rad|Deg|Mrad|Sec|Ms|Us|Mm|Cm|Volts?|Seconds|Millis|Micros)$"
 )
@@ -145,14 +149,8 @@ def split_header(text: str) -> tuple[str, str]:
         return re.sub(r"(?i)\s*\brun\s*#?\d+\s*$", "", name), bracketed[2].strip()
     for pattern in (_SLASHED, _SPACED, _SUFFIX, _CAMEL):
         split = pattern.match(text)
-        if split is None:
-            continue
-        unit = unit_of(split[2])
         # One letter after an underscore is as likely an axis or an index as a unit.
-        bare = pattern is _SUFFIX and len(split[2]) == 1 and split[2] not in "sV°"
-        if split[2] == "m" and re.fullmatch(r"(?i)s|x|y|z|pos|position|displacement", split[1]):
-            bare = False
-        if unit is not None and not bare:
+        if split and unit_of(split[2]) and (pattern is not _SUFFIX or _LIKELY.fullmatch(split[0])):
             return split[1].strip(), split[2].strip()
     return text, ""
 
@@ -257,16 +255,15 @@ def role_of(name: str) -> Role:
     words = plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip()))
     whole = re.sub(r"[\s_\-.]+", " ", words).strip()
     # "Zeit2" is the time of the second run.
-    for form in (whole, words, re.sub(r" ?\d+$", "", whole)):
-        for role, pattern in _PATTERNS:
-            if pattern.fullmatch(form):
-                return role
-    for role, pattern in _PATTERNS:
-        found = pattern.search(whole)
-        # One letter inside a longer name ("pendulum a") means little.
-        while found is not None and len(found[0]) == 1 and found[0].isascii():
-            found = pattern.search(whole, found.end())
-        if found is not None:
-            return role
+    forms = (whole, words, re.sub(r" ?\d+$", "", whole))
+    is_it = (role for form in forms for role, pattern in _PATTERNS if pattern.fullmatch(form))
+    # One letter inside a longer name ("pendulum a") means little.
+    holds_it = (
+        role
+        for role, pattern in _PATTERNS
+        if any(len(found[0]) > 1 or not found[0].isascii() for found in pattern.finditer(whole))
+    )
     unit = unit_of(name)
-    return "time" if unit is not None and unit.kind == "time" else "unknown"
+    return next(
+        chain(is_it, holds_it), "time" if unit is not None and unit.kind == "time" else "unknown"
+    )
