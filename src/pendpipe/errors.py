@@ -32,8 +32,7 @@ class InputError(Exception):
         self.place = str(place)
         self.problem = problem
         self.remedy = remedy
-        line = f"{self.place}: {problem}; {remedy}"
-        super().__init__(" ".join(line.split()))
+        super().__init__(" ".join(f"{self.place}: {problem}; {remedy}".split()))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
         """Let it come back whole from a worker process."""

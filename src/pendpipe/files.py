@@ -112,9 +112,7 @@ def finite(value: Any) -> Any:
         return [finite(entry) for entry in value]
     if hasattr(value, "tolist"):
         return finite(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:

@@ -130,8 +130,7 @@ def read_manifest(home: Path, stage: str) -> Manifest:
         if content.pop("check") != _digest(content):
             raise ValueError
         for name in ("outputs", "extras", "sources"):
-            entries = content[name].items()
-            setattr(manifest, name, {key: Sum(**entry) for key, entry in entries})
+            setattr(manifest, name, {key: Sum(**entry) for key, entry in content[name].items()})
         manifest.inputs, manifest.repaired = dict(content["inputs"]), tuple(content["repaired"])
     except (InputError, AttributeError, KeyError, TypeError, ValueError):
         raise DamagedError(

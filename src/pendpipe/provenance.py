@@ -52,8 +52,7 @@ def _data_of(module: str) -> tuple[Path, ...]:
     assert path is not None
     if path.name != "__init__.py":
         return ()
-    kept = path.parent.glob("templates/*")
-    return tuple(sorted(file for file in kept if file.is_file()))
+    return tuple(sorted(file for file in path.parent.glob("templates/*") if file.is_file()))
 
 
 @cache

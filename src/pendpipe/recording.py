@@ -124,9 +124,8 @@ class Recording:
             f"{len(times)} times and {len(readings)} readings",
             "give one time for each reading",
         )
-        told = notes, weak_guesses
-        fields = (times, readings, quantity, quality, metadata, resolution, *told)
-        for name, value in zip(self.__dataclass_fields__, fields, strict=True):
+        kept = (times, readings, quantity, quality, metadata, resolution, notes, weak_guesses)
+        for name, value in zip(self.__dataclass_fields__, kept, strict=True):
             object.__setattr__(self, name, value)
         if given:
             check("Recording", self)
@@ -214,9 +213,7 @@ class Recording:
         constant = volts_per_radian or self.number("volts_per_radian", place)
         if constant is None:
             guess = "no sensor constant: a, c and the amplitude are in volts (--volts-per-radian)"
-            if guess in self.weak_guesses:
-                return self
-            return replace(self, weak_guesses=(*self.weak_guesses, guess))
+            return replace(self, weak_guesses=tuple(dict.fromkeys((*self.weak_guesses, guess))))
         refuse_if(
             not constant,
             place,

@@ -89,9 +89,7 @@ def paths_beside(out: Path) -> list[Path]:
     """List the raw files that `new_path_beside` has named for a recording."""
     out = _file_of(out)
     pattern = re.compile(re.escape(out.stem) + rf"(\.{_STAMP})?\.raw")
-    if not out.parent.is_dir():
-        return []
-    return [path for path in out.parent.iterdir() if pattern.fullmatch(path.name)]
+    return [path for path in out.parent.glob("*") if pattern.fullmatch(path.name)]
 
 
 def read_attempts(paths: Iterable[Path]) -> list[Attempt]:

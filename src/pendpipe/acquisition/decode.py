@@ -71,8 +71,7 @@ def decode_recording(
     kept = raw.event("stopped").get("keep_scans")
     if kept is not None and len(segments) == 1:
         gone = sum(loss.lost_scans for loss in segments[0].losses if loss.reason == "damage")
-        first = segments[0].counts[: max(1, int(kept) - gone)]
-        segments = [replace(segments[0], counts=first)]
+        segments = [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
     if not segments:
         raise NothingRecordedError(
             place, "no scan was recorded", "check the device, and record again"
@@ -207,12 +206,11 @@ def _metadata(
 ) -> dict[str, str]:
     """Say where the recording comes from, as text."""
     header = raw.header
-    driver = find_driver(header["model"])
     metadata = {
         "source": str(header.get("source") or f"{header['model']} on {header['port']}"),
         "model": str(header["model"]),
         "channel": str(channel),
-        "bits": str(driver.bits),
+        "bits": str(find_driver(header["model"]).bits),
         "range_volts": repr(range_volts),
         "sample_rate_hz": repr(time_base.rate_hz),
         "sample_rate_nominal_hz": repr(time_base.nominal_hz),

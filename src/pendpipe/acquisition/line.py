@@ -184,12 +184,12 @@ def cannot_open(port: str, fault: Exception, platform: str = sys.platform) -> In
 
 def _permission(port: str, platform: str) -> str:
     """Say how to be let in."""
-    if platform == "linux":
-        group = _group(port) or "dialout"
-        return f"join its group (sudo usermod -aG {group} $USER), log out and in again"
-    if platform == "darwin":
-        return "give the /dev/cu.* name of the port; its owner must be you (ls -l)"
-    return "ask the owner of the machine"
+    group = _group(port) or "dialout"
+    remedies = {
+        "linux": f"join its group (sudo usermod -aG {group} $USER), log out and in again",
+        "darwin": "give the /dev/cu.* name of the port; its owner must be you (ls -l)",
+    }
+    return remedies.get(platform, "ask the owner of the machine")
 
 
 def _group(port: str) -> str | None:

@@ -295,8 +295,7 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     if end < 0 and (content.startswith(_BEGINNING) or _BEGINNING.startswith(content)):
         problem = "this is no raw recording of pendpipe, or only its beginning"
         raise NothingRecordedError(place, problem, "give another file")
-    line = content[: max(end, 0)]
-    header = _description(line)
+    header = _description(content[: max(end, 0)])
     if header is None:
         copies = (frame.content for _, frame in _frames(content, 0) if frame.kind == b"H")
         header, end = _description(next(copies, b"")), -1

@@ -196,10 +196,9 @@ class Session:
                 return f"the device ended its stream with '{message}'"
             if enough and not self._by_clock:
                 return "scans"
-            if self._watch and self._decoder:
-                counts = self._decoder.feed(data).counts
-                if self._watch.feed(counts[:, 0]):
-                    return "noise"
+            watch, decoder = self._watch, self._decoder
+            if watch and decoder and watch.feed(decoder.feed(data).counts[:, 0]):
+                return "noise"
             if len(data) < _BACKLOG:
                 time.sleep(poll_s)
 
@@ -310,8 +309,7 @@ def record(
         kept = {key: value for key, value in header.items() if value is not None}
         try:
             size = kind.decoder(len(session.setup.channels)).bytes_per_scan
-            bytes_per_s = session.setup.rate_hz * size
-            session.run(RawWriter(stream, kept, bytes_per_s=bytes_per_s))
+            session.run(RawWriter(stream, kept, bytes_per_s=session.setup.rate_hz * size))
         except OSError as fault:
             raise _cannot_write(raw_path or "memory", fault) from None
         content = stream.getvalue() if isinstance(stream, BytesIO) else None
@@ -364,14 +362,13 @@ def _header(
     port: str, identity: Identity, setup: Setup, request: AcquisitionRequest, clock: ScaledClock
 ) -> dict[str, object]:
     """Describe a recording for whoever finds the file."""
-    kind = find_driver(identity.model)
     return {
         "model": identity.model,
         "firmware": identity.firmware or None,
         "serial_number": identity.serial_number or None,
         "port": port,
         "channels": list(setup.channels),
-        "bits": kind.bits,
+        "bits": find_driver(identity.model).bits,
         "range_volts": setup.range_volts,
         "rate_hz": setup.rate_hz,
         "requested_rate_hz": request.rate_hz,
@@ -503,8 +500,7 @@ class NoiseWatch:
         return self._small >= _WINDOWS
 
     def _judge(self, window: AnyArray) -> None:
-        differences = np.diff(window, 3)
-        noise = math.sqrt(max(float(np.mean(differences**2)) / 20.0, 1.0 / 12.0))
+        noise = math.sqrt(max(float(np.mean(np.diff(window, 3) ** 2)) / 20.0, 1.0 / 12.0))
         place = np.linspace(-1.0, 1.0, len(window))
         slope = float(np.sum(place * window) / np.sum(place**2))
         left = window - np.mean(window) - slope * place

@@ -118,8 +118,7 @@ def _onwards(words: AnyArray) -> FloatArray:
     half = len(words) // 2
     early, late = words[:half].mean(axis=0), words[half:].mean(axis=0)
     ahead = (0.5 * len(words) + 0.5 * half + 2 * _MARGIN) / half
-    onwards: FloatArray = late + ahead * (late - early)
-    return onwards
+    return np.asarray(late + ahead * (late - early))
 
 
 def _roughness(data: bytes, begin: int, scans: int, size: int) -> tuple[FloatArray, FloatArray]:

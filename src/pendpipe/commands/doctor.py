@@ -34,8 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     found = examine(arguments.folder)
     if arguments.json:
-        findings = [finding._asdict() for finding in found]
-        print_json({"schema_version": 1, "findings": findings})
+        print_json({"schema_version": 1, "findings": [finding._asdict() for finding in found]})
     elif found:
         print("\n".join(map(str, found)))
     else:

@@ -26,8 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = read_model(arguments.model)
     if arguments.seed is not None:
         model = model.model_copy(update={"seed": arguments.seed})
-    source = f"simulated: {Path(arguments.model).name}"
-    recording = simulate(model, source, place=arguments.model)
+    recording = simulate(model, f"simulated: {Path(arguments.model).name}", place=arguments.model)
     write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
     return 0

@@ -60,8 +60,7 @@ def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None
     current: type[BaseModel] | None = model
     steps = list(path)
     while steps and current is not None:
-        annotation = current.model_fields[steps.pop(0)].annotation
-        inner, is_mapping = _inner_model(annotation)
+        inner, is_mapping = _inner_model(current.model_fields[steps.pop(0)].annotation)
         if is_mapping and steps:
             steps.pop(0)  # the user's own name for the entry
         current = inner

@@ -83,9 +83,8 @@ class Record:
     @property
     def file(self) -> Path | None:
         """The file of the recording, where the source is one."""
-        if self.source == "simulated" or self.source.startswith("dataq:"):
-            return None
-        return Path(self.source)
+        ours = self.source == "simulated" or self.source.startswith("dataq:")
+        return None if ours else Path(self.source)
 
 
 def read_records(path: str | Path) -> list[Record]:

@@ -96,8 +96,7 @@ def meaning(column: Column) -> Role:
     if unit is None or role == "none":
         return role
     if unit.kind == "own" and unit.name in _BY_UNIT:
-        silent = role in ("unknown", "angle", "length", "index")
-        return _BY_UNIT[unit.name] if silent else role
+        return _BY_UNIT[unit.name] if role in ("unknown", "angle", "length", "index") else role
     if unit.kind == "own":
         return "signal" if role == "unknown" else role
     # "(m)" beside a velocity: a rate whose unit is printed without its "/s".
@@ -225,10 +224,9 @@ def _counted_on(values: FloatArray) -> FloatArray:
     steps = np.diff(values)
     for turn in (2.0**16, 2.0**32):
         over = steps < -0.5 * turn
-        if over.any() and values.max() < turn:
-            across = np.abs(steps[over] + turn).max()
-            if across < 10.0 * np.median(np.abs(steps)):
-                return np.asarray(values + turn * np.append(0, np.cumsum(over)))
+        across = np.abs(steps[over] + turn).max(initial=0.0)
+        if over.any() and values.max() < turn and across < 10.0 * np.median(np.abs(steps)):
+            return np.asarray(values + turn * np.append(0, np.cumsum(over)))
     return values
 
 

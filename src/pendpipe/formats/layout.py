@@ -130,8 +130,7 @@ def guess_layout(lines: Sequence[str], options: ReadOptions) -> Layout:
     # Of a long file evenly spaced lines will do.
     some = lines[:: max(1, len(lines) // 2000)]
     full = [line for line in some if line.strip() and not is_comment(line)]
-    step = max(1, len(full) // 200)
-    sample = full[len(full) // 20 :: step]
+    sample = full[len(full) // 20 :: max(1, len(full) // 200)]
     # "0,025","0,5": the same sign twice, separated by the quotes alone.
     quoted = any('"' in line for line in sample)
     candidates = [

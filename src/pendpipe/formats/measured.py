@@ -545,9 +545,8 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     )
     if stated and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
-    named = choice.roles.get(column.number) == "angle"
     return (
-        _by_step(finite, named)
+        _by_step(finite, choice.roles.get(column.number) == "angle")
         or _by_sibling(choice, column, time_s)
         or _by_size(choice, column, finite, time_s)
     )
@@ -596,9 +595,8 @@ def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | N
     why = "is taken to be in radians (its period grows as such swings' does)"
     # Of a pendulum 1 m long (2 s) metres look the same.
     usual = float(np.median(periods(time_s, column.values)[0]))
-    if not named and abs(usual - 2.0) < 0.3:
-        return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", weak=True)
-    return _Guess(_RADIAN, why)
+    metres = not named and abs(usual - 2.0) < 0.3
+    return _Guess(_RADIAN, why + ", or in metres, with a string of 1 m" * metres, weak=metres)
 
 
 def _by_step(finite: FloatArray, named: bool) -> _Guess | None:

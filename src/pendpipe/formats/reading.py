@@ -138,10 +138,10 @@ def file_bytes(place: Path) -> bytes:
     try:
         standard = str(place) in ("-", "/dev/stdin")
         found = None if standard else place.stat()
-        for is_kind, what, remedy in _NO_FILES:
-            refuse_if(
-                found is not None and is_kind(found.st_mode), place, f"this is a {what}", remedy
-            )
+        mode = found.st_mode if found else stat.S_IFREG
+        refuse_if(stat.S_ISDIR(mode), place, "this is a folder", "give a file in it")
+        pipes = "give a file, or - for standard input"
+        refuse_if(not stat.S_ISREG(mode), place, "this is a device or a pipe", pipes)
         _refuse_size(place, found.st_size if found else 0)
         data = _standard_input() if standard else place.read_bytes()
     except FileNotFoundError:
@@ -157,16 +157,6 @@ def file_bytes(place: Path) -> bytes:
         "record again, or give another file",
     )
     return data
-
-
-_NO_FILES: Final[tuple[tuple[Callable[[int], bool], str, str], ...]] = (
-    (stat.S_ISDIR, "folder", "give a file in it"),
-    (
-        lambda mode: not stat.S_ISREG(mode),
-        "device or a pipe",
-        "give a file, or - for standard input",
-    ),
-)
 
 
 @cache
@@ -332,8 +322,7 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
     names = _header(data)
     if "time_s" not in names or any(getattr(options, name) is not None for name in _STEERING):
         return None
-    found = [name for name in QUANTITIES if name in names]
-    if len(found) != 1:
+    if sum(name in names for name in QUANTITIES) != 1:
         if any(role_of(split_header(name)[0]) in _READINGS for name in names):
             return None
         raise InputError(

@@ -58,8 +58,7 @@ def decode(data: bytes) -> str:
         return _unified(data.decode("utf-16", errors="replace"))
     head = data[:65536]
     for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
-        zeros = head[start::2].count(0)
-        if zeros > 0.4 * len(head) and not head[1 - start :: 2].count(0):
+        if head[start::2].count(0) > 0.4 * len(head) and not head[1 - start :: 2].count(0):
             return _unified(data.decode(encoding, errors="replace"))
     if b"\0" in head or len(head) - len(head.translate(None, _CONTROLS)) > len(head) // 50:
         raise NotThisFormatError("the bytes are no text")
@@ -293,10 +292,9 @@ def _without_words(lines: list[str]) -> list[str]:
     rows, first = list(lines), len(lines)
     for row, line in enumerate(lines):
         if len(line) < _LONGEST_ROW and " ".join(_TOKEN.sub("\0", line).split()) == shape:
-            cells = zip(_TOKEN.findall(line), units, strict=True)
             rows[row] = "\t".join(
                 f"{cell.replace(' ', 'T').replace('*^', 'e')} {unit}".strip()
-                for cell, unit in cells
+                for cell, unit in zip(_TOKEN.findall(line), units, strict=True)
             )
             first = min(first, row)
     # The names take the place of the line above, so that the rows keep their numbers.

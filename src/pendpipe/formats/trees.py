@@ -216,8 +216,7 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
 
 def _of_numpy(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
     loaded = np.load(io.BytesIO(data), allow_pickle=False)
-    tree = dict(loaded) if hasattr(loaded, "files") else loaded
-    return table_of_tree(place, tree, form, options)
+    return table_of_tree(place, dict(loaded) if hasattr(loaded, "files") else loaded, form, options)
 
 
 def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
@@ -250,8 +249,7 @@ def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
         if rows:
             cells = (names, *([row.get(name, "") for name in names] for row in rows))
             text = "\n".join("\t".join(map(str, row)) for row in cells)
-            plain = replace(options, delimiter="\t", decimal=".")
-            return table_of_text(place, text, plain, form)
+            return table_of_text(place, text, replace(options, delimiter="\t", decimal="."), form)
     return table_of_tree(place, tree, form, options)
 
 
@@ -407,8 +405,7 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
         names = _element(parts, order, 1).tobytes().decode("latin-1")
         if width < 1 or len(names) % width:
             raise DamagedError("the names of a structure's fields are damaged")
-        starts = range(0, len(names), width)
-        fields = [names[at : at + width].partition("\0")[0] for at in starts]
+        fields = [names[at : at + width].partition("\0")[0] for at in range(0, len(names), width)]
     held = [_array(*each, order, depth + 1)[1] for each in islice(parts, count * len(fields))]
     if len(held) < count * len(fields):
         raise DamagedError(f"{len(held)} arrays stand where {count * len(fields)} are due")

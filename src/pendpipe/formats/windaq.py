@@ -438,9 +438,8 @@ def _checked(place: Path, data: bytes, header: WindaqHeader) -> tuple[WindaqHead
 
 def _words(header: WindaqHeader) -> int:
     """Count the 16-bit words of the samples in the file."""
-    if not header.packed:
-        return header.data_bytes // 2
-    return sum(-(-header.scans // channel.divisor) for channel in header.channels)
+    packed = sum(-(-header.scans // channel.divisor) for channel in header.channels)
+    return packed if header.packed else header.data_bytes // 2
 
 
 def _counts(header: WindaqHeader, raw: IntArray) -> list[IntArray]:

@@ -230,8 +230,7 @@ def _events(
             comments.append(mark.comment)
     if recording.quality is not None:
         suspect = recording.quality[rows] == SUSPECT
-        starts = suspect & ~np.concatenate(([False], suspect[:-1]))
-        for scan in np.flatnonzero(starts).tolist():
+        for scan in np.flatnonzero(suspect & ~np.concatenate(([False], suspect[:-1]))).tolist():
             by_scan.setdefault(scan, []).append("suspect")
     return [
         Event(scan, round(float(time_s[scan] - time_s[0])), "; ".join(filter(None, comments)))

@@ -208,10 +208,9 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
         position = np.floor(time_s / dwell_s).astype(np.int64)
         return np.asarray(displacement[np.clip(position, 0, run.points - 1)] / run.arm_m)
 
-    noise = np.random.default_rng([settings.seed, run.points])
     recording = acquire_simulated(
         truth.device.kind,
-        SensorVolts(held, truth.sensor, noise),
+        SensorVolts(held, truth.sensor, np.random.default_rng([settings.seed, run.points])),
         rate_hz=CALIPER_HZ,
         duration_s=run.points * dwell_s,
         clock_scale=truth.device.clock_scale,

@@ -66,9 +66,8 @@ def _range_warnings(recording: Recording, result: dict[str, Any]) -> list[str]:
     volts = recording.values[recording.usable]
     largest = float(np.max(np.abs(volts - np.median(volts))))
     reached = largest / abs(float(result["volts_per_radian"]["value"]))
-    if reached <= 1.05 * tested:
-        return []
-    return [
+    warning = (
         f"the record reaches {reached:.3g} rad, the calibration was tested to {tested:.3g} rad:"
         " linearity beyond is assumed"
-    ]
+    )
+    return [warning] if reached > 1.05 * tested else []

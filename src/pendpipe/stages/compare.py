@@ -296,14 +296,13 @@ def _tail(campaign: Campaign, results: list[RecordResult]) -> list[dict[str, Any
     usable = [result.record.record for result in results if result.refused is None]
     if name is None or name not in usable:
         return []
-    path = campaign.folder / name / "turning_points.csv"
     return [
         {
             "start_s": tail.start_s,
             "amplitude_rad": tail.amplitude_rad,
             **{letter: getattr(tail, letter).as_json() for letter in "abc"},
         }
-        for tail in tail_fits(read_turning_points(path))
+        for tail in tail_fits(read_turning_points(campaign.folder / name / "turning_points.csv"))
     ]
 
 
@@ -311,8 +310,7 @@ def _calibration(campaign: Campaign) -> dict[str, Any] | None:
     """The caliper run with its line and its test."""
     if campaign.configuration.calibration is None:
         return None
-    content: dict[str, Any] = read_json(sensor_file(campaign))
-    return content
+    return dict(read_json(sensor_file(campaign)))
 
 
 NUMBERS: Final = (
@@ -356,9 +354,7 @@ def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
 
 def _number(content: dict[str, Any] | None) -> dict[str, Any] | None:
     """Value, sd and unit of a number; ``None`` where the campaign has none."""
-    if content is None:
-        return None
-    return {name: content[name] for name in ("value", "sd", "unit")}
+    return content and {name: content[name] for name in ("value", "sd", "unit")}
 
 
 PACKAGES: Final = ("numpy", "scipy", "numba", "matplotlib", "pyserial", "snakemake")

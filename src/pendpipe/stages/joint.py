@@ -17,12 +17,12 @@ FEWEST_RECORDS = 3
 
 def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordResult]:
     """The usable records of the configured apparatus: those with a fluid and a geometry."""
-    if campaign.configuration.apparatus is None:
-        return []
     return [
         result
         for result in results
-        if result.usable and result.record.fluid and campaign.geometry(result.record) is not None
+        if campaign.configuration.apparatus is not None
+        and (result.usable and result.record.fluid)
+        and campaign.geometry(result.record) is not None
     ]
 
 

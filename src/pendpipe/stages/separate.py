@@ -113,8 +113,7 @@ def _measured(
 
 def _benchmark_json(benchmark: Benchmark) -> dict[str, Any]:
     """The coefficient in the form of campaign.json, with the tests of the line."""
-    content = benchmark.coefficient.as_json()
-    return content | {
+    return benchmark.coefficient.as_json() | {
         "inverse": benchmark.inverse,
         "inverse_sd": benchmark.inverse_sd,
         "chi2": benchmark.chi2,

@@ -50,8 +50,7 @@ def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | N
     geometries = [place for record in records if (place := campaign.geometry(record))]
     if apparatus is None or len(geometries) < 2 or not all(place.sphere for place in geometries):
         return None
-    moved = _moved(geometries)
-    parts = pendulum_parts(apparatus, moved, sphere=True)
+    parts = pendulum_parts(apparatus, _moved(geometries), sphere=True)
     fluid = fluid_at(campaign.configuration.fluids[records[0].fluid], records[0].temperature_c)
     curve = theory_curve(parts, _surroundings(campaign, fluid))
     assert curve is not None

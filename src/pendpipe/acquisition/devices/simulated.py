@@ -159,8 +159,7 @@ class Stream:
 
     def due(self, clock: ScaledClock) -> bytes:
         """Return the whole packets that are complete by now."""
-        elapsed = clock.now() - self._origin_s
-        taken = math.floor(elapsed * self._rate_hz) + 1
+        taken = math.floor((clock.now() - self._origin_s) * self._rate_hz) + 1
         packet = self._dialect.packet_bytes
         size = max(0, taken * self.scan_bytes // packet * packet - self._released)
         while len(self._ready) < size:
@@ -289,8 +288,7 @@ class SimulatedDevice:
         """Serve the line until the end; an exception of the signal silences the device."""
         try:
             while not self._ending.is_set():
-                rest_s = min(self._rest_s(), _LONGEST_REST_S)
-                self._link.wait(rest_s, sending=bool(self._outbox))
+                self._link.wait(min(self._rest_s(), _LONGEST_REST_S), sending=bool(self._outbox))
                 self.step()
         except BaseException as fault:
             self.failure = fault

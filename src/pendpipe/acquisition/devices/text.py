@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import sys
 from abc import abstractmethod
 from typing import ClassVar, Final
@@ -69,8 +68,7 @@ class SimulatedDI149(TextDialect, model="DI-149", bits=12):
             self.streaming = name == "start"
             self.starts += self.streaming
         elif name == "info" and arguments:
-            number = self.model.split("-")[1]
-            answers = {"0": "DATAQ", "1": number, "2": "65", "6": "0012345601"}
+            answers = {"0": "DATAQ", "1": self.model.split("-")[1], "2": "65", "6": "0012345601"}
             answer = " " + answers.get(arguments[0], "")
         elif name == "slist" and len(arguments) == 2:
             place, word = int(arguments[0]), arguments[1]
@@ -167,8 +165,6 @@ class SimulatedDI2108(TextDialect, model="DI-2108", bits=16):
         """One signed 16-bit word a sample, low byte first, its bits at the top."""
         scale: int = 1 << (16 - self.bits)
         words = (np.asarray(codes).ravel() * scale).astype(np.int16)
-        if words.size < 32:
-            return struct.pack(f"<{words.size}h", *words.tolist())
         return (words if sys.byteorder == "little" else words.byteswap()).tobytes()
 
 

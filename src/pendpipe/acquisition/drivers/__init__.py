@@ -106,17 +106,14 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
 def no_ports(platform: str = sys.platform) -> str:
     """Say where to look when there is no port at all."""
     try_this = "to try without one: --device simulated:di2108"
-    if platform == "win32":
-        return (
-            "no serial ports; a device with a warning in the Device Manager lacks its driver"
-            f" (Dataq's page has it); a DI-1100 to DI-4718B must be in CDC mode: {_CDC}; {try_this}"
-        )
-    if platform == "darwin":
-        return (
-            "no serial ports; a DI-1100 to DI-4718B needs no driver but must be in CDC mode:"
-            f" {_CDC}; a DI-245 needs a driver of FTDI's that knows 0683:2450; {try_this}"
-        )
-    return f"no serial ports; lsusb -d 0683: shows whether a device is seen at all; {try_this}"
+    hints = {
+        "win32": "a device with a warning in the Device Manager lacks its driver (Dataq's page"
+        f" has it); a DI-1100 to DI-4718B must be in CDC mode: {_CDC}",
+        "darwin": f"a DI-1100 to DI-4718B needs no driver but must be in CDC mode: {_CDC};"
+        " a DI-245 needs a driver of FTDI's that knows 0683:2450",
+    }
+    hint = hints.get(platform, "lsusb -d 0683: shows whether a device is seen at all")
+    return f"no serial ports; {hint}; {try_this}"
 
 
 def _remedy(product: int) -> str:

@@ -203,8 +203,7 @@ class Driver(ABC):
         One byte too many before the first scan would shift every scan of a stream
         that has no marks.
         """
-        wait_s = self.patience_s if self._doubt else self.quiet_s
-        self.line.discard(wait_s, 2.0 * self.patience_s)
+        self.line.discard(self.patience_s if self._doubt else self.quiet_s, 2.0 * self.patience_s)
         self._doubt = False
 
     def receive(self, limit_s: float) -> bytes:

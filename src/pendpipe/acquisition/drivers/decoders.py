@@ -128,8 +128,7 @@ class SyncBitDecoder:
     def _counts(self, words: AnyArray) -> AnyArray:
         """Take the samples out of words that are in step; shape (scans, channels)."""
         code = (words & 0x00FF) >> (15 - self._bits) | (words >> 9) << (self._bits - 7)
-        counts: AnyArray = code.astype(np.int16) - np.int16(1 << (self._bits - 1))
-        return counts
+        return np.asarray(code.astype(np.int16) - np.int16(1 << (self._bits - 1)))
 
     def _resynchronise(self, data: bytes) -> Scans:
         """Find the whole scans between broken ones, and count what is thrown away.
@@ -166,8 +165,7 @@ class SyncBitDecoder:
             followed = bool(discard[index[-1]])
         self._discarded = int(before[-1]) - spent
         self._suspect = followed
-        frames = octets[starts[index][:, None] + np.arange(size)]
-        words = np.ascontiguousarray(frames).view("<u2")
+        words = np.ascontiguousarray(octets[starts[index][:, None] + np.arange(size)]).view("<u2")
         self._scans += len(index)
         return Scans(self._counts(words.reshape(-1, len(self._marks))), tuple(losses))
 

@@ -73,8 +73,7 @@ class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4
             what = f"{len(channels)} channel(s) "
             raise self._no_rate(what, rate_hz, "0.15", 480 / len(channels))
         self._set_baudrate(baudrate)
-        mask = sum(1 << (channel - 1) for channel in channels)
-        self._command(b"C", bytes([mask]))
+        self._command(b"C", bytes([sum(1 << (channel - 1) for channel in channels)]))
         self._command(b"L", bytes([count & 0xFF]))
         self._command(b"M", bytes([count >> 8]))
         return baudrate / (_BITS_PER_SAMPLE * len(channels) + count)

@@ -48,8 +48,7 @@ class DI149(TextDriver, model="DI-149", bits=12):
             _DI149_HZ / _FASTEST_DIVISOR / len(channels),
         )
         if not slowest <= rate_hz <= fastest:
-            what = f"{len(channels)} channel(s) "
-            raise self._no_rate(what, rate_hz, f"{slowest:.4g}", fastest)
+            raise self._no_rate(f"{len(channels)} channel(s) ", rate_hz, f"{slowest:.4g}", fastest)
         divisor = round(_DI149_HZ / rate_hz)
         self._send_line("asc")  # the scan list is written in this mode
         for position, channel in enumerate(channels):
