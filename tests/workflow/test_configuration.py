@@ -10,8 +10,13 @@ from typing import Any
 import pytest
 
 from pendpipe.configuration import document, jobs
-from pendpipe.configuration.load import load_campaign, read_configuration
-from pendpipe.configuration.records import COLUMNS, Record, read_records
+from pendpipe.configuration.load import (
+    COLUMNS,
+    Record,
+    load_campaign,
+    read_configuration,
+    read_records,
+)
 from pendpipe.errors import InputError
 from pendpipe.stages.results import RecordResult
 from pendpipe.stages.separate import common_relative_sd

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe.configuration.records import read_records
+from pendpipe.configuration.load import read_records
 
 ROOT = Path(__file__).parents[2]
 

@@ -18,9 +18,8 @@ import numpy as np
 from pendpipe import physics
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.configuration.apparatus import fluid_at
-from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Apparatus, Fluid
-from pendpipe.configuration.records import Record
 
 AIR_DRAG_RELATIVE_SD = 0.1
 """Of the drag that weights and rod meet in air: each weight counts as the sphere of its area."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Apparatus, Fluid
-from pendpipe.configuration.records import Record
 from pendpipe.errors import InputError, refuse_if
 
 

@@ -1,7 +1,14 @@
-"""A campaign: the configuration and its records, read, checked and held together."""
+"""A campaign: the configuration and its table of records, read, checked and held together.
+
+The table, ``config/records.tsv``, has a row a record.
+"""
 
 from __future__ import annotations
 
+import csv
+import math
+import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +18,193 @@ from pydantic import ValidationError
 
 from pendpipe.configuration.faults import as_input_error, nearest, read_text
 from pendpipe.configuration.models import Configuration, Geometry
-from pendpipe.configuration.records import Record, read_records
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_json
+
+COLUMNS: Final = (
+    "record",
+    "source",
+    "fluid",
+    "branch",
+    "geometry",
+    "channel",
+    "start_s",
+    "stop_s",
+    "volts_per_radian",
+    "temperature_c",
+    "order",
+    "pendulum",
+)
+_NUMBERS: Final = ("start_s", "stop_s", "volts_per_radian", "temperature_c", "order")
+REQUIRED: Final = ("record", "source")
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+LONGEST_NAME: Final = 100
+"""The names of files made from it stay below the 255 bytes that file systems allow."""
+_OF_WINDOWS: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+_OF_THE_CAMPAIGN: Final = (
+    *("figures", "calibration", "logs", "manifest", "pendulums", "challenge", "challenge-sealed"),
+    *("campaign.json", "comparison.json", "separation.json", "report.html", "readme.md"),
+    "campaign_diagnosis.json",
+)
+"""What stands beside the records' folders."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A row of the table; what is blank is ``None`` (or ``""`` for the words).
+
+    Parameters
+    ----------
+    record
+        Its name, that of its folder in ``results/``.
+    source
+        ``simulated``, ``dataq:<port>`` or a file.
+    fluid, branch, geometry
+        Names from the configuration; `branch` groups records (``low``, ``high``, ``air``).
+    channel
+        Channel or column of the source, as its reader names it.
+    start_s, stop_s
+        The part to use; blank: found from the recording.
+    volts_per_radian
+        The sensor's constant; blank: from the file, or from the campaign's calibration.
+    temperature_c
+        Of the fluid.
+    order
+        When it was taken: a number that rises over the day (an hour, a count); blank: its row.
+    pendulum
+        A name: records of one name are diagnosed together as well (docs/several.md).
+    """
+
+    record: str
+    source: str
+    fluid: str = ""
+    branch: str = ""
+    geometry: str = ""
+    channel: str = ""
+    start_s: float | None = None
+    stop_s: float | None = None
+    volts_per_radian: float | None = None
+    temperature_c: float | None = None
+    order: float | None = None
+    pendulum: str = ""
+
+    @property
+    def file(self) -> Path | None:
+        """The file of the recording, where the source is one."""
+        ours = self.source == "simulated" or self.source.startswith("dataq:")
+        return None if ours else Path(self.source)
+
+
+def read_records(path: str | Path) -> list[Record]:
+    """Read the table.
+
+    Raises
+    ------
+    InputError
+        On a missing or unknown column, a name that is no name or stands twice, or text
+        where a number belongs: file, line, what, remedy.
+    """
+    place = Path(path)
+    text = read_text(place, "table", "see config/README.md", "a table")
+    rows = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.startswith("#")
+    ]
+    refuse_if(not rows, place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}")
+    names = [name.strip() for name in rows[0][1].split("\t")]
+    _check_columns(f"{place}, line {rows[0][0]}", names)
+    records: list[Record] = []
+    for number, line in rows[1:]:
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
+        where = f"{place}, line {number}"
+        refuse_if(
+            len(cells) > len(names),
+            where,
+            f"{len(cells)} cells, not {len(names)}",
+            "separate by one tab",
+        )
+        cells += [""] * (len(names) - len(cells))
+        records.append(_record(where, dict(zip(names, cells, strict=True))))
+    refuse_if(not records, place, "the table has no records", "add a row a record")
+    _check_names(place, records)
+    return records
+
+
+def _check_columns(where: str, names: list[str]) -> None:
+    """Refuse a header with a column too few, unknown or twice."""
+    for name in (*REQUIRED, *names):
+        for wrong, problem, remedy in (
+            (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
+            (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
+            (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
+        ):
+            refuse_if(wrong, where, problem, remedy)
+
+
+def _record(where: str, row: dict[str, str]) -> Record:
+    """Make a record from the cells of a row."""
+    _check_name(where, row["record"])
+    refuse_if(
+        not row["source"], where, "the source is blank", "write simulated, dataq:<port> or a file"
+    )
+    if row.get("pendulum"):
+        _check_name(where, row["pendulum"])
+    cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS if name not in _NUMBERS}
+    cells |= {name: _number(where, row, name) for name in _NUMBERS}
+    return Record(**cells)
+
+
+def _check_name(where: str, name: str) -> None:
+    """Refuse what can't be the name of a folder on Linux, Windows and macOS alike."""
+    for wrong, problem, remedy in (
+        (
+            len(name) > LONGEST_NAME,
+            f"the record's name has {len(name)} characters",
+            f"use at most {LONGEST_NAME}",
+        ),
+        (
+            not NAME.fullmatch(name) or name.endswith("."),
+            f"'{name}' is no name for a folder",
+            "use letters, digits, . _ -, and no dot at the end",
+        ),
+        (
+            _OF_WINDOWS.fullmatch(name),
+            f"Windows keeps the name '{name}' for itself",
+            "rename the record",
+        ),
+        (
+            name.lower() in _OF_THE_CAMPAIGN,
+            f"the campaign has a file or folder '{name}' of its own",
+            "rename the record",
+        ),
+    ):
+        refuse_if(wrong, where, problem, remedy)
+
+
+def _number(where: str, row: dict[str, str], name: str) -> float | None:
+    """Read a cell that holds a number or nothing."""
+    text = row.get(name, "")
+    try:
+        value = float(text) if text else None
+    except ValueError:
+        raise InputError(where, f"{name} '{text}' is no number", "fix or blank the cell") from None
+    refuse_if(
+        value is not None and not math.isfinite(value),
+        where,
+        f"{name} is not finite",
+        "fix or blank the cell",
+    )
+    return value
+
+
+def _check_names(place: Path, records: list[Record]) -> None:
+    """Refuse two records of one name, also where only the case differs (Windows)."""
+    counts = Counter(entry.record.lower() for entry in records)
+    again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
+    if again:
+        raise InputError(place, f"the record '{again[-1]}' stands twice", "rename one")
+
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
 

@@ -11,9 +11,8 @@ import numpy as np
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.apparatus import pendulum, quadratic_rate
-from pendpipe.configuration.load import Campaign
+from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Device, Sensor
-from pendpipe.configuration.records import Record
 from pendpipe.dynamics import Eq8, Release, sample
 
 STEP_V = {"di154": 20.0 / 2**12, "di2108": 20.0 / 2**16}

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.load import Campaign
-from pendpipe.configuration.records import Record
+from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import replaced
 from pendpipe.manifest import SET_ASIDE

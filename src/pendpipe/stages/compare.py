@@ -26,10 +26,17 @@ from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
 from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
 from pendpipe.provenance import code_version
-from pendpipe.stages.joint import campaign_data, placed
-from pendpipe.stages.results import RecordResult, read_results, record_files, sensor_file
+from pendpipe.stages.results import (
+    RecordResult,
+    branch_curves,
+    campaign_data,
+    placed,
+    read_results,
+    record_files,
+    record_theory,
+    sensor_file,
+)
 from pendpipe.stages.separate import Separation, read_separation
-from pendpipe.stages.theory import branch_curves, record_theory
 from pendpipe.version import __version__
 
 

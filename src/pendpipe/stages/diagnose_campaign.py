@@ -17,7 +17,7 @@ from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 from pendpipe.provenance import code_version
-from pendpipe.stages.results import read_results, record_files
+from pendpipe.stages.results import campaign_data, read_results, record_files
 from pendpipe.version import __version__
 
 FILE_NAME = "campaign_diagnosis.json"
@@ -58,7 +58,6 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
     """Return the content of campaign_diagnosis.json."""
     from pendpipe.campaign.answer import BASELINE, campaign_diagnosis
     from pendpipe.campaign.diagnose import search
-    from pendpipe.stages.joint import campaign_data
 
     provenance = {"version": __version__, "code": code_version(__name__)}
     found = campaign_data(campaign, read_results(campaign))

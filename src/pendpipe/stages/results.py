@@ -1,16 +1,29 @@
-"""What the stages have left of each record, read back for the campaign's own stages."""
+"""What the campaign's own stages build on: the records' results, their joint fit, the theory."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from pendpipe import physics
 from pendpipe.analysis.fit.result import FitResult, read_fit
-from pendpipe.configuration.load import Campaign
-from pendpipe.configuration.records import Record
+from pendpipe.analysis.theory import Surroundings, TheoryCurve, theory_curve
+from pendpipe.arrays import FloatArray
+from pendpipe.campaign.design import Design, design_of
+from pendpipe.campaign.fit import Measured, measured
+from pendpipe.configuration.apparatus import fluid_at, pendulum, pendulum_parts
+from pendpipe.configuration.load import Campaign, Record
+from pendpipe.configuration.models import Geometry
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
+
+FEWEST_RECORDS = 3
+"""With fewer there is nothing to compare: k and one effect are free."""
+POINTS_OF_A_CURVE = 60
 
 
 @dataclass(frozen=True)
@@ -53,3 +66,123 @@ def _read(folder: Path, record: Record) -> RecordResult:
     refused = read_json(path).get("refused")
     fit = None if refused else read_fit(path)
     return RecordResult(record, fit, read_json(folder / "calibration.json"), refused)
+
+
+def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordResult]:
+    """The usable records of the configured apparatus: those with a fluid and a geometry."""
+    return [
+        result
+        for result in results
+        if campaign.configuration.apparatus is not None
+        and (result.usable and result.record.fluid)
+        and campaign.geometry(result.record) is not None
+    ]
+
+
+def campaign_data(
+    campaign: Campaign, results: Sequence[RecordResult]
+) -> tuple[Design, Measured] | None:
+    """Design and data of the usable records with a geometry; None where too few swing.
+
+    The joint fit compares with Eq. 16: it needs an apparatus, and three records, two of them in a
+    fluid.
+    """
+    used = placed(campaign, results)
+    if len(used) < FEWEST_RECORDS:
+        return None
+    design = design_of(campaign, [result.record for result in used])
+    if design.wet.sum() < 2.0:
+        return None
+    values, covariances = [], []
+    for result in used:
+        fit = result.fit
+        assert fit is not None
+        order = [fit.covariance_order.index(name) for name in ("frequency", "b")]
+        values.append([fit.parameters[name].value for name in ("frequency", "b")])
+        covariances.append(np.asarray(fit.covariance)[np.ix_(order, order)])
+    return design, measured(np.array(values), np.array(covariances))
+
+
+def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
+    """What geometry and theory say of one record; ``None`` without a geometry.
+
+    Returns
+    -------
+    dict
+        ``frequency_hz``, ``moment_of_inertia_kg_m2`` and ``restoring_torque_n_m_per_rad``
+        of any pendulum; with a sphere in the fluid also Eq. 16's Q_v, the steady Stokes
+        law's, a/delta and the lengthening of the period.
+    """
+    if campaign.configuration.apparatus is None or campaign.geometry(record) is None:
+        return None
+    built = pendulum(campaign, record)
+    content: dict[str, Any] = {
+        "frequency_hz": float(built.swing.frequency_hz),
+        "moment_of_inertia_kg_m2": float(built.swing.moment_of_inertia_kg_m2),
+        "restoring_torque_n_m_per_rad": float(built.swing.restoring_torque_n_m_per_rad),
+    }
+    curve = theory_curve(built.parts, _surroundings(campaign, built.fluid))
+    return content | (_as_numbers(curve) if curve else {})
+
+
+def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | None:
+    """Theory along a branch: the weights move evenly from each record's place to the next.
+
+    ``None`` for a branch of fewer than two records, or without a sphere in a fluid.
+    """
+    apparatus = campaign.configuration.apparatus
+    records = [record for record in campaign.records if record.branch == branch]
+    geometries = [place for record in records if (place := campaign.geometry(record))]
+    if apparatus is None or len(geometries) < 2 or not all(place.sphere for place in geometries):
+        return None
+    parts = pendulum_parts(apparatus, _moved(geometries), sphere=True)
+    fluid = fluid_at(campaign.configuration.fluids[records[0].fluid], records[0].temperature_c)
+    curve = theory_curve(parts, _surroundings(campaign, fluid))
+    assert curve is not None
+    order = np.argsort(curve.frequency_hz)
+    return {name: np.asarray(values)[order].tolist() for name, values in _columns(curve).items()}
+
+
+def _surroundings(campaign: Campaign, fluid: physics.Fluid) -> Surroundings:
+    apparatus = campaign.configuration.apparatus
+    assert apparatus is not None
+    return Surroundings(fluid, apparatus.gravity_m_per_s2, apparatus.added_mass == "plain")
+
+
+def _moved(geometries: Sequence[Geometry]) -> dict[str, FloatArray]:
+    """Each weight's positions along the way; a weight that comes and goes is left out."""
+    names = set.intersection(*(set(place.weights_m) for place in geometries))
+    way = np.linspace(0.0, len(geometries) - 1.0, POINTS_OF_A_CURVE)
+    return {
+        name: np.interp(
+            way, np.arange(len(geometries)), [place.weights_m[name] for place in geometries]
+        )
+        for name in sorted(names)
+    }
+
+
+def _columns(curve: TheoryCurve) -> dict[str, FloatArray]:
+    """The curve's columns under the names of comparison.json."""
+    return {
+        "frequency_hz": curve.frequency_hz,
+        "moment_of_inertia_kg_m2": curve.moment_of_inertia_kg_m2,
+        "quality_factor_viscous_theory": curve.quality_factor_viscous,
+        "quality_factor_viscous_steady": curve.quality_factor_steady,
+        "a_over_delta": curve.radius_over_depth,
+        "lengthening_buoyancy": np.atleast_1d(curve.lengthening.buoyancy),
+        "lengthening_added_mass": np.atleast_1d(curve.lengthening.added_mass),
+        "lengthening_both": np.atleast_1d(curve.lengthening.both),
+    }
+
+
+def _as_numbers(curve: TheoryCurve) -> dict[str, Any]:
+    """One pendulum's theory as numbers, the lengthening as a group."""
+    numbers = {name: float(values[0]) for name, values in _columns(curve).items()}
+    return {
+        "quality_factor_viscous_theory": numbers["quality_factor_viscous_theory"],
+        "quality_factor_viscous_steady": numbers["quality_factor_viscous_steady"],
+        "a_over_delta": numbers["a_over_delta"],
+        "lengthening": {
+            name: numbers[f"lengthening_{name}"] for name in ("buoyancy", "added_mass", "both")
+        },
+    }

@@ -15,9 +15,13 @@ from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
-from pendpipe.stages.joint import campaign_data
-from pendpipe.stages.results import RecordResult, read_results, record_files
-from pendpipe.stages.theory import record_theory
+from pendpipe.stages.results import (
+    RecordResult,
+    campaign_data,
+    read_results,
+    record_files,
+    record_theory,
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
