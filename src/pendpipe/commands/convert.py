@@ -1,4 +1,4 @@
-"""Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
+"""Write any supported recording in the plain CSV form."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "out",
         metavar="OUT",
         type=Path,
-        help="OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
+        help="OUT.csv, the plain form; - is standard output",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
-    from pendpipe.formats.writing import check_name, write
-    from pendpipe.recording import plain_lines
+    from pendpipe.recording import check_name, plain_lines, write_plain
 
     piped = str(arguments.out) == "-"
     if not piped:
@@ -34,7 +33,6 @@ def run(arguments: argparse.Namespace) -> int:
     if piped:
         sys.stdout.writelines(plain_lines(recording))
         return 0
-    for note in write(arguments.out, recording):
-        print(f"{arguments.out}: {note}", file=sys.stderr)
+    write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")
     return 0
