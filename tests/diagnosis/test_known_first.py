@@ -133,3 +133,19 @@ def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor(
     assert not {"cubic-stiffness", "sensor-cubic"} & set(names)
     curvature = answer.effects[0].parameters["inverse_length_squared"]
     assert curvature.value**-0.5 == pytest.approx(scale, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("torque", [np.sin, float])
+def test_a_brake_leaves_few_cycles_that_show_sin_x(seed: int, torque: type) -> None:
+    # Q = 10: the misfit is a line as wide as the loss, which is no noise of the readings.
+    omega, loss = 4.6, 0.23
+    time_s = np.arange(0.0, 6.0, 0.01)
+
+    def motion(_: float, state: FloatArray) -> list[float]:
+        return [state[1], -(omega**2) * torque(state[0]) - 2.0 * loss * state[1]]
+
+    found = solve_ivp(motion, (0.0, 6.0), [0.42, 0.0], t_eval=time_s, rtol=1e-9, atol=1e-10)
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(len(time_s))
+    answer = diagnose_recording(Recording(time_s, found.y[0] + noise, "angle_rad"))
+    assert [each.identifier for each in answer.effects] == ["circular-error"] * (torque is np.sin)

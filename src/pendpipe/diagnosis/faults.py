@@ -23,6 +23,7 @@ from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, Location
 from pendpipe.diagnosis.state import Fault, State, is_gross
 from pendpipe.dynamics.any_law import NoMotionError
@@ -237,8 +238,10 @@ class Forensics:
                 continue  # the model comes to rest before the corrected times
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
-        """Test whether random kicks explain more than the best effect of the catalogue."""
+        """Test whether random kicks explain more than an effect that leaves more than noise."""
         name = "broadband-drive"
+        if not remainder_of(rival.fit, state.data, state.noise).systematic:
+            return False
         finding, p_value = self._tested(name, state)
         if p_value > self.level:
             return False

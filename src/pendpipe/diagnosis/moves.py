@@ -195,7 +195,8 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
     if not (leader.drawn or tone):
         return list(rivals)
     rare = applicable(task.catalogue, before, task.baseline, state.data.unit, rare=True)
-    fits = [fit for each in rare if (fit := _with(before, each, np.zeros(each.count), state))]
+    starts = [(each, np.full(each.count, float(each.parameter_free))) for each in rare]
+    fits = [fit for pair in starts if (fit := _with(before, *pair, state))]
     if not fits:
         return list(rivals)
     lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)

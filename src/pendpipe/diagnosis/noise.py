@@ -17,6 +17,8 @@ from pendpipe.diagnosis.log_variance import Smooth, Squares, log_variance
 _HARMONICS: Final = 7
 _HARMONIC_HALF_WIDTH: Final = 0.08
 """Half width of the band about each harmonic that a misfit may fill, over the frequency."""
+_LOBE: Final = 1.5
+"""Half width of the line of a short decay, times its cycles: its first side lobes lie within."""
 _CYCLES_TOGETHER: Final = 5.0
 """Cycles over which the readings in a cycle are counted."""
 _FEWEST_COSINES: Final = 40
@@ -212,6 +214,7 @@ def estimate_noise(
     frequency_hz: float,
     floor: float,
     *,
+    cycles: float = math.inf,
     red: bool = True,
     slope: FloatArray | None = None,
 ) -> Noise:
@@ -228,12 +231,15 @@ def estimate_noise(
         Of the motion.
     floor
         The smallest rms that is plausible.
+    cycles
+        Over which the motion is to be seen: what it leaves is a line as wide as one over these.
     red
         Whether the noise may grow to low frequencies.
     slope
         If the error is in the time: the speed at each reading.
     """
-    noise_only = _noise_only(len(data), *_cycles_per_reading(data, frequency_hz))
+    width = max(_HARMONIC_HALF_WIDTH, _LOBE / cycles)
+    noise_only = _noise_only(len(data), *_cycles_per_reading(data, frequency_hz), width)
     level = None if slope is None else _level_of_counts(slope)
     noise = Noise(np.ones(len(data)), data.weight, level, harmonics=~noise_only)
     noise.harmonics[0] = False
@@ -333,7 +339,7 @@ def _change_of_level(
     return np.exp(0.5 * (log - float(np.mean(log)))), found.charge
 
 
-def _noise_only(count: int, lowest: float, highest: float) -> BoolArray:
+def _noise_only(count: int, lowest: float, highest: float, half_width: float) -> BoolArray:
     """Return which cosines contain noise alone; the offset itself is fitted.
 
     Parameters
@@ -342,11 +348,13 @@ def _noise_only(count: int, lowest: float, highest: float) -> BoolArray:
         Of the readings.
     lowest, highest
         Frequency of the motion in cycles per reading.
+    half_width
+        Of the bands about its harmonics, over the frequency.
     """
     frequency = np.arange(count) / (2.0 * count)
     harmonic = np.arange(1, _HARMONICS)[:, None]
-    below = frequency < (harmonic - _HARMONIC_HALF_WIDTH) * lowest
-    above = frequency > (harmonic + _HARMONIC_HALF_WIDTH) * highest
+    below = frequency < (harmonic - half_width) * lowest
+    above = frequency > (harmonic + half_width) * highest
     noise_only: BoolArray = np.all(below | above, axis=0)
     if np.count_nonzero(noise_only) < _FEWEST_COSINES:
         noise_only = np.ones(count, dtype=bool)

@@ -128,7 +128,10 @@ def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
     residual = data.residual(fit.at.reading)
     slope = fit.at.sampled.velocity if data.time_noise else None
     floor = _LEAST_STEP * data.step
-    return estimate_noise(data, residual, frequency, floor, red=red, slope=slope)
+    power = fit.at.sampled.amplitude**2
+    seen = float(np.mean(power) ** 2 / np.mean(power**2))
+    cycles = frequency * float(np.ptp(data.time_s)) * seen
+    return estimate_noise(data, residual, frequency, floor, cycles=cycles, red=red, slope=slope)
 
 
 def settled(

@@ -21,7 +21,10 @@ from pendpipe.effects.curves import CURVES, Curve
 def applicable(
     catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str, *, rare: bool = False
 ) -> list[Effect]:
-    """Return the effects that a baseline may lack, and curves for what has no name; or rare ones.
+    """Return the effects that a baseline may lack, and curves for what has no name.
+
+    Or, with `rare`, those that are asked where a curve would be added: rare effects, and what every
+    pendulum has.
 
     What happens at an instant may happen twice: a second one is a copy, so that the model can
     tell their values apart.
@@ -33,7 +36,7 @@ def applicable(
         copy(effect) if effect.identifier in used else effect
         for effect in catalogue
         if effect.has_signature
-        and effect.rare == rare
+        and (effect.rare or (rare and effect.expected)) == rare
         and baseline not in effect.inside
         and (unit == "rad" or not effect.angular)
         and all(present[name] for name in effect.needs)
