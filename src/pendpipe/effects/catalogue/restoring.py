@@ -70,8 +70,8 @@ def _unlike_a_pendulum(values: FloatArray, span: Span) -> float:
 def _from_the_side(motion: Motion, pendulum: Pendulum, curvature: float) -> FloatArray:
     """The form of `circular-error` in the horizontal displacement x = L sin(theta).
 
-    x'' = -x [omega^2 cos(theta) + theta'^2], with x' = L cos(theta) theta'. In metres L is
-    expected about g/omega^2.
+    x'' = -x [omega^2 cos(theta) + theta'^2], with x' = L cos(theta) theta'. In metres it is
+    expected, with L about g/omega^2; in other units anything may swing.
     """
     x, v = motion.angle, motion.velocity
     square = np.minimum(curvature * x * x, 0.99)
@@ -88,8 +88,6 @@ def _seen_from_the_side(unit: str, **more: Any) -> Effect:
         name="circular error",
         equation=r"x = L \sin\theta, \quad \ddot\theta = -\omega^2 \sin\theta",
         parameters=(Parameter("inverse_length_squared", "1/rad^2", 0.0, math.inf),),
-        expected=True,
-        prior=circular_error.prior,
         discriminating_test=circular_error.discriminating_test,
         **more,
     )(_from_the_side)
@@ -97,7 +95,9 @@ def _seen_from_the_side(unit: str, **more: Any) -> Effect:
 
 CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
     "rad/s": circular_error_of_rate,
-    "m": _seen_from_the_side("m", prior_penalty=_unlike_a_pendulum),
+    "m": _seen_from_the_side(
+        "m", expected=True, prior=circular_error.prior, prior_penalty=_unlike_a_pendulum
+    ),
     "pixels": _seen_from_the_side("pixels"),
     "1": _seen_from_the_side("1"),
 }
