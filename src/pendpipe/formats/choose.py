@@ -90,7 +90,7 @@ def meaning(column: Column) -> Role:
     role: Role = role_of(column.name) if column.name else "unknown"
     # Of "field.header.stamp" the last part counts, unless it is one letter ("acc.x").
     last = column.name.rpartition(".")[2]
-    if len(last) > 2 and last != column.name and role_of(last) != "unknown":
+    if len(last) > 2 and role_of(last) != "unknown":
         role = role_of(last)
     unit = unit_of(column.unit) if column.unit else None
     if unit is None or role == "none":
@@ -172,16 +172,12 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
 def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[int] = ()) -> Column:
     """Find a column by its name (in any case), or by its number: in the file, or as given."""
     names = [f"{n} {c.label}" for n, c in zip(numbers, columns, strict=False)]
-    names = names or [column.label for column in columns]
     numbers = numbers or [column.number for column in columns]
-    for names_it in (str, str.lower):
-        for column in columns:
-            if names_it(column.name) == names_it(key):
-                return column
-    for column, number in zip(columns, numbers, strict=True):
-        if str(number) == key:
-            return column
-    raise InputError(table.place, f"there is no column '{key}'", f"choose from: {listed(names)}")
+    alike = [c for form in (str, str.lower) for c in columns if form(c.name) == form(key)]
+    alike += [c for c, number in zip(columns, numbers, strict=True) if str(number) == key]
+    known = listed(names or [column.label for column in columns])
+    refuse_if(not alike, table.place, f"there is no column '{key}'", f"choose from: {known}")
+    return alike[0]
 
 
 def _only_falls(values: FloatArray) -> bool:
@@ -326,9 +322,9 @@ def _evenness(finite: FloatArray) -> float:
 def _counts_samples(column: Column, role: Role) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
     values = column.values
-    if len(values) < 2 or not np.isfinite(values).all() or np.any(values != np.rint(values)):
-        return False
-    return abs(float(np.median(np.diff(values)))) == 1.0 and role in ("index", "unknown", "length")
+    steps = np.diff(values)
+    whole = len(steps) > 0 and np.isfinite(values).all() and np.all(values == np.rint(values))
+    return bool(whole and abs(np.median(steps)) == 1.0) and role in ("index", "unknown", "length")
 
 
 def _readings(
@@ -437,12 +433,14 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     silent = tuple(column for column in columns if not column.name)
     pairs = [(named[a], named[b]) for a, b in ("xy", ("px", "py")) if {a, b} <= named.keys()]
     bare = [(silent[0], silent[1])] if len(silent) > 1 else []
-    for x, y in pairs or _bob_from_pivot(columns) or bare:
+    round_the_pivot = (
+        (x, y)
+        for x, y in pairs or _bob_from_pivot(columns) or bare
         # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
-        sensed = "z" in named and not x.unit
-        if not sensed and _on_a_circle(x.values, y.values, named=bool(x.name)):
-            return x, y
-    return None
+        if not ("z" in named and not x.unit)
+        and _on_a_circle(x.values, y.values, named=bool(x.name))
+    )
+    return next(round_the_pivot, None)
 
 
 def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
@@ -451,8 +449,7 @@ def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
     for column in columns:
         axis = re.fullmatch(r"([xy])[\s_]*(.+)|(.+?)[\s_.]*([xy])", column.name.lower())
         if axis is not None:
-            point = points.setdefault(axis[2] or axis[3], {})
-            point[axis[1] or axis[4]] = column
+            points.setdefault(axis[2] or axis[3], {})[axis[1] or axis[4]] = column
     both = [point for point in points.values() if len(point) == 2]
     if len(both) != 2:
         return []
@@ -475,20 +472,20 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     there the distance follows x, and the swing is not about a vertical through the origin.
     """
     good = np.isfinite(x) & np.isfinite(y)
-    x, y = x[good], y[good]
-    if len(x) < 8 or np.abs(x).max() > 1e100 or np.abs(y).max() > 1e100:
+    x, y, sides = x[good], np.abs(y[good]), np.sign(y[good])
+    if len(x) < 8 or max(np.abs(x).max(), y.max()) > 1e100:
         return False
-    radius, angle = np.hypot(x, y), np.arctan2(x, np.abs(y))
+    radius = np.hypot(x, y)
     if (
         not 0.0 < np.std(radius) <= min(0.08 * np.mean(radius), 0.3 * np.std(x))
-        or abs(np.mean(np.sign(y))) <= 0.95
-        or abs(np.median(angle)) > 0.4
+        or abs(np.mean(sides)) <= 0.95
+        or abs(np.median(np.arctan2(x, y))) > 0.4
         or not swing_of(x).clear
     ):
         return False
-    if not np.ptp(x**2) > 0.0 or not np.ptp(np.abs(y)) > 0.0:
+    if not np.ptp(x**2) > 0.0 or not np.ptp(y) > 0.0:
         return named
     # On a circle y falls with x squared; two columns without names must show it.
-    follows = float(np.corrcoef(x**2, np.abs(y))[0, 1])
+    follows = float(np.corrcoef(x**2, y)[0, 1])
     shown = follows < -0.5 and np.std(radius) < 0.5 * np.std(y) and one_way(y) < 0.9
     return follows < 0.5 if named else bool(shown)

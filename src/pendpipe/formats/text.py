@@ -54,31 +54,32 @@ def decode(data: bytes) -> str:
     NotThisFormatError
         When the bytes are no text.
     """
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return _unified(data.decode("utf-16", errors="replace"))
+    text = data.decode(_encoding(data), errors="replace")
+    for wrong in "°µ²³":  # UTF-8 that a program took for Windows-1252, and wrote anew
+        text = text.replace(f"Â{wrong}", wrong)
+    for blank in _BLANKS:
+        text = text.replace(blank, " ")
+    text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\N{MINUS SIGN}", "-")
+
+
+def _encoding(data: bytes) -> str:
+    """Name the encoding of a text."""
     head = data[:65536]
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
     for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
         if head[start::2].count(0) > 0.4 * len(head) and not head[1 - start :: 2].count(0):
-            return _unified(data.decode(encoding, errors="replace"))
+            return encoding
     if b"\0" in head or len(head) - len(head.translate(None, _CONTROLS)) > len(head) // 50:
         raise NotThisFormatError("the bytes are no text")
     try:
-        return _unified(data.decode("utf-8-sig"))
+        data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        for encoding in ("gb18030", "big5", "cp932", "cp949", "cp1251"):
-            if _EASTERN.search(head.decode(encoding, errors="replace")):
-                return _unified(data.decode(encoding, errors="replace"))
-        return _unified(data.decode("cp1252", errors="replace"))
-
-
-def _unified(text: str) -> str:
-    """Give line ends, minus signs and blanks one form each."""
-    for wrong in "°µ²³":  # UTF-8 that a program took for Windows-1252, and wrote anew
-        text = text.replace(f"Â{wrong}", wrong)
-    text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    for blank in _BLANKS:
-        text = text.replace(blank, " ")
-    return text.replace("\N{MINUS SIGN}", "-")
+        eastern = ("gb18030", "big5", "cp932", "cp949", "cp1251")
+        likely = (e for e in eastern if _EASTERN.search(head.decode(e, errors="replace")))
+        return next(likely, "cp1252")
+    return "utf-8-sig"
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -172,13 +173,10 @@ def _of_octave(lines: list[str]) -> list[str]:
 
 def _of_cassy(lines: list[str]) -> list[str]:
     """Make of the header that CASSY Lab writes (MIN=, MAX=, SCALE=, DEC=, DEF=) a line of names."""
-    head = [
-        line.removeprefix("DEF=").replace('"', "").replace("&", "")
-        if line.startswith("DEF=")
-        else re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line)
-        for line in lines[:50]
-    ]
-    return head + lines[50:]
+    head = [re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line) for line in lines[:50]]
+    names = [line.removeprefix("DEF=").replace('"', "").replace("&", "") for line in head]
+    told = zip(head, names, strict=True)
+    return [name if line.startswith("DEF=") else line for line, name in told] + lines[50:]
 
 
 _PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
@@ -231,9 +229,9 @@ _DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]],
 
 def _bare_cells(lines: list[str]) -> list[str]:
     """Take off what programs and people put behind numbers, where most lines have it."""
+    filled = sum(bool(line.strip()) for line in lines[:100])
     for found, put in _CLOTHED:
-        some = [line for line in lines[:100] if found.search(line)]
-        if len(some) > 0.5 * len([line for line in lines[:100] if line.strip()]):
+        if sum(bool(found.search(line)) for line in lines[:100]) > 0.5 * filled:
             lines = [found.sub(put, line) for line in lines]
     return lines
 
@@ -420,9 +418,8 @@ def _text_of(line: str, layout: Layout) -> tuple[bool, bool]:
         return (is_comment(line),) * 2
     cells = layout.split(line)
     kinds = layout.kinds(filter(None, cells))
-    return kinds[:1] == "t" and (set(kinds) == {"t"} or len(cells) != layout.width), kinds[
-        :1
-    ] == "t"
+    begins = kinds[:1] == "t"
+    return begins and (set(kinds) == {"t"} or len(cells) != layout.width), begins
 
 
 _NO_TEXT: Final = re.compile(r"[\s\d.,;:+\-eE|/\"']*")
@@ -436,27 +433,30 @@ def _columns(
     if table is not None:
         return [_column(header, column, values) for column, values in enumerate(table.T)], []
     cells = [layout.split(row) for row in rows]
-    width = max(layout.width, max(map(len, cells)))
-    if width > max(_WIDEST, 4 * layout.width):
-        row = int(np.argmax([len(row) for row in cells]))
-        raise InputError(
-            f"{place}, line {numbers[row]}", f"{width} cells in a row", "correct or drop the row"
-        )
+    widths = list(map(len, cells))
+    width = max(layout.width, *widths)
+    too_wide = f"{place}, line {numbers[widths.index(max(widths))]}"
+    refuse_if(
+        width > max(_WIDEST, 4 * layout.width),
+        too_wide,
+        f"{width} cells in a row",
+        "correct or drop the row",
+    )
     columns: list[Column] = []
     words: list[list[str]] = []
-    for place_of in range(width):
-        texts = [row[place_of] if place_of < len(row) else "" for row in cells]
+    for place_of, texts in enumerate(map(list, zip_longest(*cells, [""] * width, fillvalue=""))):
+        del texts[-1]
         column = column_of_numbers(texts, layout, _column(header, place_of, np.empty(0)))
-        if not np.isfinite(column.values).any():
-            clock = column_of_clock_times(texts)
-            if clock is None:
-                words.append(texts)
-                # "0.123,V": the unit stands in a column of its own.
-                if columns and unit_of(texts[0]) and not columns[-1].unit and len(set(texts)) == 1:
-                    columns[-1] = replace(columns[-1], unit=texts[0])
-                continue
-            column = Column(column.name or "time", "s", clock, column.number)
-        columns.append(column)
+        clock = None if np.isfinite(column.values).any() else column_of_clock_times(texts)
+        if clock is not None:
+            columns.append(Column(column.name or "time", "s", clock, column.number))
+        elif np.isfinite(column.values).any():
+            columns.append(column)
+        else:
+            words.append(texts)
+            # "0.123,V": the unit stands in a column of its own.
+            if columns and unit_of(texts[0]) and not columns[-1].unit and len(set(texts)) == 1:
+                columns[-1] = replace(columns[-1], unit=texts[0])
     return columns, words
 
 
@@ -576,10 +576,9 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
         joined = re.sub(r"\s+(?=[\[({])|\s*/\s*", lambda gap: gap[0].strip() or "\0", bare).split()
         others = [bare.split(sign) for sign in "\t;,|"] + [re.split(r"\s{2,}", bare)]
-        for cells in (*others, [cell.replace("\0", " ") for cell in joined]):
-            cells = _trimmed([cell.strip() for cell in cells], layout.width)
-            if len(cells) == layout.width:
-                yield cells
+        ways = (*others, [cell.replace("\0", " ") for cell in joined])
+        trimmed = (_trimmed([cell.strip() for cell in cells], layout.width) for cells in ways)
+        yield from (cells for cells in trimmed if len(cells) == layout.width)
     yield from ([bare.split()] if is_comment(line) else [])
     yield from own
 
@@ -639,11 +638,13 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
 
 def _row_of_units(below: Sequence[str], layout: Layout) -> list[str] | None:
     """Read a row under the names that holds units only."""
-    for line in reversed(below):  # "t A v" above "s rad rad/s" are symbols
-        for cells in _splits(line.strip(" ").lstrip("#%"), layout):
-            if len(cells) == layout.width and _are_units(cells):
-                return [cell.strip("[](){} ") for cell in cells]
-    return None
+    rows = (
+        [cell.strip("[](){} ") for cell in cells]
+        for line in reversed(below)  # "t A v" above "s rad rad/s" are symbols
+        for cells in _splits(line.strip(" ").lstrip("#%"), layout)
+        if len(cells) == layout.width and _are_units(cells)
+    )
+    return next(rows, None)
 
 
 def _refuse_damaged_rows(
@@ -657,16 +658,16 @@ def _refuse_damaged_rows(
     below = [(number, line) for number, line in filled if names_at and number > names_at]
     for place_of, (number, line) in enumerate(below):
         cells = layout.split(line)
-        numbers = [layout.is_number(cell) for cell in cells]
-        if len(cells) != len(row) or layout.width == 1 or not any(numbers):
+        good = list(map(layout.is_number, cells))
+        if len(cells) != len(row) or layout.width == 1 or not any(good):
             continue
-        texts = [at for at, good in enumerate(numbers) if not good and cells[at]]
+        texts = [at for at, is_good in enumerate(good) if not is_good and cells[at]]
         wrong = [cells[at] for at in texts if layout.is_number(row[at])]
         if texts and not wrong:
             continue
         if not wrong:
-            number, text = below[place_of + 1] if place_of + 1 < len(below) else (number, line)
-            wrong = [text.strip()[:60]]
+            number, line = below[min(place_of + 1, len(below) - 1)]
+            wrong = [line.strip()[:60]]
         raise InputError(
             f"{place}, line {number}", f"'{wrong[0]}' is no number", "correct or drop the row"
         )
@@ -702,17 +703,13 @@ def _interval(lines: Sequence[str]) -> float | None:
 
 def _metadata(lines: Sequence[str]) -> dict[str, str]:
     """Keep ``key: value`` lines (with or without a comment sign) as they stand."""
-    kept = {"header": " ".join(lines)[:4000]}
-    for line in lines[:200]:
-        key, colon, value = line.strip().lstrip("#%/! ").partition(":")
-        if colon and value.strip() and 0 < len(key) <= 40:
-            kept[key.strip()] = value.strip()
-    return kept
+    parts = (line.strip().lstrip("#%/! ").partition(":") for line in lines[:200])
+    told = {k.strip(): v.strip() for k, _, v in parts if v.strip() and 0 < len(k) <= 40}
+    return {"header": " ".join(lines)[:4000]} | told
 
 
 def _unique(names: Sequence[str]) -> list[str]:
     """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
     counts = [list(names[:place]).count(name) for place, name in enumerate(names)]
-    return [
-        f"{name} ({n + 1})" if n and name else name for name, n in zip(names, counts, strict=True)
-    ]
+    numbered = zip(names, counts, strict=True)
+    return [f"{name} ({n + 1})" if n and name else name for name, n in numbered]
