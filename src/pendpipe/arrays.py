@@ -1,7 +1,5 @@
 """The array types that signatures are written in."""
 
-from __future__ import annotations
-
 from typing import Any, TypeAlias
 
 import numpy as np

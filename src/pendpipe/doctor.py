@@ -1,7 +1,5 @@
 """What is wrong with a folder of results, and what can safely be done about it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files that are either whole or absent: written beside their place, then moved into it."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

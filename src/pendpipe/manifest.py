@@ -14,8 +14,6 @@ such a parameter: it lists every damage of a stage's results, and keeps those th
 so that each damage runs the stage once.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """What a process of ours asks of its system: one thread, and memory that is kept."""
 
-from __future__ import annotations
-
 import os
 import sys
 from typing import Final

@@ -1,7 +1,5 @@
 """Which code made a result: so that editing the library reruns what depends on it."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections.abc import Iterator

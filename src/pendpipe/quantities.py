@@ -1,7 +1,5 @@
 """How a number is printed: with its unit, an SI prefix, and its error."""
 
-from __future__ import annotations
-
 import math
 
 from pendpipe.arrays import FloatArray

@@ -1,7 +1,5 @@
 """Pages made from a package's own templates."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined

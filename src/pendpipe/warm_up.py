@@ -7,8 +7,6 @@ Python's own byte code is written for the same reason: pip does so for what it c
 for an editable installation, and where PYTHONDONTWRITEBYTECODE is set nobody else would.
 """
 
-from __future__ import annotations
-
 import compileall
 import sys
 from pathlib import Path

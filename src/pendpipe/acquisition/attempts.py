@@ -4,8 +4,6 @@ A campaign keeps the attempts at a record in ``results/<record>/raw/``, the comm
 ``--out``. A recording is always decoded from such a file, so it can be made again at any time.
 """
 
-from __future__ import annotations
-
 import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """The clock of the recorder, which for a simulated device may run faster than wall-clock time."""
 
-from __future__ import annotations
-
 import time
 
 

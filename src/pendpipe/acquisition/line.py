@@ -5,8 +5,6 @@ All limits here are seconds of the host's clock: how long a byte takes from one 
 another does not depend on the scale of a simulated clock.
 """
 
-from __future__ import annotations
-
 import errno
 import re
 import stat

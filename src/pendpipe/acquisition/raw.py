@@ -17,8 +17,6 @@ disk full), what stands before is good. In version 1 frames have neither mark, s
 at_byte and the description no check sum; it is read up to the first damage.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -1,7 +1,5 @@
 """Record from a simulated device: the device, its line, the driver and the recorder."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final

@@ -6,8 +6,6 @@ of the full scale, and what is read one byte later becomes smooth. Only that *ch
 to the other, is believed: a signal that looks odd throughout is left alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

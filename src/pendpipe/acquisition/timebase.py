@@ -8,8 +8,6 @@ and stays so. Other delays (a busy host) pass, and the pieces that were not held
 as before.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final, Literal

@@ -8,8 +8,6 @@ pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
 pendpipe acquire --serve di2108 --signal config/model.toml
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import signal

@@ -1,7 +1,5 @@
 """Check a campaign's configuration, or print its schema or the manual's tables."""
 
-from __future__ import annotations
-
 import argparse
 
 

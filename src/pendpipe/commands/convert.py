@@ -1,7 +1,5 @@
 """Write any supported recording in the plain CSV form."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

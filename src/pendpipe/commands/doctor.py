@@ -4,8 +4,6 @@ Nothing is changed. Each line names a file or folder, what is wrong with it, and
 to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

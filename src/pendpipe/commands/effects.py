@@ -3,8 +3,6 @@
 With --list, one line an effect: identifier, kind, name.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from pendpipe.arguments import add, print_json

@@ -3,8 +3,6 @@
 The page is a single HTML file that needs no network.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ from the folder `figures` beside the page, where pendpipe figures has put them. 
 campaign's numbers go to standard output too, beside the paper's and the simulated truth.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ MODEL.toml has the sections pendulum, sampling and, where wanted, sensor, conver
 with every key.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -5,8 +5,6 @@ the level, with standard deviations (independent of each other), and the level. 
 holds what they share: noise, the level's standard deviation, the spans that were cut.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From the configuration's words to the physics: parts, fluid, and how they swing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The schema and the manual's tables, made from the models."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Errors in a configuration, one line each with the nearest known name."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the workflow's rules need to know about a campaign: names, sources, digests."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

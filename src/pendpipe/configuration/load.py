@@ -3,8 +3,6 @@
 The table, ``config/records.tsv``, has a row a record.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -5,8 +5,6 @@ from these models, so a key is described once: here. Lengths are metres, masses
 kilograms, angles radians; distances are counted from the axis along the rod.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field

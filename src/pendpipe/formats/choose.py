@@ -1,7 +1,5 @@
 """Which column is the time, and which is the pendulum."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Files of other programs: workbooks, zips (phyphox), XML (CASSY Lab, Logger Pro, Tracker)."""
 
-from __future__ import annotations
-
 import io
 import re
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """How a text file writes its table: the signs between cells and in numbers, cells to numbers."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """From the chosen columns to seconds that rise, and to readings in radians, volts, metres or so."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from typing import Final

@@ -1,7 +1,5 @@
 """Any supported file to a recording: the readers in turn, then the choice of columns."""
 
-from __future__ import annotations
-
 import bz2
 import lzma
 import re

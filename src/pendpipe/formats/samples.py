@@ -1,7 +1,5 @@
 """What the numbers of a column show by themselves: whether they swing, and how far."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

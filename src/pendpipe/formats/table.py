@@ -1,7 +1,5 @@
 """What every reader of a file returns: named columns of numbers, before any is chosen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

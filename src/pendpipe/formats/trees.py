@@ -5,8 +5,6 @@ that a damaged one makes it crash. Layout after MathWorks' "MAT-File Format", ve
 a type, a byte count and the data, padded to eight bytes; arrays are elements that hold elements.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

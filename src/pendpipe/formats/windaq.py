@@ -6,8 +6,6 @@ annotations and comments, which also hold pauses, and what a damaged header lost
 Dataq's own texts are here too: spreadsheet exports, and captures of a DI-149 in its ASCII mode.
 """
 
-from __future__ import annotations
-
 import datetime as dt
 import re
 import struct

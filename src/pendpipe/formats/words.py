@@ -1,7 +1,5 @@
 """The words of a header: what each unit is worth, and what a column's name promises."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the instrument has recorded, real or simulated: a record, or the caliper run."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which sensor constant holds for a record: its own, its file's, or the campaign's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

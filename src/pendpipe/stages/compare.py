@@ -1,7 +1,5 @@
 """Compare a campaign's losses with Eq. 16, and sum the campaign up in numbers."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version

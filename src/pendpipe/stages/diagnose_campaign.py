@@ -6,8 +6,6 @@ effects. DIR is the campaign's folder of results; it gets campaign_diagnosis.jso
 goes to standard output as one paragraph.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

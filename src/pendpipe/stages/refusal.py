@@ -5,8 +5,6 @@ the place of each: whole, valid, and holding nothing but the reason. The stages 
 see ``refused.json``, write their stubs and go on.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

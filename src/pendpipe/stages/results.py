@@ -1,7 +1,5 @@
 """What the campaign's own stages build on: the records' results, their joint fit, the theory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

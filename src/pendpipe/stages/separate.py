@@ -1,7 +1,5 @@
 """Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path

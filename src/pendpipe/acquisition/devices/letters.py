@@ -1,7 +1,5 @@
 """Simulated DI-154RS, DI-194RS (dataq-facts A1) and DI-245 (A7): commands are letters."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Final
 
 from pendpipe.acquisition.devices.simulated import Dialect

@@ -1,7 +1,5 @@
 """Simulated DI-149, DI-155 (dataq-facts A5, A6), DI-1100 to DI-4718B (A8): commands are text."""
 
-from __future__ import annotations
-
 import sys
 from abc import abstractmethod
 from typing import ClassVar, Final

@@ -1,7 +1,5 @@
 """Drivers, a module a protocol family; each model is entered where its class is defined."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Final

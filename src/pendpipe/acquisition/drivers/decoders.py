@@ -14,8 +14,6 @@ A *scan* is one reading of every enabled channel at one instant; a *count* is th
 signed number, zero at 0 V.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias

@@ -5,8 +5,6 @@ and the next byte is sent after the echo of the last (dataq-facts A1). The DI-24
 commands as text, which ends in CR and is echoed there (A7).
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from pendpipe.acquisition.clock import ScaledClock

@@ -6,8 +6,6 @@ once; their samples have a frame mark (A6). The others, in CDC mode, don't echo 
 binary words; one whose buffer overflows writes ``stop 01`` (02, 03) into its data and falls silent.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Final
 
