@@ -80,8 +80,8 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
     tables: dict[str, Table] = {}
     reason = "it holds no CSV"
     for name, content in members.items():
+        reader = read_project if name.lower().endswith(".trk") else read_text
         try:
-            reader = read_project if name.lower().endswith(".trk") else read_text
             tables[name] = reader(place, content, options)
         except (NotThisFormatError, InputError) as fault:
             reason = f"{name}: {getattr(fault, 'problem', fault)}"

@@ -1,5 +1,7 @@
 """How a text file writes its table: the signs between cells and in numbers, cells to numbers."""
 
+import csv
+import datetime as dt
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -10,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions
 from pendpipe.formats.words import unit_of
 
@@ -63,8 +65,6 @@ class Layout:
         if '"' not in line:
             blank = self.delimiter == " "
             return line.split() if blank else [cell.strip() for cell in line.split(self.delimiter)]
-        import csv
-
         try:
             rows = csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True)
             return [cell.strip() for cell in next(rows) if cell.strip() or self.delimiter != " "]
@@ -173,10 +173,11 @@ def _is_one_column(sample: Sequence[str]) -> bool:
 
 def _wanted(option: str, given: str | None, names: dict[str, str], usual: str, fit: str) -> str:
     """Give the signs that are tried: all usual ones, or the one that the user gives."""
-    sign = usual if given is None else names.get(given.lower(), given)
-    if given is not None and not re.fullmatch(fit, sign):
-        remedy = "'.' or ','" if option == "--decimal" else "tab, space, ',' or ';'"
-        raise InputError(option, f"'{sign}' can't be used", f"give {remedy}")
+    if given is None:
+        return usual
+    sign = names.get(given.lower(), given)
+    remedy = "give '.' or ','" if option == "--decimal" else "give tab, space, ',' or ';'"
+    refuse_if(not re.fullmatch(fit, sign), option, f"'{sign}' can't be used", remedy)
     return sign
 
 
@@ -188,7 +189,7 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
     header).
     """
     above: list[tuple[int, list[str]]] = []
-    first: int | None = None
+    first: list[int] = []
     for place, line in enumerate(lines):
         if not line.strip() or is_comment(line):
             continue
@@ -197,13 +198,13 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
         if not row or (above and _is_title(above[-1][1], cells, layout)):
             above = []
         if row:
-            first = place if first is None else first
+            first = first or [place]
             above.append((place, cells))
         if len(above) == _IN_A_ROW:
-            return above[0][0]
-    if first is None:
+            break
+    if not first:
         raise NotThisFormatError("no row of numbers was found")
-    return above[0][0] if above else first
+    return above[0][0] if above else first[0]
 
 
 def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> bool:
@@ -306,8 +307,6 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
 
 def _days(date: tuple[str | None, ...], slashed: bool) -> int:
     """Count the days since 1970; 0 without a date, -1 where there is no such day."""
-    import datetime as dt
-
     parts = [int(part or 0) for part in date]
     if not any(date):
         return 0

@@ -174,12 +174,8 @@ def _unpacked(place: Path, data: bytes) -> bytes:
         content = bytes(unpacker.decompress(data, most_unpacked(len(data))))
     except (OSError, ValueError, EOFError, zlib.error, lzma.LZMAError) as fault:
         raise InputError(place, f"it can't be unpacked ({fault})", "pack it again") from None
-    refuse_if(
-        not unpacker.eof,
-        place,
-        "what is packed in it is cut short, or too large",
-        "give the file in it",
-    )
+    cut = "what is packed in it is cut short, or too large"
+    refuse_if(not unpacker.eof, place, cut, "give the file in it")
     return content
 
 

@@ -143,32 +143,29 @@ def _last(name: str) -> str:
 
 
 def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
-    for name, values in columns.items():
-        if options.reading_column in (name, _last(name)) or options.channel == name:
-            return len(values)
-    timed = [len(values) for name, values in columns.items() if role_of(_last(name)) == "time"]
-    paired = [n for n in timed if sum(len(values) == n for values in columns.values()) > 1]
-    return max(paired or [len(values) for values in columns.values()])
+    lengths = {name: len(values) for name, values in columns.items()}
+    asked = (options.reading_column, options.channel)
+    wanted = [n for name, n in lengths.items() if name in asked or _last(name) == asked[0]]
+    timed = [n for name, n in lengths.items() if role_of(_last(name)) == "time"]
+    paired = [n for n in timed if list(lengths.values()).count(n) > 1]
+    return wanted[0] if wanted else max(paired or lengths.values())
 
 
 def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """Keep one of several equal time columns, and put it first."""
-    first: dict[str, FloatArray] = {}
-    rest: dict[str, FloatArray] = {}
-    for name, values in columns.items():
-        clock = role_of(_last(name)) == "time"
-        if not clock or not any(np.array_equal(values, each) for each in first.values()):
-            (first if clock else rest)[name] = values
-    return first | rest
+    clocks: dict[str, FloatArray] = {}
+    named = {name: values for name, values in columns.items() if role_of(_last(name)) == "time"}
+    for name, values in named.items():
+        if not any(np.array_equal(values, each) for each in clocks.values()):
+            clocks[name] = values
+    return clocks | {name: values for name, values in columns.items() if name not in named}
 
 
 def _interval(arrays: dict[str, FloatArray]) -> float | None:
-    for name, values in arrays.items():
-        word = _last(name).lower()
-        known = values.size == 1 and _SLOWEST_HZ < values[0] < _FASTEST_HZ
-        if known and word in (*_RATES, *_INTERVALS):
-            return float(1.0 / values[0] if word in _RATES else values[0])
-    return None
+    single = ((_last(name).lower(), v[0]) for name, v in arrays.items() if v.size == 1)
+    known = (each for each in single if _SLOWEST_HZ < each[1] < _FASTEST_HZ)
+    word, value = next((each for each in known if each[0] in _RATES + _INTERVALS), ("", None))
+    return value and float(1.0 / value if word in _RATES else value)
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -183,10 +180,8 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     Exception
         Whatever a library raises that stumbles on a damaged file.
     """
-    for form, begins, reader in _FORMS:
-        if begins(data):
-            return reader(place, data, form, options)
-    return table_of_tree(place, tree_of_version_4(data), "matlab-v4", options)
+    form, reader = next((form, reader) for form, begins, reader in _FORMS if begins(data))
+    return reader(place, data, form, options)
 
 
 def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
@@ -456,4 +451,5 @@ _FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
     ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
     ("matlab-v5", is_matlab, lambda p, d, f, o: table_of_tree(p, tree_of(d), f, o)),
     ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),
+    ("matlab-v4", bool, lambda p, d, f, o: table_of_tree(p, tree_of_version_4(d), f, o)),
 )

@@ -8,7 +8,6 @@ Dataq's own texts are here too: spreadsheet exports, and captures of a DI-149 in
 
 import datetime as dt
 import re
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,6 +47,7 @@ _MARK: Final = b"\x01\x80"
 _HEADER_BYTES, _TABLE, _ENTRY = 1156, 110, 36
 _SIZES: Final = (_HEADER_BYTES, 1536, 5296)
 _HIRES, _PACKED = 1 << 1, 1 << 14
+_ANOTHER_COPY: Final = "give another copy"
 _LARGEST_SCALE: Final = 1e30
 """No unit makes a count worth more than this: a greater scale is a damaged one."""
 
@@ -126,34 +126,34 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     InputError
         When the file is a WinDaq file, and damaged beyond repair.
     """
-
-    def damaged(what: str, remedy: str = "give another copy") -> InputError:
-        return InputError(place, what, remedy)
-
     suffix = place.suffix.lower()
     size, notes = _size(data)
-    if not size:
-        if suffix not in SUFFIXES:
-            raise NotThisFormatError("the mark 0x8001 at the end of a WinDaq header is missing")
-        raise damaged(
-            "this is no WinDaq file, or its header is damaged (the mark 0x8001 is missing)",
-            "open and save it in WinDaq, or give another copy",
-        )
+    if not size and suffix not in SUFFIXES:
+        raise NotThisFormatError("the mark 0x8001 at the end of a WinDaq header is missing")
+    refuse_if(
+        not size,
+        place,
+        "this is no WinDaq file, or its header is damaged (the mark 0x8001 is missing)",
+        f"open and save it in WinDaq, or {_ANOTHER_COPY}",
+    )
     told = np.frombuffer(data, _HEADER, 1)[0]
     count = int(told["channels"]) & (0x1F if size <= 1536 else 0xFF)
     table, entry = int(told["table"]), int(told["entry"])
-    if not count or table + count * entry > size - 2 or entry < _ENTRY:
-        raise damaged(
-            f"the WinDaq header is damaged ({count} channels of {entry} bytes at {table})"
-        )
+    refuse_if(
+        not count or table + count * entry > size - 2 or entry < _ENTRY,
+        place,
+        f"the WinDaq header is damaged ({count} channels of {entry} bytes at {table})",
+        _ANOTHER_COPY,
+    )
     interval = float(told["interval_s"])
     hires, packed = bool(told["flags"] & _HIRES), bool(told["flags"] & _PACKED)
     false = not 1e-7 < interval < 1e6
-    if false and options.sample_rate is None:
-        raise damaged(
-            f"the WinDaq header is damaged (sample interval {interval:g} s)",
-            "give the true rate with --sample-rate",
-        )
+    refuse_if(
+        false and options.sample_rate is None,
+        place,
+        f"the WinDaq header is damaged (sample interval {interval:g} s)",
+        "give the true rate with --sample-rate",
+    )
     form = "HiRes" if hires else "14-bit"
     for odd, note in (
         (false, f"the sample interval in the header ({interval:g} s) can't be true"),
@@ -168,27 +168,18 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         ),
     ):
         notes += [note] * bool(odd)
-    interval = 1.0 / options.sample_rate if false and options.sample_rate else interval
-    channels: list[Channel] = []
-    for each in np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table):
-        # DOS wrote the degree sign as byte 0xF8, which is another letter today.
-        unit = each["unit"].split(b"\0")[0].decode("latin-1").strip().replace("ø", "°")
-        slope, intercept = float(each["slope"]), float(each["intercept"])
-        number, divisor = len(channels) + 1, max(int(each["divisor"]), 1)
-        # (Infinities and NaN fail the comparisons as well.)
-        if not (0.0 < abs(slope) < _LARGEST_SCALE > abs(intercept)):
-            raise damaged(f"the scale of channel {number} is damaged ({slope:g})")
-        channels.append(Channel(number, slope, intercept, unit, divisor=divisor))
+    entries = np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table)
+    channels = [_channel(place, number, each) for number, each in enumerate(entries, start=1)]
     # A scan without a word would let a damaged header claim any number of scans.
-    if packed and min(channel.divisor for channel in channels) > 1:
-        raise damaged("no channel of this packed file is in every scan")
+    bare = packed and min(channel.divisor for channel in channels) > 1
+    refuse_if(bare, place, "no channel of this packed file is in every scan", _ANOTHER_COPY)
     return WindaqHeader(
         told,
         size,
         tuple(channels),
         int(told["data_bytes"]),
         int(told["event_bytes"]),
-        interval,
+        1.0 / options.sample_rate if false and options.sample_rate else interval,
         hires,
         packed,
         circular=size == 1536 or suffix in (".wdc", ".whc"),
@@ -196,17 +187,29 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     )
 
 
+def _channel(place: Path, number: int, told: Any) -> Channel:
+    """Read a channel's entry in the header."""
+    # DOS wrote the degree sign as byte 0xF8, which is another letter today.
+    unit = told["unit"].split(b"\0")[0].decode("latin-1").strip().replace("ø", "°")
+    slope, intercept = float(told["slope"]), float(told["intercept"])
+    # (Infinities and NaN fail the comparisons as well.)
+    refuse_if(
+        not 0.0 < abs(slope) < _LARGEST_SCALE > abs(intercept),
+        place,
+        f"the scale of channel {number} is damaged ({slope:g})",
+        _ANOTHER_COPY,
+    )
+    return Channel(number, slope, intercept, unit, max(int(told["divisor"]), 1))
+
+
 def _size(data: bytes) -> tuple[int, list[str]]:
     """Find the header's size: as stated, or by the mark; 0 where there is none."""
-    if len(data) < _HEADER_BYTES:
-        return 0, []
-    stated = int(np.frombuffer(data, _HEADER, 1)["size"][0])
+    stated = int.from_bytes(data[6:8], "little", signed=True)
     usual = _SIZES if data[4:6] == bytes((_TABLE, _ENTRY)) else ()
-    for size in (stated, *usual):
-        if size > _TABLE and data[size - 2 : size] == _MARK:
-            why = f"the header's own size ({stated}) is damaged: {size} bytes by its mark"
-            return size, [why] if size != stated else []
-    return 0, []
+    marked = [n for n in (stated, *usual) if n > _TABLE and data[n - 2 : n] == _MARK]
+    size = marked[0] if marked and len(data) >= _HEADER_BYTES else 0
+    why = f"the header's own size ({stated}) is damaged: {size} bytes by its mark"
+    return size, [why] * (size not in (0, stated))
 
 
 _COMMENT: Final = 1 << 31
@@ -230,28 +233,24 @@ def parse_trailers(
     files), then a time stamp if the pointer is not negative, then a comment's place if the
     next integer has its top bit set.
     """
-    texts_at = at + header.event_bytes
+    texts_at, width = at + header.event_bytes, len(header.channels)
     if header.event_bytes % 4 or texts_at > len(data):
         return None
-    per_scan, width = len(header.channels) if header.hires else 1, len(header.channels)
+    # (A view: a damaged size may promise a list as long as the file.)
+    words = np.frombuffer(data, "<i4", header.event_bytes // 4, at)
     events: list[Event] = []
-    last = -1
-
-    def word() -> int:
-        # One by one: a damaged size may promise a list as long as the file.
-        nonlocal at
-        at += 4
-        return int(struct.unpack_from("<i", data, at - 4)[0])
-
-    while at < texts_at:
-        pointer = word()
-        scan = abs(pointer) // per_scan
-        if not (last + rising <= scan <= header.scans) or (pointer >= 0 and at >= texts_at):
+    place, last = 0, -1
+    while place < len(words):
+        pointer, comment, stamped = int(words[place]), "", bool(words[place] >= 0)
+        scan = abs(pointer) // (width if header.hires else 1)
+        place += 1 + stamped
+        if not last + rising <= scan <= header.scans or place > len(words):
             return None
-        stamp, comment, last = word() if pointer >= 0 else None, "", scan
+        stamp, last = int(words[place - 1]) if stamped else None, scan
         # Pointers end at the number of samples; what lies far below zero is a comment.
-        if at < texts_at and struct.unpack_from("<i", data, at)[0] < -_COMMENT // 2:
-            begin = texts_at + (word() & 0x7FFFFFFF)
+        if place < len(words) and words[place] < -_COMMENT // 2:
+            begin = texts_at + (int(words[place]) & 0x7FFFFFFF)
+            place += 1
             if begin >= len(data):
                 return None
             comment = _decoded(data[begin : begin + _LONGEST_TEXT].split(b"\0", 1)[0])
