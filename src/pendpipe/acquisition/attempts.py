@@ -99,27 +99,21 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
         If one of them is being recorded now, or none holds a scan and one is damaged.
     """
     found: list[Attempt] = []
-    damage: InputError | None = None
-    for path in sorted(paths):
-        if not path.is_file():
-            continue
-        refuse_if(
-            is_being_recorded(path),
-            path,
-            "another process is recording into it",
-            "wait for its end",
-        )
+    damages: list[InputError] = []
+    for path in sorted(path for path in paths if path.is_file()):
+        busy = "another process is recording into it"
+        refuse_if(is_being_recorded(path), path, busy, "wait for its end")
         try:
             raw = read_raw(path)
             decode_recording(raw)
         except NothingRecordedError:
             continue
         except InputError as fault:
-            damage = damage or fault
+            damages.append(fault)
         else:
             found.append(Attempt(path, raw))
-    if damage and not found:
-        raise damage
+    if damages and not found:
+        raise damages[0]
     return sorted(found, key=lambda attempt: (attempt.recorded_at, _stamp(attempt.path)))
 
 

@@ -70,7 +70,7 @@ def decode_recording(
     segments = split(raw, driver)
     kept = raw.event("stopped").get("keep_scans")
     if kept is not None and len(segments) == 1:
-        gone = sum(loss.lost_scans for loss in segments[0].losses if loss.reason == "damage")
+        gone = _lost([loss for loss in segments[0].losses if loss.reason == "damage"])
         segments = [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
     if not segments:
         raise NothingRecordedError(
@@ -206,7 +206,8 @@ def _metadata(
 ) -> dict[str, str]:
     """Say where the recording comes from, as text."""
     header = raw.header
-    metadata = {
+    told = ("firmware", "serial_number", "clock_scale", "volts_per_radian")
+    return {
         "source": str(header.get("source") or f"{header['model']} on {header['port']}"),
         "model": str(header["model"]),
         "channel": str(channel),
@@ -219,67 +220,63 @@ def _metadata(
         "time_base": time_base.chosen,
         "unseen_loss_below_s": f"{max(segment.limit_s for segment in segments):.4g}",
         "recorded_at": str(header["recorded_at"]),
-    }
-    for key in ("firmware", "serial_number", "clock_scale", "volts_per_radian"):
-        if header.get(key):
-            metadata[key] = str(header[key])
-    return metadata
+    } | {key: str(header[key]) for key in told if header.get(key)}
+
+
+def _lost(losses: Sequence[Loss]) -> int:
+    """How many scans were lost."""
+    return sum(loss.lost_scans for loss in losses)
 
 
 def _notes(
     raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
 ) -> tuple[str, ...]:
     """Say what a user should know of the session, a clause each."""
-    notes: list[str] = []
     losses = [loss for segment in segments for loss in segment.losses]
     met = [loss for loss in losses if loss.after_scan and not loss.reason]
-    if met:
-        scans, discarded = (
-            sum(loss.lost_scans for loss in met),
-            sum(loss.discarded_bytes for loss in met),
-        )
-        notes.append(f"{scans} scans lost at {len(met)} places ({discarded} bytes out of step)")
-    if silent := [loss for loss in losses if loss.reason == "clock"]:
-        scans = sum(loss.lost_scans for loss in silent)
-        notes.append(f"{scans} scans lost at {len(silent)} places, by the recorder's clock")
-    if slipped := [loss for loss in losses if loss.reason.startswith("slip")]:
-        unsure = sum(loss.reason != "slip" for loss in slipped)
-        doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
-        notes.append(
-            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}"
-        )
-    notes += [
-        f"the device's buffer overflowed ('{loss.reason}')"
-        for loss in losses
-        if loss.reason.startswith("stop")
-    ]
-    notes += [
-        f"broken off and resumed: {event.get('reason')}"
-        for event in raw.events
-        if event.get("event") == "restarted"
-    ]
-    if len(segments) > 1:
-        steps = [f"{len(segment.counts)} scans" for segment in segments]
-        notes.append(f"{len(segments)} pieces ({', '.join(steps)}) in {time_s[-1]:.6g} s")
-    if time_base.chosen == "measured":
-        notes.append(
+    silent = [loss for loss in losses if loss.reason == "clock"]
+    damaged = [loss for loss in losses if loss.reason == "damage"]
+    slipped = [loss.reason for loss in losses if loss.reason.startswith("slip")]
+    unsure = len(slipped) - slipped.count("slip")
+    doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
+    discarded = sum(loss.discarded_bytes for loss in met)
+    pieces = ", ".join(f"{len(segment.counts)} scans" for segment in segments)
+    stopped, asked_s = raw.event("stopped"), raw.header.get("duration_s")
+    asked = f" of {asked_s:g} s" if isinstance(asked_s, int | float) else ""
+    extent = f"{time_s[-1]:.6g} s{asked}"
+    notes = (
+        (met, f"{_lost(met)} scans lost at {len(met)} places ({discarded} bytes out of step)"),
+        (silent, f"{_lost(silent)} scans lost at {len(silent)} places, by the recorder's clock"),
+        (
+            slipped,
+            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}",
+        ),
+        *(
+            (loss.reason.startswith("stop"), f"the device's buffer overflowed ('{loss.reason}')")
+            for loss in losses
+        ),
+        *(
+            (event.get("event") == "restarted", f"broken off and resumed: {event.get('reason')}")
+            for event in raw.events
+        ),
+        (len(segments) > 1, f"{len(segments)} pieces ({pieces}) in {time_s[-1]:.6g} s"),
+        (
+            time_base.chosen == "measured",
             f"the device scans at {time_base.measured_hz:.6g} Hz, "
-            f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock"
-        )
-    stopped = raw.event("stopped")
-    extent = f"{time_s[-1]:.6g} s"
-    if isinstance(asked_s := raw.header.get("duration_s"), int | float):
-        extent += f" of {asked_s:g} s"
-    if not stopped:
-        notes.append(f"the recording was cut short: the {extent} that had arrived are kept")
-    elif stopped.get("reason") not in COMPLETE:
-        notes.append(f"ended early: {stopped.get('reason')} ({extent} kept)")
-    if raw.damaged_bytes:
-        scans = sum(loss.lost_scans for loss in losses if loss.reason == "damage")
-        notes.append(
-            f"{raw.damaged_bytes} bytes of the raw file are damaged: {scans} scans are lost"
-        )
-    return tuple(notes)
+            f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock",
+        ),
+        (not stopped, f"the recording was cut short: the {extent} that had arrived are kept"),
+        (
+            stopped and stopped.get("reason") not in COMPLETE,
+            f"ended early: {stopped.get('reason')} ({extent} kept)",
+        ),
+        (
+            raw.damaged_bytes,
+            f"{raw.damaged_bytes} bytes of the raw file are damaged:"
+            f" {_lost(damaged)} scans are lost",
+        ),
+    )
+    return tuple(note for is_so, note in notes if is_so)
 
 
 _NEAR: Final = 64
@@ -435,13 +432,12 @@ def _scans_by(
     arrived_bytes: IntArray, losses: Sequence[Loss], bytes_per_scan: int
 ) -> tuple[FloatArray, FloatArray]:
     """Turn bytes arrived into scans the device has made, and into those that are good."""
-    made, good = arrived_bytes / bytes_per_scan, arrived_bytes / bytes_per_scan
-    discarded = 0
+    good = arrived_bytes / bytes_per_scan
+    made, discarded = good.copy(), 0
     for loss in losses:
         discarded += loss.discarded_bytes
         later = arrived_bytes >= loss.after_scan * bytes_per_scan + discarded
         good[later] -= loss.discarded_bytes / bytes_per_scan
         made[later] -= loss.discarded_bytes / bytes_per_scan
-        if loss.after_scan:
-            made[later] += loss.lost_scans
+        made[later] += loss.lost_scans if loss.after_scan else 0
     return made, good

@@ -273,7 +273,8 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
                 stamps.pop()  # what arrived at once may fill several frames
             stamps.append((frame.time_s, total))
         elif frame.kind == b"E":
-            event = _event(place, frame.content)
+            event = _json(frame.content) or {}
+            refuse_if(not event, place, "an event in it is damaged", "give another copy")
             starts += event.get("event") == "restarted"
             events.append({**event, "time_s": frame.time_s, "at_byte": total})
     return RawRecording(
@@ -313,28 +314,22 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
 
 def _description(line: bytes) -> dict[str, Any] | None:
     """Read a line that describes a recording; ``None`` if it is none, or damaged."""
-    try:
-        header = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(header, dict) or header.get("format") != _FORMAT:
+    header = _json(line)
+    if header is None or header.get("format") != _FORMAT:
         return None
     check = header.pop("crc32", None)
-    if check is None:
-        return header if header.get("version") == 1 else None
     text, _, _ = line.rpartition(b', "crc32": "')
-    return header if check == f"{zlib.crc32(text):08x}" else None
+    unchecked = check is None and header.get("version") == 1
+    return header if unchecked or check == f"{zlib.crc32(text):08x}" else None
 
 
-def _event(place: str, body: bytes) -> Mapping[str, Any]:
-    """Return an event's content."""
+def _json(body: bytes) -> dict[str, Any] | None:
+    """Read a line of JSON; ``None`` if it is no mapping."""
     try:
-        event = json.loads(body)
+        content = json.loads(body)
     except (ValueError, RecursionError):
-        event = None
-    if not isinstance(event, dict):
-        raise InputError(place, "an event in it is damaged", "give another copy")
-    return event
+        return None
+    return content if isinstance(content, dict) else None
 
 
 def _frames(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:

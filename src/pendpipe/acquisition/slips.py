@@ -73,11 +73,8 @@ def find_slips(data: bytes, channels: int) -> list[Slip]:
 def _next_slip(data: bytes, begin: int, size: int) -> Slip | None:
     """Find the first slip behind `begin`, where the words are held to be in step."""
     scans = (len(data) - begin) // size - 1
-    firsts = [*range(0, scans - _SNIPPET, _EVERY), scans - _SNIPPET]
     in_step: int | None = None
-    for first in firsts:
-        if first < 0:
-            continue
+    for first in [*range(0, scans - _SNIPPET, _EVERY), scans - _SNIPPET][scans < _SNIPPET :]:
         here, beside = _roughness(data, begin + first * size, _SNIPPET, size)
         if _CLEARLY * here.mean() < beside.mean():
             in_step = first

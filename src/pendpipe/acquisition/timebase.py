@@ -212,6 +212,5 @@ def find_clock_losses(
 
 def _place(late: FloatArray, begin: int, end: int) -> int:
     """Return the arrival between the two after which the lateness never falls back."""
-    part = late[begin : end + 1]
-    least_after = np.minimum.accumulate(part[::-1])[::-1]
+    least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
     return begin + 1 + int(np.argmax(np.diff(least_after)))
