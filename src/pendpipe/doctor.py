@@ -77,9 +77,8 @@ def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
         broken, damages = manifest.damages_of(home, stage.stage, hash_all=True)
         for damage in damages:
             yield Finding("altered", str(damage.path), damage.problem, _RUN)
-        for name in broken.outputs:
-            if not (home / name).is_file():
-                yield Finding("incomplete", str(home / name), "it is missing", _RUN)
+        for path in (home / name for name in broken.outputs if not (home / name).is_file()):
+            yield Finding("incomplete", str(path), "it is missing", _RUN)
         if not broken.outputs and not damages:
             problem = f"stage {stage.stage} began and did not end"
             yield Finding("incomplete", str(home), problem, "snakemake runs it again")
@@ -98,23 +97,19 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
     """Files that no stage claims, and recordings that were never decoded."""
     for path in sorted(path for path in results.rglob("*") if path.is_file()):
         inside = path.relative_to(results).parts[:-1]
+        home = results / inside[0] if inside else results
+        ours = path.resolve() in listed or path.name.lower() == "readme.md"
         if TEMPORARY.fullmatch(path.name):
-            yield Finding(
-                "temporary",
-                str(path),
-                "a process was killed while it wrote this",
-                "delete it when no run is alive",
-            )
+            problem = "a process was killed while it wrote this"
+            yield Finding("temporary", str(path), problem, "delete it when no run is alive")
         elif SET_ASIDE in path.name:
             problem = "a damaged result, kept when it was made again"
             yield Finding("set-aside", str(path), problem, "delete it when nobody needs it")
         elif path.suffix == ".raw":
             yield from _undecoded(path)
-        elif not set(inside) & set(_NO_RESULTS) and path.resolve() not in listed:
-            home = results if not inside else results / inside[0]
-            if (home / FOLDER).is_dir() and path.name.lower() != "readme.md":
-                problem = "no stage has written this"
-                yield Finding("orphaned", str(path), problem, "move it elsewhere, or delete it")
+        elif not set(inside) & set(_NO_RESULTS) and not ours and (home / FOLDER).is_dir():
+            problem = "no stage has written this"
+            yield Finding("orphaned", str(path), problem, "move it elsewhere, or delete it")
 
 
 def _undecoded(raw: Path) -> Iterator[Finding]:

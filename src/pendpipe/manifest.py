@@ -106,10 +106,10 @@ class Manifest:
         if not self.path.is_file():
             return []
         since = None if hash_all else self.path.stat().st_mtime_ns
-        found = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
-        found = [damage for damage in found if damage and damage.found != "missing"]
-        found += [_compare(self.home / name, made, since) for name, made in self.extras.items()]
-        return [damage for damage in found if damage]
+        outputs = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
+        extras = [_compare(self.home / name, made, since) for name, made in self.extras.items()]
+        there = [damage for damage in outputs if damage and damage.found != "missing"]
+        return there + [damage for damage in extras if damage]
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:
@@ -139,6 +139,14 @@ def read_manifest(home: Path, stage: str) -> Manifest:
     return manifest
 
 
+def _readable(home: Path, stage: str) -> Manifest:
+    """Read a stage's manifest; an empty one where it can't be read, too."""
+    try:
+        return read_manifest(home, stage)
+    except DamagedError:
+        return Manifest(home, stage)
+
+
 def _digest(content: dict[str, Any]) -> str:
     """Hash a manifest's own content."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -146,11 +154,7 @@ def _digest(content: dict[str, Any]) -> str:
 
 def manifests(home: Path) -> Iterator[Manifest]:
     """Read all manifests of a folder; one that can't be read holds nothing."""
-    for path in sorted((home / FOLDER).glob("*.json")):
-        try:
-            yield read_manifest(home, path.stem)
-        except DamagedError:
-            yield Manifest(home, path.stem)
+    yield from (_readable(home, path.stem) for path in sorted((home / FOLDER).glob("*.json")))
 
 
 def damages_of(home: Path, stage: str, *, hash_all: bool = False) -> tuple[Manifest, list[Damage]]:
@@ -268,10 +272,7 @@ def job(
     if out is not None and not out.absolute().is_relative_to(home.absolute()):
         yield Job()
         return
-    try:
-        repaired = read_manifest(home, stage).repaired
-    except DamagedError:
-        repaired = ()
+    repaired = _readable(home, stage).repaired
     # Until the stage has ended its old results are nobody's.
     Manifest(home, stage, repaired=repaired).write()
     running = Job()
@@ -351,14 +352,10 @@ def source_sha256(home: Path, stage: str, source: Path) -> str | None:
     """Hash a file of the user; from the manifest if it has not changed since."""
     if not source.is_file():
         return None
-    try:
-        manifest = read_manifest(home, stage)
-    except DamagedError:
-        manifest = Manifest(home, stage)
+    manifest = _readable(home, stage)
     made = manifest.sources.get(source.name)
-    if made is not None and _unchanged(source, made, manifest.path.stat().st_mtime_ns):
-        return made.sha256
-    return sha256(source)
+    kept = made is not None and _unchanged(source, made, manifest.path.stat().st_mtime_ns)
+    return made.sha256 if made is not None and kept else sha256(source)
 
 
 def _name(path: Path, home: Path) -> str:
@@ -380,12 +377,7 @@ def _compare(path: Path, made: Sum, since_ns: int | None) -> Damage | None:
     if since_ns is not None and _unchanged(path, made, since_ns):
         return None
     length, found = sum_of(path)
-    if found == made.sha256:
-        return None
-    if length == 0:
-        problem = "it is empty"
-    elif length < made.length:
-        problem = f"it is torn or altered ({length} bytes of {made.length})"
-    else:
-        problem = "it was altered"
-    return Damage(path, problem, found[:8])
+    torn = f"it is torn or altered ({length} bytes of {made.length})"
+    problem = torn if length < made.length else "it was altered"
+    changed = Damage(path, problem if length else "it is empty", found[:8])
+    return changed if found != made.sha256 else None

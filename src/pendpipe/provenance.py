@@ -27,68 +27,45 @@ def code_version(module: str) -> str:
     str
         Twelve hexadecimal digits.
     """
-    seen: set[str] = set()
-    waiting = [module]
+    seen, waiting = set[str](), [module]
     while waiting:
         name = waiting.pop()
-        if name in seen or _file(name) is None:
-            continue
-        seen.add(name)
-        waiting.extend(_imports(name))
+        if name not in seen and _files(name):
+            seen.add(name)
+            waiting.extend(_imports(name))
     digest = hashlib.sha256()
-    for name in sorted(seen):
-        digest.update(_content(name))
-        for data in _data_of(name):
-            digest.update(data.read_bytes())
+    for path in (path for name in sorted(seen) for path in _files(name)):
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
 @cache
-def _data_of(module: str) -> tuple[Path, ...]:
-    """The data files (templates) beside a package's ``__init__``, in a folder of their own."""
-    path = _file(module)
-    assert path is not None
-    if path.name != "__init__.py":
-        return ()
-    return tuple(sorted(file for file in path.parent.glob("templates/*") if file.is_file()))
-
-
-@cache
-def _file(module: str) -> Path | None:
-    """The source file of one of our modules."""
-    parts = module.split(".")
-    if parts[0] != PACKAGE.name:
-        return None
-    path = PACKAGE.joinpath(*parts[1:])
-    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
-        if len(parts) > 1 and candidate.is_file():
-            return candidate
-    return None
-
-
-@cache
-def _content(module: str) -> bytes:
-    path = _file(module)
-    assert path is not None
-    return path.read_bytes()
+def _files(module: str) -> tuple[Path, ...]:
+    """The source of one of our modules, with a package's templates; nothing for others'."""
+    package, *parts = module.split(".")
+    path = PACKAGE.joinpath(*parts)
+    candidates = (path.with_suffix(".py"), path / "__init__.py")
+    ours = parts and package == PACKAGE.name
+    source = [each for each in candidates if ours and each.is_file()][:1]
+    templates = path.glob("templates/*") if source == [path / "__init__.py"] else ()
+    return (*source, *sorted(file for file in templates if file.is_file()))
 
 
 @cache
 def _imports(module: str) -> frozenset[str]:
     """The modules of ours that a module names in its import statements."""
     found: set[str] = set()
-    content = _content(module)
+    content = _files(module)[0].read_bytes()
     tree = ast.parse(content)
     for statement in _statements(tree.body):
         if isinstance(statement, ast.Import):
             found.update(alias.name for alias in statement.names)
         elif isinstance(statement, ast.ImportFrom) and statement.module and not statement.level:
-            found.add(statement.module)
-            found.update(f"{statement.module}.{alias.name}" for alias in statement.names)
-    if b"import_module" in content:
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call):
-                found.update(_imported_by_name(node, module))
+            names = (f"{statement.module}.{alias.name}" for alias in statement.names)
+            found.update((statement.module, *names))
+    calls = ast.walk(tree) if b"import_module" in content else ()
+    for call in (node for node in calls if isinstance(node, ast.Call)):
+        found.update(_imported_by_name(call, module))
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
@@ -101,8 +78,7 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
         for part in ("body", "orelse", "finalbody"):
             yield from _statements(getattr(statement, part, []))
         for part in ("handlers", "cases"):
-            for block in getattr(statement, part, []):
-                yield from _statements(block.body)
+            yield from _statements([s for b in getattr(statement, part, []) for s in b.body])
 
 
 def _imported_by_name(call: ast.Call, module: str) -> set[str]:

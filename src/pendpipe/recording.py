@@ -11,8 +11,10 @@ need no constant of the sensor.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import takewhile
 from pathlib import Path
 from typing import Final, Literal
 
@@ -360,14 +362,11 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     except UnicodeDecodeError:
         raise InputError(place, "this is no UTF-8 text", "run pendpipe convert first") from None
     lines, notes = whole_lines(text)
-    metadata: dict[str, str] = {}
-    first = 0
-    while first < len(lines) and (lines[first].startswith("#") or not lines[first].strip()):
-        key, _, value = lines[first].lstrip("# ").partition(":")
-        if value:
-            metadata[key.strip()] = value.strip()
-        first += 1
+    above = list(takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
+    first = len(above)
     refuse_if(first == len(lines), place, "the file is empty", "record again, or give another file")
+    told = (line.lstrip("# ").partition(":") for line in above)
+    metadata = {key.strip(): value.strip() for key, _, value in told if value}
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, picked, len(names))
@@ -407,47 +406,34 @@ def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
 
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
     """Find the columns of the plain form in its header."""
-    where = f"{place}, line {line}"
-    refuse_if(
-        "time_s" not in names,
-        where,
-        f"the column time_s is missing (found {', '.join(names)})",
-        "name it time_s",
-    )
+    where, headed = f"{place}, line {line}", f"(found {', '.join(names)})"
+    missing = f"the column time_s is missing {headed}"
+    refuse_if("time_s" not in names, where, missing, "name it time_s")
     found = [name for name in QUANTITIES if name in names]
     refuse_if(
         len(found) != 1,
         where,
-        f"exactly one of {', '.join(QUANTITIES)} is needed (found {', '.join(names)})",
+        f"exactly one of {', '.join(QUANTITIES)} is needed {headed}",
         "rename the column, or run pendpipe convert",
     )
-    picked = [names.index("time_s"), names.index(found[0])]
-    if "quality" in names:
-        picked.append(names.index("quality"))
-    return found[0], picked
+    wanted = ("time_s", found[0], "quality")
+    return found[0], [names.index(name) for name in wanted if name in names]
 
 
 def _numbers(
     place: Path, lines: list[str], start: int, picked: list[int], width: int
 ) -> FloatArray:
     """Turn the rows into numbers, quickly; on a fault go through them one by one."""
-    rows = [line for line in lines[start:] if line.strip()]
+    rows = {n: line for n, line in enumerate(lines[start:], start=start + 1) if line.strip()}
     refuse_if(not rows, place, "there are no samples", "record again, or give another file")
-    try:
-        return np.loadtxt(rows, delimiter=",", usecols=picked, ndmin=2, dtype=np.float64)
-    except ValueError:
-        pass
-    for number, line in enumerate(lines[start:], start=start + 1):
-        if not line.strip():
-            continue
-        cells = line.split(",")
-        where = f"{place}, line {number}"
-        refuse_if(
-            len(cells) < width,
-            where,
-            f"{len(cells)} cells, not {width}",
-            "complete or drop the row",
+    with suppress(ValueError):
+        return np.loadtxt(
+            [*rows.values()], delimiter=",", usecols=picked, ndmin=2, dtype=np.float64
         )
+    for number, line in rows.items():
+        cells, where = line.split(","), f"{place}, line {number}"
+        few = f"{len(cells)} cells, not {width}"
+        refuse_if(len(cells) < width, where, few, "complete or drop the row")
         for index in picked:
             try:
                 float(cells[index])

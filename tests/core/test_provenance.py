@@ -23,7 +23,7 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def version() -> str:
-    for kept in (provenance._content, provenance._imports, provenance._file, provenance._data_of):
+    for kept in (provenance._imports, provenance._files):
         kept.cache_clear()
     return provenance.code_version("pendpipe.stage")
 

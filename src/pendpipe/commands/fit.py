@@ -67,15 +67,24 @@ def run(arguments: argparse.Namespace) -> int:
     arguments.file = arguments.files[0]
     if arguments.record is not None or arguments.refused is not None:
         return _stage(arguments)
-    _check_figure(arguments.figure)
+    figure: Path | None = arguments.figure
+    # A form that nobody can draw is refused before the file is written.
+    refuse_if(
+        figure and figure.suffix not in (".svg", ".png"),
+        f"--figure {figure}",
+        "its form is unknown",
+        "end its name in .svg or .png",
+    )
     result = _fit(arguments)
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
         print(f"pendpipe: {arguments.file}: {why} (--accept prints it)", file=sys.stderr)
     if arguments.out and arguments.out != "-":
         _write(arguments, result)
-    if arguments.figure:
-        _draw(arguments.figure, result)
+    if figure:
+        from pendpipe.figures.style import save
+
+        save(result.plot(), figure.with_suffix(""), forms=[figure.suffix[1:]])
     if arguments.json or arguments.out == "-":
         print_json(result.to_dict())
     else:
@@ -137,34 +146,9 @@ def _write(arguments: argparse.Namespace, result: FitResult) -> None:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
 
 
-def _check_figure(path: Path | None) -> None:
-    """Refuse a form that nobody can draw before the file is written."""
-    refuse_if(
-        path is not None and path.suffix not in (".svg", ".png"),
-        f"--figure {path}",
-        "its form is unknown",
-        "end its name in .svg or .png",
-    )
-
-
-def _draw(path: Path, result: FitResult) -> None:
-    from pendpipe.figures.style import save
-
-    save(result.plot(), path.with_suffix(""), forms=[path.suffix[1:]])
-
-
 def _print(arguments: argparse.Namespace, result: FitResult) -> None:
     """Print the summary."""
-    from pendpipe.analysis.fit.summary import lines
-
-    printed = lines(result, law=result.light != "red" or arguments.accept)
-    if arguments.length or arguments.gravity:
-        printed.insert(-1, _gravity_or_length(arguments, result))
-    print("\n".join(printed))
-
-
-def _gravity_or_length(arguments: argparse.Namespace, result: FitResult) -> str:
-    from pendpipe.analysis.fit.summary import gravity_line
+    from pendpipe.analysis.fit.summary import gravity_line, lines
 
     for option, value in (("--length", arguments.length), ("--gravity", arguments.gravity)):
         refuse_if(
@@ -173,7 +157,11 @@ def _gravity_or_length(arguments: argparse.Namespace, result: FitResult) -> str:
             f"{value} is no length or acceleration",
             "give one above 0",
         )
-    return gravity_line(result, length_m=arguments.length, gravity=arguments.gravity)
+    printed = lines(result, law=result.light != "red" or arguments.accept)
+    if arguments.length or arguments.gravity:
+        length_m, gravity = arguments.length, arguments.gravity
+        printed.insert(-1, gravity_line(result, length_m=length_m, gravity=gravity))
+    print("\n".join(printed))
 
 
 def _status(arguments: argparse.Namespace, result: FitResult) -> int:
@@ -185,9 +173,8 @@ def _table(arguments: argparse.Namespace) -> int:
     from pendpipe.analysis.fit.summary import row, table
 
     for option in ("out", "figure", "turning_points", "record"):
-        if getattr(arguments, option):
-            name = option.replace("_", "-")
-            raise InputError(f"--{name}", "it belongs to one FILE", "fit that file alone")
+        name = f"--{option.replace('_', '-')}"
+        refuse_if(getattr(arguments, option), name, "it belongs to one FILE", "fit that file alone")
     status, found, rows = 0, [], []
     for file in arguments.files:
         arguments.file = file
@@ -198,10 +185,10 @@ def _table(arguments: argparse.Namespace) -> int:
             found.append({"file": file, "error": str(problem)})
             rows.append(row(file, None))
             status = 2
-            continue
-        found.append({"file": file, **result.to_dict()})
-        rows.append(row(file, result))
-        status = max(status, _status(arguments, result))
+        else:
+            found.append({"file": file, **result.to_dict()})
+            rows.append(row(file, result))
+            status = max(status, _status(arguments, result))
     if arguments.json:
         print_json({"schema_version": 1, "fits": found})
     else:
