@@ -52,10 +52,9 @@ def pretty_unit(unit: str) -> str:
     ('rad⁻¹ s⁻¹', 'rad⁻²', 'm/s²', '')
     """
     if unit.startswith("1/") and "sqrt" not in unit:
-        parts = [part.partition("^") for part in unit[2:].strip("()").split()]
         return " ".join(
             f"{of}⁻{'¹²³'[int(n) - 1 if n in '123' and n else 0]}"
-            for of, _, n in parts
+            for of, _, n in [part.partition("^") for part in unit[2:].strip("()").split()]
             if of != "1"
         )
     return "" if unit == "1" else unit.replace("^2", "²")

@@ -22,6 +22,7 @@ from typing import Any, Final
 
 from pendpipe.arguments import Flags, add, declare, load
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import check_writable
 
 _FLAGS: Final[Flags] = {
     "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
@@ -123,8 +124,14 @@ def _record(arguments: argparse.Namespace) -> int:
 
     out = Path(arguments.out)
     check_name(out)
-    _check_place(out)
-    _check_length(arguments)
+    # Before anything is recorded: a place where no recording can be written.
+    refuse_if(out.is_dir(), out, "this is a folder", "name a file in it")
+    if out.is_file() or not out.exists():  # else it is a device or a pipe
+        check_writable(out.parent)
+    if arguments.samples is not None:
+        wrong = arguments.samples < 1
+        refuse_if(wrong, "--samples", "it must be positive", "give a whole number above 0")
+        arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
     earlier: list[attempts.Attempt] = []
     if not (arguments.recover or arguments.anew):
         kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
@@ -151,25 +158,6 @@ def _record(arguments: argparse.Namespace) -> int:
     rate = recording.metadata["sample_rate_hz"]
     print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
     return 0
-
-
-def _check_place(out: Path) -> None:
-    """Refuse, before anything is recorded, a place where no recording can be written."""
-    from pendpipe.files import check_writable
-
-    refuse_if(out.is_dir(), out, "this is a folder", "name a file in it")
-    if out.is_file() or not out.exists():  # else it is a device or a pipe
-        check_writable(out.parent)
-
-
-def _check_length(arguments: argparse.Namespace) -> None:
-    """Let ``--samples`` give the length, where it is there."""
-    if arguments.samples is not None:
-        refuse_if(
-            arguments.samples < 1, "--samples", "it must be positive", "give a whole number above 0"
-        )
-        if arguments.rate > 0:
-            arguments.duration = arguments.samples / arguments.rate
 
 
 def _stage(arguments: argparse.Namespace) -> int:
@@ -304,8 +292,8 @@ def _list(port: str | None) -> int:
         extra = f", firmware {identity.firmware}" if identity.firmware else ""
         print(f"{port}: {identity.model}{extra}")
         return 0
-    found = sorted(comports(), key=lambda entry: entry.device)
-    for entry in found:
+    lines = []
+    for entry in sorted(comports(), key=lambda entry: entry.device):
         shown = entry.description
         # Only a device with the vendor's number is asked: others may not bear it.
         if entry.vid == VENDOR:
@@ -313,10 +301,7 @@ def _list(port: str | None) -> int:
                 shown = f"Dataq {identify(entry.device).model}"
             except InputError as fault:
                 shown = f"Dataq, {fault.problem}"
-        print(f"{entry.device}: {shown}")
-    unbound = without_port()
-    for device in unbound:
-        print(device)
-    if not found and not unbound:
-        print(no_ports())
+        lines.append(f"{entry.device}: {shown}")
+    lines += without_port()
+    print("\n".join(lines or [no_ports()]))
     return 0

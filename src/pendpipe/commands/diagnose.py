@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
+from pendpipe.files import distinct_names, make_folder, replaced, write_json
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis import Outcome
@@ -92,7 +93,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, write the result, and print the answer."""
     from pendpipe.analysis.fit.fixed import parse_fixed
-    from pendpipe.files import make_folder
     from pendpipe.process import keep_memory
 
     if len(arguments.files) > 1:
@@ -163,12 +163,10 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
 def _diagnose_several(arguments: argparse.Namespace) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
-    from pendpipe.files import distinct_names
 
     for single in ("fix", "turning_points", "record"):
-        if getattr(arguments, single):
-            option = f"--{single.replace('_', '-')}"
-            raise InputError(option, "it is for one recording", "give one FILE, or leave it out")
+        option, given = f"--{single.replace('_', '-')}", getattr(arguments, single)
+        refuse_if(given, option, "it is for one recording", "give one FILE, or leave it out")
     recordings, made, given = {}, [], arguments.calibration
     refuse_if(
         len(given) not in (0, 1, len(arguments.files)),
@@ -245,21 +243,16 @@ def _remove_figures(folder: Path) -> None:
 
 def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
     """Write one line instead of each figure that a workflow waits for and that was not drawn."""
-    from pendpipe.files import replaced
-
-    if arguments.record is None or arguments.figures == "none":
-        return
-    for name in OF_EVERY_DIAGNOSIS:
-        path = arguments.out / f"{name}.svg"
-        if not path.exists():
-            with replaced(path) as stream:
-                stream.write(_EMPTY.format(reason))
+    wanted = arguments.record is not None and arguments.figures != "none"
+    paths = [arguments.out / f"{name}.svg" for name in OF_EVERY_DIAGNOSIS if wanted]
+    for path in (path for path in paths if not path.exists()):
+        with replaced(path) as stream:
+            stream.write(_EMPTY.format(reason))
 
 
 def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
     from pendpipe.diagnosis.result import FILE_NAME, not_analysable
-    from pendpipe.files import write_json
 
     content = not_analysable(arguments.baseline, reason, provenance)
     if arguments.out is not None:

@@ -221,11 +221,10 @@ class Campaign:
 
     def record(self, name: str) -> Record:
         """Find a record by its name."""
-        for entry in self.records:
-            if entry.record == name:
-                return entry
-        known = [entry.record for entry in self.records]
-        raise InputError(self.configuration.records, f"no record '{name}'", nearest(name, known))
+        entries = {entry.record: entry for entry in self.records}
+        if name in entries:
+            return entries[name]
+        raise InputError(self.configuration.records, f"no record '{name}'", nearest(name, entries))
 
     def geometry(self, record: Record) -> Geometry | None:
         """Where the weights are for a record; ``None`` where none is given."""
@@ -339,8 +338,7 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
         if not there
     ]
     refuse_if(missing, where, f"a simulated record needs {', '.join(missing)}", "add it")
-    assert configuration.simulated is not None
-    releases = configuration.simulated.release
+    releases = configuration.simulated.release if configuration.simulated else {}
     refuse_if(
         entry.record not in releases and entry.fluid not in releases,
         where,

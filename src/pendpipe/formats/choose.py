@@ -274,8 +274,7 @@ def _time(
             continue
         score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
         # A number of the row, where anything else is a time.
-        numbers = not named and _counts_samples(column, role)
-        score -= 5.0 * (role == "index") or 3.0 * numbers
+        score -= 5.0 * (role == "index") or 3.0 * (not named and _counts_samples(column, role))
         score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
         best = max(best, (score, column), key=lambda each: each[0])
     found = best[1]
@@ -344,8 +343,7 @@ def _readings(
     if not candidates:
         return (), (), ()
     most = max(entry[0] for entry in candidates)
-    equals = [entry[1] for entry in candidates if entry[0] == most]
-    chosen, why = _of_equals(equals, swings)
+    chosen, why = _of_equals([entry[1] for entry in candidates if entry[0] == most], swings)
     clock = time.values if time is not None else None
     if len(chosen) == 1:
         chosen, why = _not_a_derivative(chosen[0], alive, clock, roles, why)

@@ -435,10 +435,9 @@ def _columns(
     cells = [layout.split(row) for row in rows]
     widths = list(map(len, cells))
     width = max(layout.width, *widths)
-    too_wide = f"{place}, line {numbers[widths.index(max(widths))]}"
     refuse_if(
         width > max(_WIDEST, 4 * layout.width),
-        too_wide,
+        f"{place}, line {numbers[widths.index(max(widths))]}",
         f"{width} cells in a row",
         "correct or drop the row",
     )
@@ -556,8 +555,7 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     notes: tuple[str, ...] = ()
     pairs = [split_header(cell) for cell in cells]
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
-    below = [line for number, line in filled if number > names_at]
-    row_of_units = _row_of_units(below, layout)
+    row_of_units = _row_of_units([line for number, line in filled if number > names_at], layout)
     if row_of_units:
         units = [unit or own for unit, own in zip(row_of_units, units, strict=True)]
     if missing := layout.width - len(cells):
@@ -675,9 +673,9 @@ def _refuse_damaged_rows(
 
 def _interval(lines: Sequence[str]) -> float | None:
     """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
-    words = ((_RATE_WORD, True), (_INTERVAL_WORD, False), (_SAMPLING, None))
     for (line, follower), (word, inverse) in product(
-        zip(lines, [*lines[1:], ""], strict=False), words
+        zip(lines, [*lines[1:], ""], strict=False),
+        ((_RATE_WORD, True), (_INTERVAL_WORD, False), (_SAMPLING, None)),
     ):
         found = word.search(line)
         # Else names stand over their values.
