@@ -413,8 +413,8 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     described = read_model(model)
     if seed is not None:
         described = described.model_copy(update={"seed": seed})
-    name = "model" if isinstance(model, Mapping) else Path(model).name
-    return simulate_model(described, f"simulated: {name}", place=name)
+    place = "model" if isinstance(model, Mapping) else str(model)
+    return simulate_model(described, f"simulated: {Path(place).name}", place=place)
 
 
 def _options(**given: Any) -> Any:

@@ -82,10 +82,8 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
     scaled, error = value / 10.0**power, error / 10.0**power
     tens = f" × 10{_superscript(power)}" if power else ""
     if not known:
-        number = f"{scaled:.4g}"
-        if "e" in number:
-            number = f"{scaled:.0f}"
-        return _join(_minus(number) + tens, unit)
+        number = f"{scaled:.0f}" if "e" in f"{scaled:.4g}" else f"{scaled:.4g}"
+        return f"{_minus(number)}{tens} {unit}".rstrip()
     decimals = max(1 - math.floor(math.log10(error) + 1e-9), 0)
     # An error of 120 leaves no meaning in the last digit of 1234.
     coarse = min(1 - math.floor(math.log10(error) + 1e-9), 0)
@@ -94,13 +92,9 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
         digits = f"{error:.{decimals}f}"
         # Below one only the digits count; from one on the point stays, as in 136.1(1.2).
         inside = digits if error >= 1.0 else digits.lstrip("0.") or "0"
-        return _join(f"{number}({inside}){tens}", unit)
+        return f"{number}({inside}){tens} {unit}".rstrip()
     text = f"{number} ± {error:.{decimals}f}"
-    return _join(f"({text}){tens}" if tens or unit else text, unit)
-
-
-def _join(number: str, unit: str) -> str:
-    return f"{number} {unit}" if unit else number
+    return f"({text}){tens} {unit}".rstrip() if tens or unit else text
 
 
 def _minus(number: str) -> str:

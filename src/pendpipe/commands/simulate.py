@@ -18,13 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
+    from pendpipe import api
     from pendpipe.recording import write_plain
-    from pendpipe.simulation.model import read_model, simulate
 
-    model = read_model(arguments.model)
-    if arguments.seed is not None:
-        model = model.model_copy(update={"seed": arguments.seed})
-    recording = simulate(model, f"simulated: {Path(arguments.model).name}", place=arguments.model)
+    recording = api.simulate(arguments.model, seed=arguments.seed)
     write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
     return 0

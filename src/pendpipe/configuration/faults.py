@@ -1,10 +1,10 @@
 """Errors in a configuration, one line each with the nearest known name."""
 
 import difflib
+import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
-from types import UnionType
-from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -42,8 +42,7 @@ def as_input_error(place: str | Path, fault: ValidationError, model: type[BaseMo
     path = [str(part) for part in first["loc"]]
     where = f"{place}, {'.'.join(path) or 'top level'}"
     if first["type"] == "extra_forbidden":
-        holder = _model_at(model, path[:-1])
-        known = holder.model_fields if holder else ()
+        known = _known_keys(model, path[:-1])
         return InputError(where, f"unknown key '{path[-1]}'", nearest(path[-1], known))
     if first["type"] == "missing":
         return InputError(where, "this key is missing", "add it (see config/README.md)")
@@ -53,26 +52,11 @@ def as_input_error(place: str | Path, fault: ValidationError, model: type[BaseMo
     return InputError(where, problem + shown, "see config/README.md")
 
 
-def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:
-    """Follow a path of keys down to the model that holds the last one."""
-    current: type[BaseModel] | None = model
-    steps = list(path)
-    while steps and current is not None:
-        inner, is_mapping = _inner_model(current.model_fields[steps.pop(0)].annotation)
-        if is_mapping and steps:
-            steps.pop(0)  # the user's own name for the entry
-        current = inner
-    return current
-
-
-def _inner_model(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
-    """Find the model inside ``Model``, ``Model | None`` and ``dict[str, Model]``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation, False
-    is_mapping = get_origin(annotation) is dict
-    if is_mapping or get_origin(annotation) in (Union, UnionType):
-        for argument in get_args(annotation):
-            found, _ = _inner_model(argument)
-            if found:
-                return found, is_mapping
-    return None, is_mapping
+def _known_keys(model: type[BaseModel], path: list[str]) -> Iterable[str]:
+    """The keys of the section to which a path of keys leads."""
+    schema = section = model.model_json_schema()
+    for key in path:
+        named = re.findall(r"#/\$defs/(\w+)", json.dumps(section["properties"].get(key)))
+        # (A key that is the user's own name for an entry leads no further.)
+        section = schema["$defs"][named[0]] if named else section
+    return list(section["properties"])

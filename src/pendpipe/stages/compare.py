@@ -2,7 +2,7 @@
 
 import argparse
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -372,12 +372,5 @@ def stamp(campaign: Campaign) -> dict[str, Any]:
         "code": code_version("pendpipe.stages.compare"),
         "configuration": digest(campaign.configuration.model_dump(exclude={"results", "records"})),
         "seed": campaign.configuration.seed,
-        "packages": {name: _version(name) for name in PACKAGES},
+        "packages": {name: version(name) for name in PACKAGES},
     }
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
