@@ -74,6 +74,7 @@ def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     noise = 3e-4 * np.random.default_rng(4).standard_normal(len(time_s))
     found = diagnose_recording(Recording(time_s, angle_rad + noise, "angle_rad"))
     assert [each.identifier for each in found.effects] == ["second-mode"]
+    assert found.effects[0].probability > 0.95
     own, other = (
         found.diagnosis.improved.parameters["frequency"],
         found.effects[0].parameters["f_2"],

@@ -22,6 +22,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue.oscillations import BEATING_MODE
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
@@ -90,7 +91,7 @@ def begin(
         # The turning points of a beat tell nothing of either mode.
         span = slice(None)
         value, second = _modes_start(samples, value)
-        known = by_identifier("second-mode"), np.append(value, second)
+        known = BEATING_MODE, np.append(value, second)
     elif not fixed and samples.unit == "rad":
         laws = start_of(points, stated=stated)
         if laws.sine and laws.favoured == "sine" and laws.linear.slip_rad > LARGE_PHASE_ERROR:

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, without_template
+from pendpipe.effects.effect import (
+    Effect,
+    Parameter,
+    Pendulum,
+    Span,
+    enters,
+    subclass,
+    without_template,
+)
 from pendpipe.effects.scan import elapsed, rows, since_release
 
 if TYPE_CHECKING:
@@ -81,6 +89,14 @@ def second_mode(
     """
     time = elapsed(sampled.time_s)
     return np.asarray(tone_at(cosine, sine, 2.0 * math.pi * f_2 * time) * np.exp(-time / tau_2))
+
+
+BEATING_MODE: Final[Effect] = subclass(
+    type(second_mode),
+    "beating_mode",
+    "The form of `second-mode` that is expected, where the swings grow again.",
+    {"key": "second-mode:beats", "expected": True, "prior": 12.0},
+)()
 
 
 def _detunings(span: Span) -> list[tuple[float, ...]]:
