@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.effects.catalogue.sensor import SoftClipping
+from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.model import Model
 
 from .pendulums import Floats, baseline, plain, times

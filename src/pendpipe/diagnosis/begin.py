@@ -22,7 +22,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.catalogue.oscillations import BEATING_MODE
+from pendpipe.effects.catalogue.in_time import BEATING_MODE
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 

@@ -18,7 +18,7 @@ from pendpipe.diagnosis.scores import Bank, build_bank
 from pendpipe.diagnosis.spectrum import Band, ToneScan, ToneScans, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.catalogue.oscillations import plane_band_hz
+from pendpipe.effects.catalogue.in_time import plane_band_hz
 
 _DECAY_TIMES: Final = (0.06, 0.25)
 """Decay times of the decaying tones in the scan, over the record's duration."""

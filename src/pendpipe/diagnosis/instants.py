@@ -17,7 +17,7 @@ from pendpipe.diagnosis.refine import Fit, misfit, refine
 from pendpipe.diagnosis.scores import products_and_lengths
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.time_base import DroppedSamples
+from pendpipe.effects.catalogue.reading import DroppedSamples
 from pendpipe.estimate import Estimate
 
 _TAILS: Final = (0.025, 0.975)

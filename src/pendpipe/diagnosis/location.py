@@ -15,7 +15,7 @@ from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
-from pendpipe.effects.catalogue.oscillations import PlaneCoupling
+from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.quantities import with_error
 
 _INTERVAL_SHARE: Final = 0.9

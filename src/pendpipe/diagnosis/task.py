@@ -13,8 +13,8 @@ from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
-from pendpipe.effects.catalogue.sensor import SoftClipping
 from pendpipe.effects.curves import CURVES, Curve
 
 

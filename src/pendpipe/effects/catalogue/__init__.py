@@ -16,17 +16,7 @@ from typing import Final
 from pendpipe.effects.effect import Effect
 from pendpipe.errors import InputError
 
-_FIRST: Final = (
-    "restoring",
-    "damping",
-    "contact",
-    "fluid",
-    "oscillations",
-    "changes",
-    "sensor",
-    "time_base",
-    "noise",
-)
+_FIRST: Final = ("restoring", "losses", "in_time", "reading")
 """The order of the manual: dynamics, then measurement. Other modules follow by name."""
 
 

@@ -1,4 +1,4 @@
-"""What sensor and converter do to the reading."""
+"""What stands between the motion and the file: sensor, time base, noise."""
 
 from __future__ import annotations
 
@@ -7,9 +7,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.effects.catalogue.oscillations import SteadyTone, tone_at, tried_frequencies
+from pendpipe.effects.catalogue.in_time import SteadyTone, tone_at, tried_frequencies
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, without_template
-from pendpipe.effects.scan import RELAXATION, Relaxing, between, elapsed, relaxed, rows
+from pendpipe.effects.scan import (
+    INSTANT,
+    RELAXATION,
+    Relaxing,
+    Sudden,
+    between,
+    elapsed,
+    reading_step,
+    relaxed,
+    rows,
+    unusual_drift,
+)
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray
@@ -281,3 +292,125 @@ def _lost(beyond: FloatArray, depth: float, width: float) -> FloatArray:
     if depth > _HARD * width:
         return np.asarray(width * np.logaddexp(0.0, near + depth / width))
     return np.asarray(width * np.log1p(np.expm1(depth / width) * np.exp(near)))
+
+
+@enters(
+    "delay",
+    Relaxing,
+    identifier="clock-drift",
+    name="drifting clock",
+    equation=r"t \to t + \kappa \tau \left[t - \tau (1 - e^{-t/\tau})\right]",
+    parameters=(Parameter("rate", "1/s", -1.0, 1.0), RELAXATION),
+    example=(1e-5, 15.0),
+    discriminating_test="record a second clock (GPS, mains) on another channel",
+    prior_penalty=unusual_drift,
+)
+def clock_drift(time_s: FloatArray, rate: float, tau: float) -> FloatArray:
+    """The digitiser's clock changes its rate by kappa tau (1 - e^(-t/tau)), as it warms up.
+
+    Where tau is long, readings come later by kappa t^2/2.
+    """
+    late = elapsed(time_s)
+    return np.asarray(rate * tau * (late - relaxed(late, tau)))
+
+
+JITTER: Final[Effect] = without_template(
+    __name__,
+    "Sampling instants that scatter: noise in proportion to the velocity.",
+    identifier="jitter",
+    name="jitter of the sampling",
+    equation=r"\sigma^2 \to \sigma^2 + \dot x^2 \sigma_t^2",
+    parameters=(Parameter("sigma_t", "s", 0.0, math.inf),),
+    discriminating_test="record a fast clean tone: the noise must grow with its slope",
+)
+
+
+CLOCK_SLIPS: Final[Effect] = without_template(
+    __name__,
+    "The clock misses whole samples, or repeats them, again and again.",
+    identifier="clock-slips",
+    name="clock slips by whole samples",
+    equation=r"t \to t + \mathrm{d}t \sum_k m_k\, H(t - t_k), \quad m_k \in \mathbb{Z}",
+    parameters=(Parameter("dt", "s", 0.0, math.inf), Parameter("number", "1", 0.0, 1e6)),
+    discriminating_test="log the computer's own clock with every sample",
+)
+
+
+def _part_of_a_sample(values: FloatArray, span: Span) -> float:
+    """Return what a part of a sample costs.
+
+    Samples are lost whole. Less than one is lost where the instrument itself reads n times
+    as fast as it reports, which is the less likely the larger n: by 1/n.
+    """
+    part = abs(float(values[0])) * span.fold / span.interval_s
+    return -2.0 * math.log(min(max(part, 1e-6), 1.0))
+
+
+@enters(
+    "delay",
+    Sudden,
+    identifier="dropped-samples",
+    name="dropped samples",
+    equation=r"t \to t + d\, H(t - t_k)",
+    parameters=(Parameter("d", "s", -1e5, 1e5), INSTANT),
+    tried=64,
+    example=(1e-2, 21.03),
+    discriminating_test="compare the number of samples with the time that a second clock shows",
+    prior_penalty=_part_of_a_sample,
+)
+def dropped_samples(time_s: FloatArray, late_s: float, instant_s: float) -> FloatArray:
+    """Samples were lost (or doubled): later readings come later (earlier) by a time."""
+    return np.asarray(late_s * reading_step(time_s, instant_s))
+
+
+@enters(
+    "reading",
+    identifier="rolling-shutter",
+    name="rolling shutter",
+    equation=r"y(t) = x(t + \kappa x)",
+    parameters=(Parameter("kappa", "s/rad", -1.0, 1.0),),
+    rare=True,
+    angular=True,
+    example=(0.005,),
+    discriminating_test="turn the camera by 180 degrees: the sign of kappa must turn with it",
+)
+def rolling_shutter(sampled: Sampled, pendulum: Pendulum, kappa: float) -> FloatArray:
+    """A camera reads its rows one after another: the later, the farther the bob is to one side.
+
+    The phase is shifted by omega kappa x, which makes a second harmonic in quadrature,
+    -omega kappa y^2/2 sin 2 psi.
+    """
+    omega = pendulum.angular_frequency
+    turned = omega * kappa * sampled.angle
+    moved = sampled.angle * (np.cos(turned) - 1.0) + sampled.velocity / omega * np.sin(turned)
+    return np.asarray(moved)
+
+
+DroppedSamples = type(dropped_samples)
+
+
+GLITCHES: Final[Effect] = without_template(
+    __name__,
+    "Single readings far off.",
+    identifier="glitches",
+    name="glitches",
+    equation=r"y_k = x_k + g_k, \quad k \in \mathcal{G}",
+    parameters=(Parameter("number", "1", 0.0, 1e6), Parameter("rms", "rad", 0.0, math.inf)),
+    discriminating_test="change cable and supply, and record at rest",
+)
+COLOURED_NOISE: Final[Effect] = without_template(
+    __name__,
+    """Noise that grows to low frequencies.
+
+    The diagnosis reports how steeply it falls about the pendulum's own frequency: the slope
+    -d ln S/d ln f, which is alpha far below the corner and less about it.
+    """,
+    identifier="coloured-noise",
+    name="coloured noise",
+    equation=r"S(f) = S_0 \left[1 + (f_0/f)^{\alpha}\right]",
+    parameters=(
+        Parameter("corner", "Hz", 0.0, math.inf),
+        Parameter("exponent", "1", 0.0, 4.0),
+    ),
+    discriminating_test="record with the pendulum held",
+)
