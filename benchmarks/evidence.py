@@ -60,8 +60,7 @@ def one_campaign(tracks: list[Track], seed: list[int], method: str = "waveform")
     """Record, fit, separate and compare once; the sphere is measured anew with its errors."""
     from pendpipe.analysis.compare import compare
     from pendpipe.analysis.fit import fit_recording
-    from pendpipe.analysis.losses import MeasuredRecord
-    from pendpipe.analysis.separate import fit_benchmark, separate
+    from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, separate
     from pendpipe.analysis.viscous import SharedErrors, Surroundings
     from pendpipe.estimate import Estimate
     from pendpipe.recording import Recording

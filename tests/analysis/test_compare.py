@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from pendpipe import physics
 from pendpipe.analysis.compare import Comparison, compare
-from pendpipe.analysis.losses import MeasuredRecord
-from pendpipe.analysis.separate import fit_benchmark, separate
+from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, separate
 from pendpipe.analysis.viscous import SharedErrors, Surroundings
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate

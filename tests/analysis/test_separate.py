@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pendpipe.analysis.losses import MeasuredRecord, quality_of_rate
-from pendpipe.analysis.separate import fit_benchmark, separate
+from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, quality_of_rate, separate
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 from pendpipe.physics import without_hysteresis

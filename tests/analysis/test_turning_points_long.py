@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.blocks import in_blocks
 from pendpipe.analysis.turning_points.find import turning_points_of
+from pendpipe.analysis.turning_points.long_records import in_blocks
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
-from pendpipe.dynamics.any_law import Law, Motion, NoMotionError, Tangent, follow
-from pendpipe.dynamics.clock import Clock
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
 from pendpipe.dynamics.sampling import sample_motion
 from pendpipe.effects import Pendulum
 

@@ -8,8 +8,15 @@ import pytest
 
 from pendpipe.files import without_folders
 from pendpipe.report.page import inline_svg
-from pendpipe.report.records import STATES, health, table_of_records
-from pendpipe.report.remarks import budget_rows, exponent_tables, findings, grouped_warnings
+from pendpipe.report.tables import (
+    STATES,
+    budget_rows,
+    exponent_tables,
+    findings,
+    grouped_warnings,
+    health,
+    table_of_records,
+)
 
 
 def entry(**changes: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pendpipe.analysis.losses import SeparatedRecord
+from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.viscous import (
     Line,
     SharedErrors,

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe import physics
-from pendpipe.analysis.losses import SeparatedRecord
+from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate, chi_square_p_value
 

@@ -68,8 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _sensor(arguments: argparse.Namespace) -> int:
     """Fit, print and write a sensor's line."""
-    from pendpipe.analysis.calibrate import calibrate
-    from pendpipe.analysis.caliper_table import read_caliper_table
+    from pendpipe.analysis.calibrate import calibrate, read_caliper_table
     from pendpipe.files import write_json
 
     table = read_caliper_table(

@@ -78,7 +78,7 @@ def fluid_at(fluid: Fluid, temperature_c: float | None) -> physics.Fluid:
     """Density and viscosity of a fluid at a record's temperature.
 
     Water's change between the temperature where the configured values hold and that of
-    the record is taken from the published formulas of `pendpipe.physics.water`.
+    the record is taken from the published formulas of `pendpipe.physics.fluid`.
     """
     density, viscosity = fluid.density_kg_per_m3, fluid.viscosity_pa_s
     if temperature_c is not None and fluid.temperature_c is not None:

@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Motion
-from pendpipe.dynamics.clock import Clock
+from pendpipe.dynamics.any_law import Clock, Motion
 from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.effect import Pendulum
 

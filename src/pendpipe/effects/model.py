@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Law, Motion, NoMotionError, Tangent, follow
-from pendpipe.dynamics.clock import Clock
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
 from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects.baseline import (
     BASELINE,

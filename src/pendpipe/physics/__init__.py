@@ -13,37 +13,19 @@ from pendpipe.physics.confinement import (
     thin_layer_concentric,
 )
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
-from pendpipe.physics.drag import (
+from pendpipe.physics.fluid import (
     POTENTIAL_FLOW_ADDED_MASS,
     added_mass_coefficient,
+    cylinder_drag,
+    free_decay_root,
     harmonic_drag,
     penetration_depth,
     quadratic_drag_rate,
+    rotation_of_sphere,
     stokes_drag,
     viscous_quality_factor,
-)
-from pendpipe.physics.free_decay import cylinder_drag, free_decay_root, rotation_of_sphere
-from pendpipe.physics.friction import (
-    QualityFactors,
-    decay_rates,
-    energy_power_friction,
-    energy_power_quality_factor,
-    net_quality_factor,
-    quality_factors,
-    structural_quality_factor,
-    universal_acceleration,
-)
-from pendpipe.physics.oscillator import (
-    damping_coefficient,
-    driven_pendulum_acceleration,
-    hysteretic_decrement_quality,
-    hysteretic_frequency_ratio,
-    hysteretic_frequency_shift,
-    hysteretic_quality_of_decrement,
-    logarithmic_decrement,
-    viscous_acceleration,
-    viscous_frequency_ratio,
-    viscous_frequency_shift,
+    water_density,
+    water_viscosity,
 )
 from pendpipe.physics.pendulum import (
     STANDARD_GRAVITY_M_PER_S2,
@@ -66,16 +48,33 @@ from pendpipe.physics.pendulum import (
     swing,
 )
 from pendpipe.physics.quality import (
+    QualityFactors,
     amplitude_of_largest_quality_factor,
     amplitude_rate,
+    damping_coefficient,
+    decay_rates,
+    driven_pendulum_acceleration,
+    energy_power_friction,
+    energy_power_quality_factor,
+    hysteretic_decrement_quality,
+    hysteretic_frequency_ratio,
+    hysteretic_frequency_shift,
     hysteretic_quality_factor,
+    hysteretic_quality_of_decrement,
     largest_quality_factor,
+    logarithmic_decrement,
+    net_quality_factor,
     quality_factor,
     quality_factor_limit,
+    quality_factors,
     rates_from_energy_constants,
+    structural_quality_factor,
+    universal_acceleration,
+    viscous_acceleration,
+    viscous_frequency_ratio,
+    viscous_frequency_shift,
     without_hysteresis,
 )
-from pendpipe.physics.water import water_density, water_viscosity
 
 __all__ = [
     "POTENTIAL_FLOW_ADDED_MASS",

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
-from pendpipe.physics.drag import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
+from pendpipe.physics.fluid import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
 

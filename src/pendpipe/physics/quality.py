@@ -1,10 +1,162 @@
-"""The quality factor during a decay (Eq. 15), its parts (Eq. 17), and the energy (Eqs. 12, 13)."""
+"""Quality factors and losses: Eqs. 3-13, 15 and 17.
+
+The paper names the four losses of Eq. 8 by quality factors at the starting amplitude y0; the
+rest of the program by the first-order rates of Eq. 13, which need no y0:
+
+    a = omega/(2 y0 Q_f0),  b = (omega/2)(1/Q_h + 1/Q_v),  c = omega y0/(2 Q_c0).
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+
+
+@equation
+def viscous_acceleration(
+    displacement: Numbers,
+    velocity: Numbers,
+    angular_frequency_per_s: Numbers,
+    quality_factor: Numbers,
+) -> FloatArray:
+    """Acceleration of the linear oscillator, Eq. 3: ``x'' = -(omega/Q) x' - omega^2 x``.
+
+    Parameters
+    ----------
+    displacement, velocity
+        x and x' in rad and rad/s (or m and m/s); broadcast.
+    angular_frequency_per_s, quality_factor
+        omega of the undamped motion in rad/s and Q.
+
+    Returns
+    -------
+    FloatArray
+        x'' in rad/s^2 (or m/s^2).
+    """
+    return (
+        -angular_frequency_per_s / quality_factor * velocity
+        - angular_frequency_per_s**2 * displacement
+    )
+
+
+@equation
+def damping_coefficient(angular_frequency_per_s: Numbers, quality_factor: Numbers) -> FloatArray:
+    """The rate beta of the amplitude's decay in 1/s, Eq. 4: ``2 beta = omega/Q``."""
+    return angular_frequency_per_s / (2.0 * quality_factor)
+
+
+@equation
+def logarithmic_decrement(quality_factor: Numbers) -> FloatArray:
+    """Logarithm of the ratio of amplitudes one period apart, Eq. 5: ``beta T = pi/Q``."""
+    return np.pi / quality_factor
+
+
+@equation
+def viscous_frequency_shift(quality_factor: Numbers) -> FloatArray:
+    """Relative frequency shift of viscous damping to leading order, Eq. 6: ``-1/(8 Q^2)``."""
+    return -1.0 / (8.0 * quality_factor**2)
+
+
+@equation
+def viscous_frequency_ratio(quality_factor: Numbers) -> FloatArray:
+    """Frequency of Eq. 3's free decay over the undamped one: ``sqrt(1 - 1/(4 Q^2))``.
+
+    NaN for Q below 1/2, where there is no oscillation.
+    """
+    squared = 1.0 - 0.25 / quality_factor**2
+    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
+
+
+@equation
+def hysteretic_frequency_shift(quality_factor: Numbers) -> FloatArray:
+    """Relative frequency shift of Eq. 8's hysteretic term to leading order: ``-pi^2/(32 Q_h^2)``.
+
+    According to the paper there is none; Eq. 8 itself has one, 2.5 times that of Eq. 6.
+    """
+    return -(np.pi**2) / (32.0 * quality_factor**2)
+
+
+@equation
+def hysteretic_frequency_ratio(quality_factor: Numbers) -> FloatArray:
+    """Frequency of Eq. 8's hysteretic decay over omega/(2 pi): ``sqrt(1 - (pi/(4 Q_h))^2)``.
+
+    In polar coordinates ``omega x = R cos(phi)``, ``x' = -R sin(phi)`` a half cycle of
+    ``x'' + h R sgn(x') + omega^2 x = 0``, with h = pi omega/(4 Q_h), is
+    ``phi' = omega - h cos(phi)``, so it takes ``pi/sqrt(omega^2 - h^2)``.
+    NaN for Q_h below pi/4, where there is no oscillation.
+    """
+    squared = 1.0 - (np.pi / (4.0 * quality_factor)) ** 2
+    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
+
+
+@equation
+def hysteretic_decrement_quality(quality_factor: Numbers) -> FloatArray:
+    """Q from the decrement of a half cycle of Eq. 8's hysteretic term.
+
+    ``Q = pi / (4 artanh(pi/(4 Q_h)))``, exactly: in the coordinates of
+    `hysteretic_frequency_ratio`, ``R' = -h R sin(phi)``, so R falls by
+    ``(omega - h)/(omega + h)``, and a half cycle's logarithmic decrement is pi/(2 Q).
+
+    Parameters
+    ----------
+    quality_factor
+        Q_h of Eq. 8, above pi/4.
+
+    Returns
+    -------
+    FloatArray
+        The quality factor that the turning points show, below Q_h by pi^2/(48 Q_h^2)
+        of it to leading order (0.2 % at Q_h = 10).
+    """
+    return np.pi / (4.0 * np.arctanh(np.pi / (4.0 * quality_factor)))
+
+
+@equation
+def hysteretic_quality_of_decrement(decrement_quality: Numbers) -> FloatArray:
+    """Q_h of Eq. 8 whose half cycles show the given Q: ``Q_h = pi/(4 tanh(pi/(4 Q)))``."""
+    return np.pi / (4.0 * np.tanh(np.pi / (4.0 * decrement_quality)))
+
+
+@equation
+def driven_pendulum_acceleration(
+    angle_rad: Numbers,
+    angular_velocity_rad_per_s: Numbers,
+    time_s: Numbers,
+    *,
+    moment_of_inertia_kg_m2: Numbers,
+    restoring_moment_n_m: Numbers,
+    quality_factor: Numbers,
+    angular_frequency_per_s: Numbers,
+    drive_torque_n_m: Numbers = 0.0,
+    drive_angular_frequency_per_s: Numbers = 0.0,
+) -> FloatArray:
+    """Angular acceleration of the driven pendulum of any amplitude, Eq. 7.
+
+    ``I x'' + (omega I/Q) x' + M g Delta sin x = tau_d sin(omega_d t)``
+
+    Parameters
+    ----------
+    angle_rad, angular_velocity_rad_per_s, time_s
+        x in rad, x' in rad/s, t in s; broadcast.
+    moment_of_inertia_kg_m2, restoring_moment_n_m
+        I in kg m^2 and M g Delta in N m.
+    quality_factor, angular_frequency_per_s
+        Q and the omega in rad/s that it belongs to.
+    drive_torque_n_m, drive_angular_frequency_per_s
+        tau_d in N m, omega_d in rad/s.
+
+    Returns
+    -------
+    FloatArray
+        x'' in rad/s^2.
+    """
+    driven = drive_torque_n_m * np.sin(drive_angular_frequency_per_s * time_s)
+    driven = driven - restoring_moment_n_m * np.sin(angle_rad)
+    loss_rate = angular_frequency_per_s / quality_factor
+    return driven / moment_of_inertia_kg_m2 - loss_rate * angular_velocity_rad_per_s
 
 
 @equation
@@ -142,3 +294,196 @@ def amplitude_of_largest_quality_factor(a: Numbers, c: Numbers) -> FloatArray:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.sqrt(c / a)
+
+
+class QualityFactors(NamedTuple):
+    """The four quality factors of Eq. 8, at the starting amplitude; infinite where no loss."""
+
+    coulomb: FloatArray
+    hysteretic: FloatArray
+    fluid: FloatArray
+    viscous: FloatArray
+
+
+def decay_rates(
+    quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
+    amplitude0_rad: Numbers,
+    angular_frequency_per_s: Numbers,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Turn (Q_c0, Q_h, Q_f0, Q_v) at y0 into the rates of Eq. 13, to first order.
+
+    Parameters
+    ----------
+    quality_factors
+        Q_c0, Q_h, Q_f0, Q_v in this order; infinite for a loss that is absent.
+    amplitude0_rad, angular_frequency_per_s
+        y0 in rad, omega in rad/s; broadcast.
+
+    Returns
+    -------
+    tuple of FloatArray
+        a in 1/(rad s), the hysteretic and the viscous part of b in 1/s, and c in rad/s: the order
+        of `pendpipe.Eq8`.
+    """
+    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
+    y0, omega = floats(amplitude0_rad, angular_frequency_per_s)
+    half = 0.5 * omega
+    return (
+        plain(half / (y0 * fluid)),
+        plain(half / hysteretic),
+        plain(half / viscous),
+        plain(half * y0 / coulomb),
+    )
+
+
+def quality_factors(
+    a: Numbers,
+    b: Numbers,
+    c: Numbers,
+    amplitude0_rad: Numbers,
+    angular_frequency_per_s: Numbers,
+    hysteretic_share: Numbers,
+) -> QualityFactors:
+    """Turn (a, b, c) into (Q_c0, Q_h, Q_f0, Q_v) at y0; inverse of `decay_rates`.
+
+    The decay of the turning points knows b only; how much of it is hysteretic must come
+    from elsewhere (Eq. 17).
+
+    Parameters
+    ----------
+    a, b, c
+        The rates of Eq. 13 in 1/(rad s), 1/s and rad/s; broadcast.
+    amplitude0_rad, angular_frequency_per_s
+        y0 in rad, omega in rad/s.
+    hysteretic_share
+        The hysteretic part of b, between 0 and 1.
+    """
+    quadratic, linear, coulomb, y0, omega, share = floats(
+        a, b, c, amplitude0_rad, angular_frequency_per_s, hysteretic_share
+    )
+    half = 0.5 * omega
+    return QualityFactors(
+        plain(half * y0 * inverse(coulomb)),
+        plain(half * inverse(share * linear)),
+        plain(half / y0 * inverse(quadratic)),
+        plain(half * inverse((1.0 - share) * linear)),
+    )
+
+
+def universal_acceleration(
+    angle_rad: Numbers,
+    angular_velocity_rad_per_s: Numbers,
+    angular_frequency_per_s: Numbers,
+    quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
+    amplitude0_rad: Numbers,
+) -> FloatArray:
+    """Acceleration of the free decay with every loss, Eq. 8 (its misprints mended).
+
+    ``x'' = -[pi omega^2 y0/(4 Q_c0) + (pi omega/(4 Q_h)) w + (pi/(4 y0 Q_f0)) w^2] sgn(x')
+    - (omega/Q_v) x' - omega^2 x`` with ``w = sqrt(omega^2 x^2 + x'^2)``.
+
+    Parameters
+    ----------
+    angle_rad, angular_velocity_rad_per_s
+        x in rad and x' in rad/s; broadcast.
+    angular_frequency_per_s
+        omega in rad/s.
+    quality_factors
+        Q_c0, Q_h, Q_f0, Q_v in this order; infinite for a loss that is absent.
+    amplitude0_rad
+        y0 in rad, the amplitude at which Q_c0 and Q_f0 hold.
+
+    Returns
+    -------
+    FloatArray
+        x'' in rad/s^2. At rest (x' = 0) the bracket is left out: whether Coulomb
+        friction then holds the pendulum is for the integrator to decide.
+    """
+    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
+    x, v, omega, y0 = floats(
+        angle_rad, angular_velocity_rad_per_s, angular_frequency_per_s, amplitude0_rad
+    )
+    speed = np.hypot(omega * x, v)
+    bracket = (np.pi / 4.0) * (
+        omega**2 * y0 / coulomb + omega * speed / hysteretic + speed**2 / (y0 * fluid)
+    )
+    return plain(-bracket * np.sign(v) - omega / viscous * v - omega**2 * x)
+
+
+@equation
+def energy_power_friction(
+    amplitude_rad: Numbers, coefficient: Numbers, exponent: Numbers
+) -> FloatArray:
+    """Friction per mass (or torque per inertia) as a power of the energy, Eq. 9a.
+
+    ``f/m = c (2E/(m omega^2))^lambda = c y^(2 lambda)``: lambda = 0 is Coulomb's friction,
+    1/2 hysteretic, 1 fluid.
+
+    Parameters
+    ----------
+    amplitude_rad, coefficient, exponent
+        y in rad, c in rad^(1 - 2 lambda)/s^2, lambda; broadcast.
+
+    Returns
+    -------
+    FloatArray
+        f/m in rad/s^2.
+    """
+    return coefficient * amplitude_rad ** (2.0 * exponent)
+
+
+@equation
+def energy_power_quality_factor(
+    amplitude_rad: Numbers,
+    coefficient: Numbers,
+    exponent: Numbers,
+    angular_frequency_per_s: Numbers,
+) -> FloatArray:
+    """Quality factor of Eq. 9a's friction at amplitude y.
+
+    The square wave of the friction has the fundamental (4/pi) f/m, which Eq. 9a equates
+    with omega v/Q: ``Q = (pi/4) omega^2 y^(1 - 2 lambda) / c``.
+    """
+    friction = energy_power_friction(amplitude_rad, coefficient, exponent)
+    return (np.pi / 4.0) * angular_frequency_per_s**2 * amplitude_rad / friction
+
+
+def net_quality_factor(
+    quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
+    amplitude_rad: Numbers,
+    amplitude0_rad: Numbers,
+) -> FloatArray:
+    """Quality factor at amplitude y with every loss active, Eq. 9b.
+
+    ``1/Q = y0/(y Q_c0) + 1/Q_h + y/(y0 Q_f0) + 1/Q_v``
+
+    Parameters
+    ----------
+    quality_factors
+        Q_c0, Q_h, Q_f0, Q_v in this order, Q_c0 and Q_f0 at y0.
+    amplitude_rad, amplitude0_rad
+        y and y0 in rad; broadcast.
+    """
+    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
+    y, y0 = floats(amplitude_rad, amplitude0_rad)
+    loss = y0 / (y * coulomb) + 1.0 / hysteretic + y / (y0 * fluid) + 1.0 / viscous
+    return inverse(loss)
+
+
+@equation
+def structural_quality_factor(
+    moment_of_inertia_kg_m2: Numbers,
+    angular_frequency_per_s: Numbers,
+    loss_torque_n_m_per_rad: Numbers,
+) -> FloatArray:
+    """Quality factor of a loss torque that is proportional to the angle, Eq. 10.
+
+    ``Q_h = I omega^2 / kappa''``: proportional to omega^2 as long as neither I nor the
+    loss torque per angle kappa'' changes.
+
+    Parameters
+    ----------
+    moment_of_inertia_kg_m2, angular_frequency_per_s, loss_torque_n_m_per_rad
+        I in kg m^2, omega in rad/s, kappa'' in N m/rad; broadcast.
+    """
+    return moment_of_inertia_kg_m2 * angular_frequency_per_s**2 / loss_torque_n_m_per_rad

@@ -22,10 +22,17 @@ from pendpipe.analysis.fit.result import read_fit
 from pendpipe.figures.data import number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact
-from pendpipe.report import remarks
 from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
 from pendpipe.report.headline import headline
-from pendpipe.report.records import CHI2_RANGE, STATES, Column, Health, table_of_records
+from pendpipe.report.tables import (
+    CHI2_RANGE,
+    STATES,
+    Column,
+    Health,
+    joint_rows,
+    of_campaign,
+    table_of_records,
+)
 from pendpipe.templates import render as fill_template
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -92,7 +99,7 @@ def render(
         columns=columns,
         diagnosed=diagnoses(folder, names, room),
         together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
-        joint=remarks.joint_rows(comparison),
+        joint=joint_rows(comparison),
         asked=asked,
         proof=proven,
         records=lines,
@@ -110,7 +117,7 @@ def render(
         provenance=comparison.get("provenance") or {},
         downloads=_downloads(columns, lines, summary),
         **own_files(),
-        **remarks.of_campaign(comparison),
+        **of_campaign(comparison),
     )
 
 

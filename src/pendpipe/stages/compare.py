@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.analysis.compare import Comparison, compare
-from pendpipe.analysis.losses import SeparatedRecord
+from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.analysis.viscous import SharedErrors, SharedEstimate, Surroundings

@@ -5,8 +5,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pendpipe.analysis.losses import MeasuredRecord, SeparatedRecord
-from pendpipe.analysis.separate import Benchmark, fit_benchmark, separate
+from pendpipe.analysis.separate import (
+    Benchmark,
+    MeasuredRecord,
+    SeparatedRecord,
+    fit_benchmark,
+    separate,
+)
 from pendpipe.arguments import add, load
 from pendpipe.campaign.joint import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from pendpipe.analysis.fit.least_squares import CHI2_95, Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, FitResult, units
-from pendpipe.analysis.losses import quality_of_rate
+from pendpipe.analysis.separate import quality_of_rate
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
 

@@ -27,8 +27,8 @@ from pendpipe.analysis.fit.least_squares import Minimum, covariance, minimise
 from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import BOUNDS, PRIOR_INVERSE, Waveform, best_noise
-from pendpipe.analysis.losses import quality_of_rate
 from pendpipe.analysis.noise import quantisation_rms, white_rms
+from pendpipe.analysis.separate import quality_of_rate
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray

@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.turning_points.blocks import BLOCK, in_blocks
 from pendpipe.analysis.turning_points.finish import State, finished, kept, last_seen
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
+from pendpipe.analysis.turning_points.long_records import BLOCK, in_blocks
 from pendpipe.analysis.turning_points.loops import count_half_cycles, find_extremes, smooth_times
 from pendpipe.analysis.turning_points.measure import Measured, Places, measure
 from pendpipe.analysis.turning_points.samples import Samples, prepare
