@@ -16,8 +16,10 @@ from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
+from pendpipe.recording import Recording
 
 OMEGA, LOSS, START, COUNT, RATE_HZ = 5.0, 0.004, 0.6, 0.02, 60.0
 
@@ -146,3 +148,20 @@ def test_a_clock_slips_by_whole_samples_or_it_is_no_slip(swing: Swing, whole: bo
     moved = corrected.time_s - (np.arange(len(corrected)) / RATE_HZ + 1.0)
     truth = np.cumsum(np.bincount(rows, sizes, len(corrected))) / RATE_HZ
     assert np.mean(np.abs(moved - moved[0] - truth) > 1e-3) < 0.01
+
+
+def test_counts_are_lost_from_an_encoder_that_is_read_at_fixed_times(swing: Swing) -> None:
+    # Undone in the readings as recorded too: a level one count higher is no end of the range.
+    count, random = 2e-3, np.random.default_rng(5)
+    rows = np.sort(random.choice(np.arange(200, 3500), 14, replace=False))
+    level = np.zeros(len(swing.time_s[::16]))
+    level[rows] = random.choice([-1.0, 1.0], len(rows))
+    dither = 0.4 * random.standard_normal(len(level))
+    angle = count * np.round(swing.angle[::16] / count + dither + np.cumsum(level))
+    answer = diagnose_recording(Recording(swing.time_s[::16], angle, "angle_rad"))
+    names = {each.identifier: each for each in answer.effects}
+    assert {"circular-error", "count-slips"} <= set(names)
+    assert set(names) <= {"circular-error", "count-slips", "coarse-quantisation"}
+    lost = names["count-slips"].parameters
+    assert lost["step"].value == pytest.approx(count, rel=0.02)
+    assert abs(lost["number"].value - len(rows)) <= 3

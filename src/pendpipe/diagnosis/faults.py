@@ -16,7 +16,7 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import TESTS_SHARE
-from pendpipe.diagnosis.data import at_even_times
+from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips
 from pendpipe.diagnosis.forensics.finding import Finding
@@ -212,7 +212,8 @@ class Forensics:
 
     def _correct_slips(self, state: State, progress: Progress) -> None:
         """Correct the values of an encoder that loses counts, or the times of a slipping clock."""
-        clean = state.fit.chi2 <= _CLEAN_CHI2 * state.data.used
+        # Slips that go on and on are as steady as noise, but never white.
+        clean = state.fit.chi2 <= _CLEAN_CHI2 * state.data.used and not state.noise.coloured
         for name, most in SLIPS.items():
             if (
                 clean
@@ -230,12 +231,19 @@ class Forensics:
             try:
                 fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
                 if fit.chi2 < before:
+                    self._correct_samples(state.data, corrected)
                     state.settle(fit, corrected)
                     progress(finding.summary)
                     found = replace(finding, delta_chi2=before - fit.chi2)
                     state.faults.append(Fault(found, p_value, len(state.steps)))
             except NoMotionError:
                 continue  # the model comes to rest before the corrected times
+
+    def _correct_samples(self, data: Data, corrected: Data) -> None:
+        """Correct the values as recorded, too: the later tests look at these."""
+        row = np.searchsorted(data.time_s, self.samples.time_s, side="right") - 1
+        lost = (data.values - corrected.values)[np.maximum(row, 0)]
+        self.samples = replace(self.samples, values=self.samples.values - lost)
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
         """Test whether random kicks explain more than an effect that leaves more than noise."""

@@ -219,8 +219,10 @@ def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Findi
 
 
 def count_of(samples: Samples) -> float:
-    """Return the step of an encoder that writes a row at each count, rad; 0 for other sensors."""
-    return float(np.median(np.abs(np.diff(samples.values)))) if samples.counts else 0.0
+    """Return the step of the readings, rad: between rows, where there is one at each count."""
+    if samples.counts:
+        return float(np.median(np.abs(np.diff(samples.values))))
+    return samples.step or 0.0
 
 
 def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
