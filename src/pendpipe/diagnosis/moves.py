@@ -29,6 +29,7 @@ from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable, undrawn
 from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.oscillations import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
 CHOICE: Final = 7.4
@@ -191,7 +192,8 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
     often. They are asked where what leads only describes what they would explain.
     """
     leader, before = rivals[0], state.fit
-    tone = leader.lead.effect.spectral and not off_harmonics(leader.fit, leader.lead.effect)
+    tone = leader.lead.effect.spectral or isinstance(leader.lead.effect, PlaneCoupling)
+    tone = tone and not off_harmonics(leader.fit, leader.lead.effect)
     if not (leader.drawn or tone):
         return list(rivals)
     rare = applicable(task.catalogue, before, task.baseline, state.data.unit, rare=True)
