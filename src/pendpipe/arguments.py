@@ -169,6 +169,14 @@ def load(path: Path) -> Campaign:
     return load_campaign(read_configuration(path), path)
 
 
+def print_answer(arguments: argparse.Namespace, content: Any, text: str) -> None:
+    """Print a command's answer: in words, or with ``--json`` as one object."""
+    if arguments.json:
+        print_json(content)
+    else:
+        print(text)
+
+
 def print_json(content: Any) -> None:
     """Print one JSON object for programs; what is not finite is null."""
     print(json.dumps(finite(content), indent=1, ensure_ascii=False))

@@ -113,11 +113,16 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def write_whole(path: str | Path, content: str | bytes) -> None:
+    """Write a file of which all is there, or nothing."""
+    with replaced(path, "wb" if isinstance(content, bytes) else "w") as stream:
+        stream.write(content)
+
+
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write `content` as indented JSON; a number without a finite value becomes null."""
     text = json.dumps(finite(content), indent=1, ensure_ascii=False, allow_nan=False)
-    with replaced(path) as stream:
-        stream.write(text + "\n")
+    write_whole(path, text + "\n")
 
 
 def read_json(path: str | Path) -> Any:

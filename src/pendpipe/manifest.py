@@ -17,7 +17,7 @@ so that each damage runs the stage once.
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -246,7 +246,7 @@ def job(
     *,
     inputs: Iterable[Path] = (),
     sources: Iterable[Path] = (),
-    out: Path | None = None,
+    outputs: Sequence[Path] = (),
 ) -> Iterator[Job]:
     """Run a stage between a check of what it reads and a record of what it wrote.
 
@@ -258,7 +258,7 @@ def job(
         Results of other stages. What is damaged is set aside, and the stage doesn't run.
     sources
         Files of the user: recorded and never touched. A missing one is left to the stage.
-    out
+    outputs
         What is written; somewhere else than in `home` it is no result of the campaign, and
         nothing is recorded.
 
@@ -269,13 +269,13 @@ def job(
         that are there now.
     """
     checked = check(inputs)
-    if out is not None and not out.absolute().is_relative_to(home.absolute()):
+    if outputs and not outputs[0].absolute().is_relative_to(home.absolute()):
         yield Job()
         return
     repaired = _readable(home, stage).repaired
     # Until the stage has ended its old results are nobody's.
     Manifest(home, stage, repaired=repaired).write()
-    running = Job()
+    running = Job(list(outputs))
     yield running
     Manifest(
         home,

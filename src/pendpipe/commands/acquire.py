@@ -170,9 +170,9 @@ def _stage(arguments: argparse.Namespace) -> int:
 
         refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
         out, source = Path(arguments.out), caliper_source(campaign)
-        with job(out.parent, "caliper", sources=[source] if source else []) as running:
+        sources = [source] if source else []
+        with job(out.parent, "caliper", sources=sources, outputs=[out]):
             run_caliper(campaign, out)
-            running.outputs.append(out)
         return 0
     from pendpipe.stages.acquire import acquire_record
     from pendpipe.stages.refusal import run_stage

@@ -14,7 +14,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import Flags, add, declare, print_json
+from pendpipe.arguments import Flags, add, declare, print_answer
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibrate import Calibration
@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is None or not (arguments.out.parent / manifest.FOLDER).is_dir():
         return _sensor(arguments)
     # The campaign's caliper run, in its folder of results.
-    with manifest.job(arguments.out.parent, "sensor", inputs=[arguments.file]) as running:
-        running.outputs.append(arguments.out)
+    out: Path = arguments.out
+    with manifest.job(out.parent, "sensor", inputs=[arguments.file], outputs=[out]):
         return _sensor(arguments)
 
 
@@ -87,10 +87,7 @@ def _sensor(arguments: argparse.Namespace) -> int:
         relative_scale_sd=relative_sd,
         place=str(arguments.file),
     )
-    if arguments.json:
-        print_json(calibration.as_json())
-    else:
-        print(_statement(calibration))
+    print_answer(arguments, calibration.as_json(), _statement(calibration))
     if arguments.out:
         write_json(arguments.out, calibration.as_json())
     return 0

@@ -16,10 +16,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
+from pendpipe.arguments import Flags, add, add_file, declare, print_answer, print_json, read_motion
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
-from pendpipe.files import distinct_names, make_folder, replaced, write_json
+from pendpipe.files import distinct_names, make_folder, write_json, write_whole
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis import Outcome
@@ -156,7 +156,7 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
         content = _write(arguments, outcome)
     for warning in content["warnings"]:
         print(f"{arguments.file}: {warning}", file=sys.stderr)
-    _print_answer(arguments, content)
+    print_answer(arguments, content, content["statement"])
     return FOUND if arguments.fail_on == content["verdict"] else 0
 
 
@@ -198,7 +198,7 @@ def _diagnose_several(arguments: argparse.Namespace) -> int:
     )
     if arguments.out is not None:
         joint.save(arguments.out)
-    _print_answer(arguments, joint.to_dict())
+    print_answer(arguments, content := joint.to_dict(), content["statement"])
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 
@@ -246,8 +246,7 @@ def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
     wanted = arguments.record is not None and arguments.figures != "none"
     paths = [arguments.out / f"{name}.svg" for name in OF_EVERY_DIAGNOSIS if wanted]
     for path in (path for path in paths if not path.exists()):
-        with replaced(path) as stream:
-            stream.write(_EMPTY.format(reason))
+        write_whole(path, _EMPTY.format(reason))
 
 
 def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
@@ -263,14 +262,6 @@ def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict
         print_json(content)
     print(f"pendpipe: {reason}", file=sys.stderr)
     return 2 if arguments.refused is None else 0
-
-
-def _print_answer(arguments: argparse.Namespace, content: dict[str, Any]) -> None:
-    """Print the paragraph, or the whole result with ``--json``."""
-    if arguments.json:
-        print_json(content)
-    else:
-        print(content["statement"])
 
 
 def _print_progress(line: str) -> None:

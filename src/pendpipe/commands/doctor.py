@@ -7,7 +7,7 @@ to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 import argparse
 from pathlib import Path
 
-from pendpipe.arguments import add, print_json
+from pendpipe.arguments import add, print_answer
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,10 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.doctor import examine
 
     found = examine(arguments.folder)
-    if arguments.json:
-        print_json({"schema_version": 1, "findings": [finding._asdict() for finding in found]})
-    elif found:
-        print("\n".join(map(str, found)))
-    else:
-        print(f"{arguments.folder}: all results are as their stages wrote them")
+    content = {"schema_version": 1, "findings": [finding._asdict() for finding in found]}
+    sound = f"{arguments.folder}: all results are as their stages wrote them"
+    print_answer(arguments, content, "\n".join(map(str, found)) or sound)
     return 3 if found and arguments.fail_on else 0

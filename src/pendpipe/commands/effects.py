@@ -5,7 +5,7 @@ With --list, one line an effect: identifier, kind, name.
 
 import argparse
 
-from pendpipe.arguments import add, print_json
+from pendpipe.arguments import add, print_answer
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,15 +19,11 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.effects.catalogue import CATALOGUE
     from pendpipe.effects.manual import page
 
-    if arguments.json:
-        entries = [
-            {"id": each.identifier, "name": each.name, "kind": each.kind, "equation": each.equation}
-            for each in CATALOGUE
-        ]
-        print_json({"schema_version": 1, "effects": entries})
-    elif arguments.list:
-        for effect in CATALOGUE:
-            print(f"{effect.identifier:<22}{effect.kind:<13}{effect.name}")
-    else:
-        print(page(), end="")
+    entries = [
+        {"id": each.identifier, "name": each.name, "kind": each.kind, "equation": each.equation}
+        for each in CATALOGUE
+    ]
+    listed = "\n".join(f"{each.identifier:<22}{each.kind:<13}{each.name}" for each in CATALOGUE)
+    content = {"schema_version": 1, "effects": entries}
+    print_answer(arguments, content, listed if arguments.list else page().removesuffix("\n"))
     return 0

@@ -4,18 +4,14 @@ What has no data is left out, and said on standard error; in a campaign with an 
 each of figures 3 to 10 is written all the same, with the reason in its place.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 from pendpipe.arguments import Flags, add, declare
-
-if TYPE_CHECKING:
-    from pendpipe.manifest import Job
-
+from pendpipe.files import write_json
+from pendpipe.manifest import job
 
 _FLAGS: Final[Flags] = {
     "--out": {
@@ -41,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Draw."""
+    from pendpipe.figures.campaign import draw_all
     from pendpipe.figures.data import read_compared
-    from pendpipe.manifest import job
 
     _, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     inputs = [
@@ -50,29 +46,18 @@ def run(arguments: argparse.Namespace) -> int:
         for entry in comparison["records"]
         for name in ("recording.csv", "turning_points.csv", "fit.json")
     ]
-    inputs.append(arguments.comparison)
     together = folder / "campaign_diagnosis.json"
-    inputs += [together] if together.is_file() else []
-    with job(folder, "figures", inputs=inputs, out=arguments.out) as running:
-        return _draw(arguments, folder, comparison, running)
-
-
-def _draw(
-    arguments: argparse.Namespace, folder: Path, comparison: dict[str, Any], running: Job
-) -> int:
-    from pendpipe.figures.campaign import draw_all
-    from pendpipe.files import write_json
-
-    drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
-    for name, reason in drawn.left_out.items():
-        print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
-    names = [
-        (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
-        for file in drawn.files
-    ]
+    inputs += [arguments.comparison, *([together] if together.is_file() else [])]
     listed = arguments.out / "drawn.json"
-    write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
-    running.outputs.append(listed)
-    running.extras += drawn.files
+    with job(folder, "figures", inputs=inputs, outputs=[listed]) as running:
+        drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
+        for name, reason in drawn.left_out.items():
+            print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
+        names = [
+            (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
+            for file in drawn.files
+        ]
+        write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
+        running.extras += drawn.files
     print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
     return 0

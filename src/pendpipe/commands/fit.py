@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import Flags, add, add_file, declare, print_json, read_motion
+from pendpipe.arguments import Flags, add, add_file, declare, print_answer, print_json, read_motion
 from pendpipe.errors import InputError, refuse_if
 
 if TYPE_CHECKING:
@@ -189,8 +189,5 @@ def _table(arguments: argparse.Namespace) -> int:
             found.append({"file": file, **result.to_dict()})
             rows.append(row(file, result))
             status = max(status, _status(arguments, result))
-    if arguments.json:
-        print_json({"schema_version": 1, "fits": found})
-    else:
-        print(table(rows))
+    print_answer(arguments, {"schema_version": 1, "fits": found}, table(rows))
     return status

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from pendpipe.arguments import add, add_file, print_json, read_options
+from pendpipe.arguments import add, add_file, print_answer, read_options
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection
@@ -23,10 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     from pendpipe.formats import inspect
 
     found = inspect(arguments.file, read_options(arguments))
-    if arguments.json:
-        print_json(found.as_json())
-    else:
-        print("\n".join(_lines(arguments.file, found)))
+    print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))
     return 0
 
 

@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from pendpipe import api
-    from pendpipe.files import replaced
+    from pendpipe.files import write_whole
     from pendpipe.report.recording import render_recording
 
     recording, provenance = read_motion(arguments)
@@ -39,7 +39,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(page)
         return 0
     out = Path(arguments.out) if arguments.out else Path(name).with_suffix(".html")
-    with replaced(out) as stream:
-        stream.write(page)
+    write_whole(out, page)
     print(f"{out}: written", file=sys.stderr)
     return 0

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
     from pendpipe.figures.data import read_compared, read_content
-    from pendpipe.files import replaced
+    from pendpipe.files import write_whole
     from pendpipe.manifest import job
     from pendpipe.report.headline import as_text, headline
     from pendpipe.report.page import page_files, render
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     figures = arguments.figures or arguments.out.parent / "figures"
     inputs = [arguments.comparison, arguments.summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs, out=arguments.out) as running:
+    with job(folder, "report", inputs=inputs, outputs=[arguments.out]):
         page = render(
             configuration,
             comparison,
@@ -59,9 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
             figures,
             arguments.proof,
         )
-        with replaced(arguments.out) as stream:
-            stream.write(page)
-        running.outputs.append(arguments.out)
+        write_whole(arguments.out, page)
     print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
     if rows := headline(comparison, configuration.get("simulated") or {}):
         print(as_text(rows))

@@ -9,7 +9,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import replaced
+from pendpipe.files import replaced, write_whole
 from pendpipe.manifest import SET_ASIDE
 from pendpipe.recording import Recording, read_plain, write_plain
 
@@ -190,8 +190,7 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
         # The user's own table is kept beside the results that were made with it.
         from pendpipe.formats.reading import file_bytes
 
-        with replaced(table, "wb") as copy:
-            copy.write(file_bytes(Path(run.source)))
+        write_whole(table, file_bytes(Path(run.source)))
         return
     if truth is None:
         raise InputError("calibration", "a simulated run needs the section simulated", "add it")

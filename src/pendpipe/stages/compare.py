@@ -54,9 +54,9 @@ def run(arguments: argparse.Namespace) -> int:
         sensor_file(campaign),
         *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
     ]
-    with job(campaign.folder, "compare", inputs=inputs, out=arguments.out) as running:
+    outputs = [arguments.out, arguments.summary]
+    with job(campaign.folder, "compare", inputs=inputs, outputs=outputs):
         compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
-        running.outputs += [arguments.out, arguments.summary]
     return 0
 
 

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from pendpipe.arguments import add, load, print_json
+from pendpipe.arguments import add, load, print_answer
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
@@ -41,14 +41,10 @@ def run(arguments: argparse.Namespace) -> int:
     campaign = Campaign(there, campaign.records)
     out = arguments.out or arguments.folder / FILE_NAME
     inputs = record_files(campaign, "fit.json", "calibration.json")
-    with job(campaign.folder, "diagnose-campaign", inputs=inputs, out=out) as running:
+    with job(campaign.folder, "diagnose-campaign", inputs=inputs, outputs=[out]):
         answer = diagnose_campaign(campaign)
         write_json(out, answer)
-        running.outputs.append(out)
-    if arguments.json:
-        print_json(answer)
-    else:
-        print(answer["statement"])
+    print_answer(arguments, answer, answer["statement"])
     return 3 if arguments.fail_on and answer["verdict"] == arguments.fail_on else 0
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import DamagedError, InputError, UnwritableError
-from pendpipe.files import read_json, replaced, without_folders, write_json
+from pendpipe.files import read_json, without_folders, write_json, write_whole
 from pendpipe.manifest import check, job
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
@@ -59,9 +59,8 @@ def run_stage(
         check([refused])
     home = outputs[0].parent
     given = [path for path in inputs if path is not None]
-    with job(home, stage, inputs=given, sources=sources) as running:
+    with job(home, stage, inputs=given, sources=sources, outputs=outputs) as running:
         status = _work_or_refuse(stage, record, work, outputs, refused, sources)
-        running.outputs += outputs
         if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
             running.extras.append(refused)
     return status
@@ -128,5 +127,4 @@ def _write_stubs(outputs: Sequence[Path], reason: str) -> None:
         if path.suffix == ".json":
             write_json(path, {"schema_version": 1, "refused": reason})
         else:
-            with replaced(path) as stream:
-                stream.write(f"# refused: {reason}\n")
+            write_whole(path, f"# refused: {reason}\n")

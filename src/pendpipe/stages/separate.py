@@ -37,9 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Separate."""
     campaign = load(arguments.campaign)
     inputs = record_files(campaign, "fit.json", "calibration.json")
-    with job(campaign.folder, "separate", inputs=inputs, out=arguments.out) as running:
+    with job(campaign.folder, "separate", inputs=inputs, outputs=[arguments.out]):
         separate_campaign(campaign, arguments.out)
-        running.outputs.append(arguments.out)
     return 0
 
 
