@@ -1,7 +1,8 @@
 """The command line: it picks a command and turns user errors into one line and a status.
 
 Every command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
-campaign and no more, with two functions, ``add_arguments(parser)`` and ``run(arguments) -> int``.
+campaign and no more, with two functions, ``add_arguments(parser)`` and ``run(arguments)``, which
+returns the exit status where it is not 0.
 Only the module of the command that was asked for is imported, since a job's cost is its imports.
 Other packages add commands by entry points of the group ``pendpipe.commands``.
 """
@@ -135,10 +136,9 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     return arguments
 
 
-def _first_steps(_: argparse.Namespace) -> int:
+def _first_steps(_: argparse.Namespace) -> None:
     """Show somebody who gave no command where to begin."""
     print(FIRST_STEPS)
-    return 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -156,7 +156,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     one_thread()
     try:
         arguments = _parse(sys.argv[1:] if argv is None else argv)
-        return int(arguments.run(arguments))
+        return int(arguments.run(arguments) or 0)
     except InputError as fault:
         print(f"pendpipe: {fault}", file=sys.stderr)
         return 2

@@ -305,8 +305,8 @@ def record(
         raise
     with closing(session), _opened(raw_path) as stream:
         header = _header(port, session.identity, session.setup, request, clock)
-        header |= {"volts_per_radian": volts_per_radian, "source": source}
-        kept = {key: value for key, value in header.items() if value is not None}
+        told = header | {"volts_per_radian": volts_per_radian, "source": source}
+        kept = {key: value for key, value in told.items() if value is not None}
         try:
             size = kind.decoder(len(session.setup.channels)).bytes_per_scan
             session.run(RawWriter(stream, kept, bytes_per_s=session.setup.rate_hz * size))

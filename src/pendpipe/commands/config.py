@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown.add_argument("--manual", action="store_true", help="print the tables of the manual")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Check, or print."""
     from pendpipe.configuration import document
     from pendpipe.configuration.load import load_campaign, read_configuration
@@ -25,4 +25,3 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         campaign = load_campaign(read_configuration(arguments.file), arguments.file)
         print(f"{arguments.file}: in order, {len(campaign.records)} records")
-    return 0

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
     from pendpipe.recording import check_name, plain_lines, write_plain
@@ -30,7 +30,6 @@ def run(arguments: argparse.Namespace) -> int:
     announce(arguments, recording)
     if piped:
         sys.stdout.writelines(plain_lines(recording))
-        return 0
+        return
     write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")
-    return 0

@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, "--json")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Print."""
     from pendpipe.effects.catalogue import CATALOGUE
     from pendpipe.effects.manual import page
@@ -26,4 +26,3 @@ def run(arguments: argparse.Namespace) -> int:
     listed = "\n".join(f"{each.identifier:<22}{each.kind:<13}{each.name}" for each in CATALOGUE)
     content = {"schema_version": 1, "effects": entries}
     print_answer(arguments, content, listed if arguments.list else page().removesuffix("\n"))
-    return 0

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     declare(parser, _FLAGS)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Draw."""
     from pendpipe.figures.campaign import draw_all
     from pendpipe.figures.data import read_compared
@@ -60,4 +60,3 @@ def run(arguments: argparse.Namespace) -> int:
         write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
         running.extras += drawn.files
     print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
-    return 0

@@ -18,13 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, "--json")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Inspect and print."""
     from pendpipe.formats import inspect
 
     found = inspect(arguments.file, read_options(arguments))
     print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))
-    return 0
 
 
 def _lines(file: str, found: Inspection) -> Iterator[str]:

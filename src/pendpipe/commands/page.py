@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, "--calibration")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Fit, diagnose, and write the page."""
     from dataclasses import replace
 
@@ -37,8 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     page = render_recording(name, recording, result, statement)
     if arguments.out == "-":
         print(page)
-        return 0
+        return
     out = Path(arguments.out) if arguments.out else Path(name).with_suffix(".html")
     write_whole(out, page)
     print(f"{out}: written", file=sys.stderr)
-    return 0

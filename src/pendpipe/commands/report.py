@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     declare(parser, _FLAGS)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Write the page."""
     from pendpipe.figures.data import read_compared, read_content
     from pendpipe.files import write_whole
@@ -63,4 +63,3 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
     if rows := headline(comparison, configuration.get("simulated") or {}):
         print(as_text(rows))
-    return 0

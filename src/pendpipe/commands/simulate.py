@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="seed of the noise, instead of the model's")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Simulate and write."""
     from pendpipe import api
     from pendpipe.recording import write_plain
@@ -24,4 +24,3 @@ def run(arguments: argparse.Namespace) -> int:
     recording = api.simulate(arguments.model, seed=arguments.seed)
     write_plain(arguments.out, recording)
     print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
-    return 0

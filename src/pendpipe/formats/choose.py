@@ -67,13 +67,6 @@ def listed(names: Sequence[str], most: int = 12) -> str:
     return ", ".join(shown) + f" and {len(names) - most} more" * (len(names) > most) or "none"
 
 
-_BY_KIND: Final[Mapping[str, Role]] = {
-    "angle": "angle",
-    "volts": "volts",
-    "length": "length",
-    "time": "time",
-    "none": "none",
-}
 _BY_UNIT: Final[Mapping[str, Role]] = {
     "rad/s": "velocity",
     "m/s": "velocity",
@@ -99,7 +92,7 @@ def meaning(column: Column) -> Role:
         return "signal" if role == "unknown" else role
     # "(m)" beside a velocity: a rate whose unit is printed without its "/s".
     rate = role in ("velocity", "acceleration") and unit.kind in ("angle", "length")
-    return role if rate else _BY_KIND[unit.kind]
+    return role if rate else unit.kind
 
 
 def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choice:

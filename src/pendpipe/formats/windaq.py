@@ -512,11 +512,9 @@ def read_export(place: Path, data: bytes, options: ReadOptions) -> Table:
 def _evened(time: FloatArray) -> FloatArray:
     """Take the rate for exact where times rounded to microseconds agree; a whole one first."""
     rate = (len(time) - 1) / (time[-1] - time[0]) if time[-1] > time[0] else 0.0
-    for candidate in (float(round(rate)), rate):
-        even: FloatArray = time[0] + np.arange(len(time), dtype=np.float64) / (candidate or np.nan)
-        if np.abs(even - time).max() <= 1.5e-6:
-            return even
-    return time
+    rows = np.arange(len(time), dtype=np.float64)
+    evened = [time[0] + rows / (even_hz or np.nan) for even_hz in (float(round(rate)), rate)]
+    return next((even for even in evened if np.abs(even - time).max() <= 1.5e-6), time)
 
 
 def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--summary", type=Path, required=True, help="campaign.json")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Compare."""
     campaign = load(arguments.campaign)
     inputs = [
@@ -57,7 +57,6 @@ def run(arguments: argparse.Namespace) -> int:
     outputs = [arguments.out, arguments.summary]
     with job(campaign.folder, "compare", inputs=inputs, outputs=outputs):
         compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
-    return 0
 
 
 def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:

@@ -33,13 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="the separation, JSON")
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Separate."""
     campaign = load(arguments.campaign)
     inputs = record_files(campaign, "fit.json", "calibration.json")
     with job(campaign.folder, "separate", inputs=inputs, outputs=[arguments.out]):
         separate_campaign(campaign, arguments.out)
-    return 0
 
 
 @dataclass(frozen=True)

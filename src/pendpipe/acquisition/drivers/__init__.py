@@ -89,16 +89,17 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
         Where the kernel lists USB devices; each is a folder with ``idVendor`` and
         ``idProduct``, its interfaces are folders in it, and a serial port is a ``tty`` there.
     """
-    found = []
-    for device in sorted(devices.glob("*")) if devices.is_dir() else []:
-        vendor, product = _number(device / "idVendor"), _number(device / "idProduct")
-        if vendor != VENDOR or product is None:
-            continue
-        if any(device.glob("*/tty*")):
-            continue
-        name = _OF_WINDAQ.get(product, "DI-245" if product == _DI245 else "device")
-        found.append(f"Dataq {name} (0683:{product:04x}) without a serial port: {_remedy(product)}")
-    return found
+    numbers = {
+        device: (_number(device / "idVendor"), _number(device / "idProduct"))
+        for device in sorted(devices.glob("*"))
+        if not any(device.glob("*/tty*"))
+    }
+    return [
+        f"Dataq {_OF_WINDAQ.get(product, 'DI-245' if product == _DI245 else 'device')}"
+        f" (0683:{product:04x}) without a serial port: {_remedy(product)}"
+        for vendor, product in numbers.values()
+        if vendor == VENDOR and product is not None
+    ]
 
 
 def no_ports(platform: str = sys.platform) -> str:
@@ -120,9 +121,9 @@ def _remedy(product: int) -> str:
             "sudo modprobe ftdi_sio, then"
             " echo 0683 2450 | sudo tee /sys/bus/usb-serial/drivers/ftdi_sio/new_id"
         )
-    if product in _OF_WINDAQ:
-        return f"it is in the mode for WinDaq; {_CDC}"
-    return "sudo modprobe cdc_acm, or unplug it and plug it in again"
+    in_windaq = f"it is in the mode for WinDaq; {_CDC}"
+    unbound = "sudo modprobe cdc_acm, or unplug it and plug it in again"
+    return in_windaq if product in _OF_WINDAQ else unbound
 
 
 def _number(path: Path) -> int | None:

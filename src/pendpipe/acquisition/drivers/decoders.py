@@ -150,14 +150,15 @@ class SyncBitDecoder:
         # Thrown away before each start, since the beginning of these bytes.
         before = self._discarded + lead + np.concatenate(([0], np.cumsum(discard)))
         followed = self._suspect if self._discarded else (lead > 0 and self._scans > 0)
-        losses: list[Loss] = []
         index = np.flatnonzero(good)
         spent = 0
         thrown = before[index]
         fresh = np.diff(thrown, prepend=0)
-        for number in np.flatnonzero(fresh):
-            direct = followed if number == 0 else bool(discard[index[number - 1]])
-            losses.append(self._loss(self._scans + int(number), int(fresh[number]), direct))
+        direct = [followed, *(discard[index[:-1]] > 0).tolist()]
+        losses = [
+            self._loss(self._scans + n, int(fresh[n]), direct[n])
+            for n in np.flatnonzero(fresh).tolist()
+        ]
         if len(index):
             spent = int(thrown[-1])
             followed = bool(discard[index[-1]])
