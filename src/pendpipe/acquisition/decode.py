@@ -339,12 +339,9 @@ def offsets_s(segments: Sequence[Segment], rate_hz: float) -> list[float]:
     The least late arrivals on either side of a break count, so that a delay that is alike
     on both sides does not matter.
     """
-    offsets = [0.0]
-    for before, after in pairwise(segments):
-        old = before.arrival_s - before.scans_made / rate_hz
-        new = after.arrival_s - after.scans_made / rate_hz
-        offsets.append(offsets[-1] + float(new[:_NEAR].min() - old[-_NEAR:].min()))
-    return offsets
+    late = [segment.arrival_s - segment.scans_made / rate_hz for segment in segments]
+    steps = [float(new[:_NEAR].min() - old[-_NEAR:].min()) for old, new in pairwise(late)]
+    return [0.0, *np.cumsum(steps).tolist()]
 
 
 def _decode(

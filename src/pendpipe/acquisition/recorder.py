@@ -341,12 +341,9 @@ def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
 
 def _is_without_data(path: Path) -> bool:
     """Whether a file is an attempt that ended before the first byte of the stream."""
-    if not path.is_file() or is_being_recorded(path):
-        return False
-    try:
-        return not read_raw(path).data
-    except InputError:
-        return False
+    with suppress(InputError):
+        return path.is_file() and not is_being_recorded(path) and not read_raw(path).data
+    return False
 
 
 def _cannot_write(place: str | Path, fault: OSError) -> InputError:

@@ -24,6 +24,15 @@ from pendpipe.arguments import Flags, add, declare, load
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_writable
 
+_SOURCES: Final[Flags] = {
+    "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
+    "--device": {"metavar": "simulated:MODEL", "help": "a simulated instrument"},
+    "--recover": {"metavar": "RAW", "help": "decode kept bytes, of a crash for one"},
+    "--serve": {
+        "metavar": "MODEL",
+        "help": "be a simulated instrument for other programs: di2108, ...",
+    },
+}
 _FLAGS: Final[Flags] = {
     "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
     "--model": {"help": "the instrument on --port: di154rs, di2108, ..."},
@@ -64,13 +73,7 @@ _FLAGS: Final[Flags] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments."""
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--port", help="serial port of a real instrument: /dev/ttyUSB0, COM3")
-    what.add_argument("--device", metavar="simulated:MODEL", help="a simulated instrument")
-    what.add_argument("--recover", metavar="RAW", help="decode kept bytes, of a crash for one")
-    what.add_argument(
-        "--serve", metavar="MODEL", help="be a simulated instrument for other programs: di2108, ..."
-    )
+    declare(parser.add_mutually_exclusive_group(), _SOURCES)
     declare(parser, _FLAGS)
     workflow = parser.add_argument_group("as a stage of a campaign")
     add(workflow, "--campaign", "--record", "--refused")

@@ -11,10 +11,11 @@ constant holds for it.
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import Flags, add, declare, print_answer
+from pendpipe.arguments import SHARED, Flags, add, declare, print_answer
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibrate import Calibration
@@ -23,9 +24,7 @@ if TYPE_CHECKING:
 _FLAGS: Final[Flags] = {
     "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"},
     "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"},
-}
-
-_FLAGS_2: Final[Flags] = {
+    "--json": SHARED["--json"],
     "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
     "--arm-sd-m": {"type": float, "default": 0.0, "metavar": "M", "help": "its standard deviation"},
     "--displacement-sd-m": {
@@ -37,19 +36,18 @@ _FLAGS_2: Final[Flags] = {
     "--delimiter": {"help": "between the cells; guessed from the header"},
     "--decimal": {"choices": ".,", "help": "decimal mark; guessed from the delimiter"},
 }
+_OF_A_RECORD: Final[Flags] = {
+    "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"},
+    "--volts-per-radian": {"type": float, "metavar": "V/RAD", "help": "a known constant"},
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe calibrate``."""
     declare(parser, _FLAGS)
-    add(parser, "--json")
-    declare(parser, _FLAGS_2)
     workflow = parser.add_argument_group("with --record")
     add(workflow, "--record", "--refused")
-    workflow.add_argument("--sensor", type=Path, metavar="JSON", help="the campaign's calibration")
-    workflow.add_argument(
-        "--volts-per-radian", type=float, metavar="V/RAD", help="a known constant"
-    )
+    declare(workflow, _OF_A_RECORD)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -97,22 +95,22 @@ def _statement(calibration: Calibration) -> str:
     """Say the result in a few lines."""
     constant, offset = calibration.volts_per_radian, calibration.offset
     low, high = calibration.angle_rad.min(), calibration.angle_rad.max()
-    lines = [
+    misfit = calibration.chi2_p_value
+    linear = "linearity        not tested: it takes five points at four angles"
+    if curve := calibration.linearity:
+        verdict = "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
+        linear = (
+            f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
+            f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
+        )
+    lines = (
         f"volts_per_radian {constant.value:.7g} +- {constant.sd:.2g} V/rad",
         f"offset           {offset.value:.5g} +- {offset.sd:.2g} V",
         f"points           {len(calibration.volts)}, from {low:.4g} to {high:.4g} rad",
         f"residual sd      {calibration.residual_sd_volts:.3g} V",
-    ]
-    if calibration.chi2_p_value == calibration.chi2_p_value:
-        lines.append(f"lack of fit      p = {calibration.chi2_p_value:.3g}")
-    if curve := calibration.linearity:
-        verdict = "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
-        lines.append(
-            f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
-            f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
-        )
-    else:
-        lines.append("linearity        not tested: it takes five points at four angles")
+        *([f"lack of fit      p = {misfit:.3g}"] if math.isfinite(misfit) else []),
+        linear,
+    )
     return "\n".join(lines)
 
 

@@ -84,8 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe diagnose``."""
     add_file(parser, several=True)
     declare(parser, _FLAGS)
-    add(parser, "--json", "--baseline", "--fix")
-    add(parser, "--turning-points", "--record", "--refused")
+    add(parser, "--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
     add(parser, "--calibration", nargs="+", default=[])
 

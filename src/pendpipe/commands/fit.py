@@ -56,8 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``pendpipe fit``."""
     add_file(parser, several=True)
     declare(parser, _FLAGS)
-    add(parser, "--json", "--baseline", "--fix")
-    add(parser, "--turning-points", "--calibration", "--record", "--refused")
+    add(parser, "--json", "--baseline", "--fix", "--turning-points", "--calibration")
+    add(parser, "--record", "--refused")
 
 
 def run(arguments: argparse.Namespace) -> int:
