@@ -325,8 +325,12 @@ def check_name(path: str | Path) -> None:
     InputError
         On the names of WinDaq, MATLAB and Excel.
     """
-    read_only = Path(path).suffix.lower() in _READ_ONLY
-    refuse_if(read_only, path, "this form is read, not written", "name it OUT.csv")
+    refuse_if(
+        Path(path).suffix.lower() in _READ_ONLY,
+        path,
+        "this form is read, not written",
+        "name it OUT.csv",
+    )
 
 
 def write_plain(path: str | Path, recording: Recording) -> None:
@@ -407,8 +411,9 @@ def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
 def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
     """Find the columns of the plain form in its header."""
     where, headed = f"{place}, line {line}", f"(found {', '.join(names)})"
-    missing = f"the column time_s is missing {headed}"
-    refuse_if("time_s" not in names, where, missing, "name it time_s")
+    refuse_if(
+        "time_s" not in names, where, f"the column time_s is missing {headed}", "name it time_s"
+    )
     found = [name for name in QUANTITIES if name in names]
     refuse_if(
         len(found) != 1,
@@ -432,8 +437,12 @@ def _numbers(
         )
     for number, line in rows.items():
         cells, where = line.split(","), f"{place}, line {number}"
-        few = f"{len(cells)} cells, not {width}"
-        refuse_if(len(cells) < width, where, few, "complete or drop the row")
+        refuse_if(
+            len(cells) < width,
+            where,
+            f"{len(cells)} cells, not {width}",
+            "complete or drop the row",
+        )
         for index in picked:
             try:
                 float(cells[index])

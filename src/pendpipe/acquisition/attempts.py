@@ -101,8 +101,12 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
     found: list[Attempt] = []
     damages: list[InputError] = []
     for path in sorted(path for path in paths if path.is_file()):
-        busy = "another process is recording into it"
-        refuse_if(is_being_recorded(path), path, busy, "wait for its end")
+        refuse_if(
+            is_being_recorded(path),
+            path,
+            "another process is recording into it",
+            "wait for its end",
+        )
         try:
             raw = read_raw(path)
             decode_recording(raw)

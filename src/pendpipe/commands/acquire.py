@@ -132,8 +132,9 @@ def _record(arguments: argparse.Namespace) -> int:
     if out.is_file() or not out.exists():  # else it is a device or a pipe
         check_writable(out.parent)
     if arguments.samples is not None:
-        wrong = arguments.samples < 1
-        refuse_if(wrong, "--samples", "it must be positive", "give a whole number above 0")
+        refuse_if(
+            arguments.samples < 1, "--samples", "it must be positive", "give a whole number above 0"
+        )
         arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
     earlier: list[attempts.Attempt] = []
     if not (arguments.recover or arguments.anew):

@@ -173,8 +173,12 @@ def _table(arguments: argparse.Namespace) -> int:
     from pendpipe.analysis.fit.summary import row, table
 
     for option in ("out", "figure", "turning_points", "record"):
-        name = f"--{option.replace('_', '-')}"
-        refuse_if(getattr(arguments, option), name, "it belongs to one FILE", "fit that file alone")
+        refuse_if(
+            getattr(arguments, option),
+            f"--{option.replace('_', '-')}",
+            "it belongs to one FILE",
+            "fit that file alone",
+        )
     status, found, rows = 0, [], []
     for file in arguments.files:
         arguments.file = file

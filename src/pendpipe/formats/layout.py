@@ -176,8 +176,12 @@ def _wanted(option: str, given: str | None, names: dict[str, str], usual: str, f
     if given is None:
         return usual
     sign = names.get(given.lower(), given)
-    remedy = "give '.' or ','" if option == "--decimal" else "give tab, space, ',' or ';'"
-    refuse_if(not re.fullmatch(fit, sign), option, f"'{sign}' can't be used", remedy)
+    refuse_if(
+        not re.fullmatch(fit, sign),
+        option,
+        f"'{sign}' can't be used",
+        "give '.' or ','" if option == "--decimal" else "give tab, space, ',' or ';'",
+    )
     return sign
 
 

@@ -138,8 +138,12 @@ def file_bytes(place: Path) -> bytes:
         found = None if standard else place.stat()
         mode = found.st_mode if found else stat.S_IFREG
         refuse_if(stat.S_ISDIR(mode), place, "this is a folder", "give a file in it")
-        pipes = "give a file, or - for standard input"
-        refuse_if(not stat.S_ISREG(mode), place, "this is a device or a pipe", pipes)
+        refuse_if(
+            not stat.S_ISREG(mode),
+            place,
+            "this is a device or a pipe",
+            "give a file, or - for standard input",
+        )
         _refuse_size(place, found.st_size if found else 0)
         data = _standard_input() if standard else place.read_bytes()
     except FileNotFoundError:
@@ -174,8 +178,12 @@ def _unpacked(place: Path, data: bytes) -> bytes:
         content = bytes(unpacker.decompress(data, most_unpacked(len(data))))
     except (OSError, ValueError, EOFError, zlib.error, lzma.LZMAError) as fault:
         raise InputError(place, f"it can't be unpacked ({fault})", "pack it again") from None
-    cut = "what is packed in it is cut short, or too large"
-    refuse_if(not unpacker.eof, place, cut, "give the file in it")
+    refuse_if(
+        not unpacker.eof,
+        place,
+        "what is packed in it is cut short, or too large",
+        "give the file in it",
+    )
     return content
 
 
