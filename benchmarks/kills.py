@@ -33,14 +33,14 @@ from typing import IO, Any, Final
 import numpy as np
 
 from benchmarks import journal
-from pendpipe.doctor import TEMPORARY
+from pendpipe.commands.doctor import TEMPORARY
 from pendpipe.files import sha256
 from pendpipe.manifest import SET_ASIDE, manifests
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 GUARDS: Final = (
     "pendpipe.manifest",
-    "pendpipe.doctor",
+    "pendpipe.commands.doctor",
     "pendpipe.stages.refusal",
     "pendpipe.stages.acquire",
     "workflow/rules/*.smk",

@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks import journal
-from pendpipe.doctor import examine
+from pendpipe.commands.doctor import examine
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / ".evidence/torn_files"

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from pendpipe.configuration import document, jobs
+from pendpipe.commands import config
+from pendpipe.configuration import jobs
 from pendpipe.configuration.load import (
     COLUMNS,
     Record,
@@ -133,8 +134,8 @@ def test_a_table_that_is_no_text_is_named_in_one_line(tmp_path: Path) -> None:
 def test_schema_and_manual_are_those_of_the_models() -> None:
     """Both are made by `pendpipe config`; whoever changes a model makes them anew."""
     committed = ROOT / "workflow/schemas/configuration.schema.json"
-    assert committed.read_text(encoding="utf-8") == document.schema()
-    assert document.manual() in (ROOT / "config/README.md").read_text(encoding="utf-8")
+    assert committed.read_text(encoding="utf-8") == config.schema()
+    assert config.manual() in (ROOT / "config/README.md").read_text(encoding="utf-8")
 
 
 def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:

@@ -12,7 +12,7 @@ from benchmarks.acquisition_live import recorded_bytes
 from pendpipe import manifest
 from pendpipe.acquisition.raw import lock
 from pendpipe.cli import main
-from pendpipe.doctor import examine
+from pendpipe.commands.doctor import examine
 from pendpipe.files import sha256, write_json
 
 

@@ -5,9 +5,20 @@ to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 """
 
 import argparse
+import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Final, NamedTuple
 
+from pendpipe import manifest
 from pendpipe.arguments import add, print_answer
+from pendpipe.errors import InputError
+from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
+
+TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
+"""The name of a file that `pendpipe.files.replaced` had not finished."""
+_NO_RESULTS: Final = (FOLDER, "logs", "raw", "challenge", "challenge-sealed")
+_RUN: Final = "snakemake makes it again"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,10 +39,152 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine and print."""
-    from pendpipe.doctor import examine
-
     found = examine(arguments.folder)
     content = {"schema_version": 1, "findings": [finding._asdict() for finding in found]}
     sound = f"{arguments.folder}: all results are as their stages wrote them"
     print_answer(arguments, content, "\n".join(map(str, found)) or sound)
     return 3 if found and arguments.fail_on else 0
+
+
+class Finding(NamedTuple):
+    """Something that is not as it should be.
+
+    Parameters
+    ----------
+    kind
+        ``altered``, ``incomplete``, ``stale``, ``orphaned``, ``locked``, ``temporary``,
+        ``raw`` or ``set-aside``.
+    path
+        Where.
+    problem
+        What is wrong.
+    safe
+        What can be done without losing anything.
+    """
+
+    kind: str
+    path: str
+    problem: str
+    safe: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}; {self.safe}"
+
+
+def examine(results: Path) -> list[Finding]:
+    """Examine a campaign's folder of results; nothing is changed.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, nor a sign of a run that was to make it.
+    """
+    found = [
+        finding
+        for project in dict.fromkeys((Path(), results.parent))
+        for finding in _of_snakemake(project / ".snakemake")
+    ]
+    if not results.is_dir():
+        if found:  # killed before the first result
+            return found
+        raise InputError(results, "there is no such folder", "name a folder of results")
+    homes = [results, *sorted(path for path in results.iterdir() if path.is_dir())]
+    homes = [home for home in homes if home.name not in _NO_RESULTS]
+    known = {home: list(manifest.manifests(home)) for home in homes}
+    found += [finding for home in homes for finding in _of_manifests(home, known[home])]
+    found += [finding for home in homes for finding in _stale(home)]
+    listed = {
+        (home / name).resolve()
+        for home in homes
+        for entry in known[home]
+        for name in (*entry.outputs, *entry.extras)
+    }
+    return [*found, *_of_files(results, listed)]
+
+
+def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
+    """Results that are not what their stages wrote, or that were never finished."""
+    for stage in known:
+        broken, damages = manifest.damages_of(home, stage.stage, hash_all=True)
+        for damage in damages:
+            yield Finding("altered", str(damage.path), damage.problem, _RUN)
+        for path in (home / name for name in broken.outputs if not (home / name).is_file()):
+            yield Finding("incomplete", str(path), "it is missing", _RUN)
+        if not broken.outputs and not damages:
+            problem = f"stage {stage.stage} began and did not end"
+            yield Finding("incomplete", str(home), problem, "snakemake runs it again")
+
+
+def _stale(home: Path) -> Iterator[Finding]:
+    """Results that were made from other files than those that are there."""
+    index = manifest.Index()
+    for entry in manifest.manifests(home):
+        for name in entry.outputs:
+            if (home / name).is_file() and (damage := index.made_from_others(home / name, entry)):
+                yield Finding("stale", str(damage.path), damage.problem, _RUN)
+
+
+def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
+    """Files that no stage claims, and recordings that were never decoded."""
+    for path in sorted(path for path in results.rglob("*") if path.is_file()):
+        inside = path.relative_to(results).parts[:-1]
+        home = results / inside[0] if inside else results
+        ours = path.resolve() in listed or path.name.lower() == "readme.md"
+        if TEMPORARY.fullmatch(path.name):
+            problem = "a process was killed while it wrote this"
+            yield Finding("temporary", str(path), problem, "delete it when no run is alive")
+        elif SET_ASIDE in path.name:
+            problem = "a damaged result, kept when it was made again"
+            yield Finding("set-aside", str(path), problem, "delete it when nobody needs it")
+        elif path.suffix == ".raw":
+            yield from _undecoded(path)
+        elif not set(inside) & set(_NO_RESULTS) and not ours and (home / FOLDER).is_dir():
+            problem = "no stage has written this"
+            yield Finding("orphaned", str(path), problem, "move it elsewhere, or delete it")
+
+
+def _undecoded(raw: Path) -> Iterator[Finding]:
+    """A raw recording without its CSV."""
+    in_campaign = raw.parent.name == "raw"
+    table = raw.parent.parent / "recording.csv" if in_campaign else raw.with_suffix(".csv")
+    if table.is_file() and not table.read_bytes().startswith(b"# refused:"):
+        return
+    from pendpipe.acquisition.attempts import read_attempts
+
+    call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
+    problem, safe = f"there is no {table.name} of it", f"{call} makes it"
+    try:
+        if not read_attempts([raw]):
+            problem, safe = "it holds no scan", "delete it"
+    except InputError as fault:
+        problem, safe = fault.problem, fault.remedy
+    yield Finding("raw", str(raw), problem, safe)
+
+
+def _of_snakemake(folder: Path) -> Iterator[Finding]:
+    """Locks, and results that Snakemake knows to be unfinished."""
+    if any(folder.glob("locks/*")):
+        problem, safe = "a run was killed", "snakemake --unlock, then run again"
+        if not Path("/proc/self").exists():
+            problem = "a run is alive, or was killed"
+            safe = f"if no snakemake is alive in this folder: {safe}"
+        elif alive := _alive(folder.parent):
+            problem, safe = f"Snakemake is at work (process {alive})", "wait until it ends"
+        yield Finding("locked", str(folder / "locks"), problem, safe)
+    unfinished = sum(1 for path in folder.glob("incomplete/**/*") if path.is_file())
+    if unfinished:
+        problem = f"{unfinished} results were being written when a run was killed"
+        yield Finding("incomplete", str(folder / "incomplete"), problem, _RUN)
+
+
+def _alive(project: Path) -> int | None:
+    """Find a living Snakemake of a project, where the system shows its processes."""
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            there = (process / "cwd").resolve()
+        except OSError:
+            continue  # it has ended, or is somebody else's
+        if any(b"snakemake" in word for word in words[:3]) and there == project.resolve():
+            return int(process.name)
+    return None
