@@ -29,7 +29,7 @@ from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
 from pendpipe.diagnosis.task import Task, applicable, undrawn
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.oscillations import PlaneCoupling
+from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
 CHOICE: Final = 7.4
