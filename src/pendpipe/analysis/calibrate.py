@@ -6,8 +6,6 @@ Am. J. Phys. 72 (2004) 367, for errors that are independent of each other; witho
 in the angle it is ordinary (weighted) least squares.
 """
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path

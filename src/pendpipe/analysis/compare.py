@@ -1,7 +1,5 @@
 """A campaign's viscous losses beside Eq. 16: the drag's factor, C_H, the exponent of Eq. 11."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

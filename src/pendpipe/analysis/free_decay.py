@@ -8,8 +8,6 @@ repositioning, and every decay but the most telling one.
 A decay is a run of half cycles that follow one another.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """The step and the noise of a recording, from what no slow motion can touch."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

@@ -5,8 +5,6 @@ In air the loss is hysteretic, ``Q_hys = k f^2``. What a record measures is the 
 through Q against f^2 would weigh the records by errors that grow with Q itself.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan, pi

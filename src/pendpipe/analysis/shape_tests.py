@@ -1,7 +1,5 @@
 """How well a decay's shape is told: Eq. 14 beside a pure exponential, and the trap of tails."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What theory says of one pendulum in its fluid: inertia, Eq. 16, and the period's lengthening."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

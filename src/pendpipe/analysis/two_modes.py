@@ -1,7 +1,5 @@
 """Two modes that beat: their frequencies and losses, from the readings."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Final, NamedTuple

@@ -7,8 +7,6 @@ followed by moving it by its standard deviation and making the estimate again.
 Fits through all records take those shared errors into their covariance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple

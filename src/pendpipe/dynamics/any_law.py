@@ -11,8 +11,6 @@ compiled. The amplitude's equation is solved by Newton's method (a scalar linear
 integrated exactly), the time's by iteration, all half cycles together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ One of the arrays is the workspace: the engine allocates nothing. `FIELDS` decla
 each array of the engine lies.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 DEGREE: Final = 16

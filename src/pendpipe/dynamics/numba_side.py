@@ -3,8 +3,6 @@
 A tuple of two dozen arrays, each of seven numbers, would take the compiler most of a minute.
 """
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any
 

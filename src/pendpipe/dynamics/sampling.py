@@ -1,7 +1,5 @@
 """A motion read at given times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

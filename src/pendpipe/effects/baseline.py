@@ -3,8 +3,6 @@
 Of b = b_h + b_v one part, or both, may be held: then the share, or b as well, is not free.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Final

@@ -1,7 +1,5 @@
 """What changes of a model's values do to its readings, along the motion: responses, Jacobian."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The catalogue's page in the docs, made from the effects' own declarations."""
 
-from __future__ import annotations
-
 import inspect
 import math
 

@@ -1,7 +1,5 @@
 """All the figures of a campaign, and which of them could not be drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial

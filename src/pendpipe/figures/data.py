@@ -1,7 +1,5 @@
 """What the figures draw from: a campaign's numbers as arrays, and one record's decay."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

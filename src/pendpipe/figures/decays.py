@@ -3,8 +3,6 @@
 Each draws the law that was fitted, and names it in its key.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from typing import Final, NamedTuple

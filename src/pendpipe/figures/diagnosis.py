@@ -1,7 +1,5 @@
 """The figures of a diagnosis: where model and recording differ, before and after."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Callable, Mapping

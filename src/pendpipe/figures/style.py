@@ -4,8 +4,6 @@ Colour never carries a meaning alone: branches differ in their symbols too, curv
 dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps

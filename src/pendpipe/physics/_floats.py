@@ -1,7 +1,5 @@
 """The array types of the equations, and what turns arguments into them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeAlias

@@ -11,8 +11,6 @@ Thin boundary layers, which the usual factors assume, are a limit: at 5 to 25 pe
 a gap they are still off by some per cent.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np

@@ -21,8 +21,6 @@ dy'``. In the parts u, v (whose determinant is 1) this is
 integrals of products of exponentials (or of cos and sin) from 0 to t.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

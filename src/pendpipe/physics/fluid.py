@@ -5,8 +5,6 @@ L the distance from the axis to its centre, I the moment of inertia, delta the
 penetration depth (not the logarithmic decrement of Eq. 5).
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -4,8 +4,6 @@ Positions are measured along the rod from the axis, positive below it. A positio
 an array (a weight moved from record to record); everything broadcasts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias

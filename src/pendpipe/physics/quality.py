@@ -6,8 +6,6 @@ rest of the program by the first-order rates of Eq. 13, which need no y0:
     a = omega/(2 y0 Q_f0),  b = (omega/2)(1/Q_h + 1/Q_v),  c = omega y0/(2 Q_c0).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

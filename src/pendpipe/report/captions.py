@@ -1,7 +1,5 @@
 """The words of the page: a caption for each figure, and a glossary for students."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 

@@ -1,7 +1,5 @@
 """The campaign's numbers beside the paper's, and beside the truth where it was simulated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple

@@ -1,7 +1,5 @@
 """The page's tables: each record's numbers, light and remarks."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 The `[[effects]]` of a model file are read here: which of the catalogue, and how strong.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Angles of a pendulum with any effects of the catalogue, to the stop."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

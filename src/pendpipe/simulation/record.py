@@ -1,7 +1,5 @@
 """The truth behind a simulated record: from the apparatus to the volts at the converter."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """From a fit's numbers to its result: intervals, quality factors, warnings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple

@@ -1,7 +1,5 @@
 """The paper's way: Eq. 14 on the amplitudes of turning points, and a line through their times."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ compared with the decrement of the turning points, which needs no model, at the 
 middle and the smallest amplitude that was analysed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple

@@ -1,7 +1,5 @@
 """Parameters that the user holds (``--fix NAME=VALUE``)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Final

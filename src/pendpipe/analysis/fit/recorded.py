@@ -1,7 +1,5 @@
 """Fit one recording, by either method."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@ Turning points are counted, so that the phase of a law can't slip against them, 
 amplitude; no motion is fitted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from itertools import pairwise

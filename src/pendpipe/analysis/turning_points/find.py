@@ -4,8 +4,6 @@ Alternating extremes are numbered with no model of the motion; their times are s
 neighbours, and the half cycles followed into the tail.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple

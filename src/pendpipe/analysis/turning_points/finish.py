@@ -1,7 +1,5 @@
 """From measured half cycles to the table: the level under them, which are kept, their errors."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -7,8 +7,6 @@ function of the amplitude, that function is found first and put into the shape.
 Beyond 1.2 rad a turning point is measured by the readings next to it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Final

@@ -1,7 +1,5 @@
 """The readings that turning points are taken from, and what makes them unfit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ A new effect is a function declared by `enters` in one of these modules, or in a
 own: whatever is declared here is found.
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 import pkgutil
