@@ -5,17 +5,11 @@ at the 17 Chebyshev-Lobatto nodes, both ends among them; 17 are enough for 1e-12
 cycle of a pendulum with Q above about 30, and a panel that is not resolved is halved.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.layout import DEGREE
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
 
 
 def lobatto_nodes(degree: int) -> FloatArray:

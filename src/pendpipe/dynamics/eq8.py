@@ -1,13 +1,12 @@
 """Eq. 8: its constants, turning points and samples, and their derivatives by every parameter."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import address
 from pendpipe.dynamics.layout import (
     ADDRESSES,
@@ -19,9 +18,6 @@ from pendpipe.dynamics.layout import (
     work_size,
 )
 from pendpipe.dynamics.march import march
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
 
 RATES = ("quadratic", "hysteretic", "viscous", "coulomb")
 """The losses of Eq. 8, in the order of Eq. 13: a, the two parts of b, c."""

@@ -25,11 +25,11 @@ psi = 0 and pi whatever p is, so there is no jump in the friction to differentia
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import INTEGRATION_T
 from pendpipe.dynamics.kernel import kernel
-from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS
+from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS, Work
 from pendpipe.dynamics.panel import (
     BEND,
     BY_CENTRE,
@@ -65,10 +65,6 @@ from pendpipe.dynamics.panel import (
     time_nodes,
     unresolved,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.layout import Work
 
 
 @kernel

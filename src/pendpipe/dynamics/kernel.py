@@ -13,16 +13,14 @@ import functools
 import hashlib
 import os
 import sys
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar, overload
+from typing import Any, Final, TypeAlias, TypeVar, overload
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _F = TypeVar("_F", bound="Callable[..., Any]")
 

@@ -1,19 +1,15 @@
 """Keeping machine code that Numba has made: a file is written, and loaded by llvmlite alone."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import hashlib
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # What LLVM itself may call for, besides what the code declares.
 _LIBRARY = ("ceil", "cos", "exp", "log", "memcpy", "memmove", "memset", "sin")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.half_cycle import direct_half_cycle, emit, rest
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import (
@@ -15,6 +15,7 @@ from pendpipe.dynamics.layout import (
     RUNNING,
     SLOTS,
     STOPPED,
+    Work,
 )
 from pendpipe.dynamics.panel import (
     CURVATURE,
@@ -41,10 +42,6 @@ from pendpipe.dynamics.table import (
     points_for,
     widest,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.layout import Work
 
 
 @kernel

@@ -32,15 +32,12 @@ functions); w = psi for the linear torque, and at small amplitudes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import layout
 from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
 
 # Where in the flat workspace `node` the 17 values of each quantity begin. Flat, and the places
 # known to the compiler, so that it sees that they do not overlap and can vectorise.

@@ -9,12 +9,12 @@ at Chebyshev points in ln y, and all others are interpolated: every number of a 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.kernel import kernel
-from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS
+from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS, Work
 from pendpipe.dynamics.panel import (
     CURVATURE,
     amplitude_at,
@@ -23,10 +23,6 @@ from pendpipe.dynamics.panel import (
     panel_width,
     row_width,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.layout import Work
 
 _WIDEST, _FEW = 5.2, 0.31
 """The widest range of ln y that one table spans, and the share of it that few points resolve."""

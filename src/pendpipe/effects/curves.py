@@ -11,17 +11,15 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.effect import Effect, How, Pendulum, Span, subclass
 from pendpipe.effects.scan import phase_since_reversal
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
-    from pendpipe.dynamics.sampling import Sampled
 
 
 class Curve(Effect):

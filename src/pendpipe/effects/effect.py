@@ -1,23 +1,17 @@
 """What an effect declares of itself, once: for simulation, diagnosis, report and manual."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from inspect import get_annotations
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeVar, cast
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.eq8 import Eq8
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
-    from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.sampling import Sampled
 
 Kind = Literal["dynamics", "measurement", "parameter", "unnamed"]
 AnyEffect = TypeVar("AnyEffect", bound="Effect")

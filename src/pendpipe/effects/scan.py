@@ -1,20 +1,15 @@
 """What the scans and the shapes of several effects have in common."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from pendpipe.effects.effect import Effect, Parameter
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
-    from pendpipe.effects.effect import Pendulum, Span
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span
 
 
 def rows(*axes: Iterable[float]) -> list[tuple[float, ...]]:

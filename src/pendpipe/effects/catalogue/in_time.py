@@ -1,12 +1,13 @@
 """What has a time of its own: added oscillations; drifts, sudden changes, the release."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.effect import (
     Effect,
     Kick,
@@ -30,11 +31,6 @@ from pendpipe.effects.scan import (
     smooth_step,
     unusual_drift,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
-    from pendpipe.dynamics.sampling import Sampled
 
 
 def tone_at(cosine: float, sine: float, phase: FloatArray) -> FloatArray:

@@ -1,12 +1,12 @@
 """Losses: friction and drag that follow amplitude, velocity or history; dry contacts; a fluid."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects.effect import Parameter, Pendulum, Span, enters
 from pendpipe.effects.scan import (
     between,
@@ -15,10 +15,6 @@ from pendpipe.effects.scan import (
     rows,
     since_release,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
 
 
 @enters(

@@ -1,12 +1,12 @@
 """What stands between the motion and the file: sensor, time base, noise."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.catalogue.in_time import SteadyTone, tone_at, tried_frequencies
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, without_template
 from pendpipe.effects.scan import (
@@ -21,10 +21,6 @@ from pendpipe.effects.scan import (
     rows,
     unusual_drift,
 )
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.sampling import Sampled
 
 
 @enters(

@@ -1,17 +1,13 @@
 """Restoring torques other than omega^2 x."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters
-
-if TYPE_CHECKING:
-    from pendpipe.arrays import FloatArray
-    from pendpipe.dynamics.any_law import Motion
 
 
 @enters(
