@@ -106,15 +106,16 @@ class Eq8:
 
     def __post_init__(self) -> None:
         if self.restoring not in ("linear", "sine"):
-            message = f'restoring must be "linear" or "sine", not {self.restoring!r}'
-            raise ValueError(message)
+            raise ValueError(f'restoring must be "linear" or "sine", not {self.restoring!r}')
         if not 0.0 < self.angular_frequency < math.inf:
-            message = f"angular_frequency must be positive and finite, not {self.angular_frequency}"
-            raise ValueError(message)
+            raise ValueError(
+                f"angular_frequency must be positive and finite, not {self.angular_frequency}"
+            )
         for name in RATES:
             if not 0.0 <= getattr(self, name) < math.inf:
-                message = f"{name} must be finite and not negative, not {getattr(self, name)}"
-                raise ValueError(message)
+                raise ValueError(
+                    f"{name} must be finite and not negative, not {getattr(self, name)}"
+                )
 
     def rates(self) -> tuple[float, float, float, float]:
         """Return the losses in the order of `RATES`."""
@@ -204,8 +205,7 @@ class Release:
     def __post_init__(self) -> None:
         for name in ("time_s", "angle_rad", "offset_rad"):
             if not math.isfinite(getattr(self, name)):
-                message = f"{name} must be finite, not {getattr(self, name)}"
-                raise ValueError(message)
+                raise ValueError(f"{name} must be finite, not {getattr(self, name)}")
 
 
 _NONE: FloatArray = np.empty(0)
@@ -261,16 +261,13 @@ def turning_points(
         If there is no end to the motion asked for, or `model` is overdamped.
     """
     if count is None and until_s is None and model.coulomb == 0.0:
-        message = "give count or until_s: without Coulomb friction the motion has no end"
-        raise ValueError(message)
+        raise ValueError("give count or until_s: without Coulomb friction the motion has no end")
     if count is not None and count < 1:
-        message = f"count must be at least 1, not {count}"
-        raise ValueError(message)
+        raise ValueError(f"count must be at least 1, not {count}")
     most = _NO_LIMIT if count is None else count
     end_s = math.inf if until_s is None else until_s
     if not end_s >= release.time_s:
-        message = f"until_s is {end_s}, before the release at {release.time_s}"
-        raise ValueError(message)
+        raise ValueError(f"until_s is {end_s}, before the release at {release.time_s}")
     # Damping makes the half cycles fewer.
     half_cycles = (end_s - release.time_s) * model.angular_frequency / math.pi
     room = 1024 if math.isinf(end_s) else math.ceil(half_cycles) + 16
@@ -297,8 +294,7 @@ def turning_points_with_jacobian(
         (points, 8), with the columns `JACOBIAN_COLUMNS`.
     """
     if count < 1:
-        message = f"count must be at least 1, not {count}"
-        raise ValueError(message)
+        raise ValueError(f"count must be at least 1, not {count}")
     turning = np.empty((2 + 2 * _COLUMNS, count))
     found, stopped = _run(model, release, derivatives=True, most=count, turning=turning)
     turning = turning[:, :found]
@@ -358,15 +354,12 @@ def _checked_times(time_s: FloatArray, release: Release) -> FloatArray:
     """Return the times as the engine needs them."""
     times = np.ascontiguousarray(time_s, dtype=np.float64)
     if times.ndim != 1 or (times.size and not math.isfinite(times[0] + times[-1])):
-        message = "time_s must be one-dimensional and finite"
-        raise ValueError(message)
+        raise ValueError("time_s must be one-dimensional and finite")
     # Written so that a nan in the middle is found as well.
     if not (times[1:] >= times[:-1]).all():
-        message = "time_s must ascend"
-        raise ValueError(message)
+        raise ValueError("time_s must ascend")
     if times.size and times[0] < release.time_s:
-        message = f"time_s starts at {times[0]}, before the release at {release.time_s}"
-        raise ValueError(message)
+        raise ValueError(f"time_s starts at {times[0]}, before the release at {release.time_s}")
     return times
 
 
@@ -384,8 +377,9 @@ def _run(
 ) -> tuple[int, bool]:
     """Call the engine; return the number of turning points and whether the last is the stop."""
     if model.restoring == "sine" and not abs(release.angle_rad) < math.pi:
-        message = f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
-        raise ValueError(message)
+        raise ValueError(
+            f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
+        )
     if time_s is None:
         time_s = _NONE
     elif time_s.size == 0:
@@ -421,6 +415,7 @@ def _run(
     request += counts(rates, time_s.size, room, most)
     found, ending = divmod(march(np.array(request)), ENDINGS)
     if ending == OVERDAMPED:
-        message = f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
-        raise ValueError(message)
+        raise ValueError(
+            f"{model} is overdamped: it creeps towards its equilibrium and does not turn"
+        )
     return found, ending == STOPPED

@@ -90,8 +90,7 @@ class Kernel:
             elif argument.dtype == kind and argument.ndim == axes:
                 words += (address(argument), *argument.shape)
             else:
-                message = f"{self.__name__} needs an array of {kind} with {axes} axes"
-                raise TypeError(message)
+                raise TypeError(f"{self.__name__} needs an array of {kind} with {axes} axes")
         return self.machine_code(*words)
 
     @cached_property

@@ -89,25 +89,17 @@ def sphere_volume(radius_m: Numbers) -> FloatArray:
 
 def moment_of_inertia(parts: Sequence[Part]) -> FloatArray:
     """Moment of inertia of the parts about the axis in kg m^2, without any fluid."""
-    return plain(sum((_inertia(part) for part in parts), start=np.float64(0.0)))
+    return plain(sum(map(_inertia, parts)))
 
 
 def static_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of mass times position, M Delta of Eq. 7, in kg m."""
-    total: FloatArray = np.zeros(())
-    for part in parts:
-        mass, position = floats(part.mass_kg, _position(part))
-        total = total + mass * position
-    return plain(total)
+    return plain(sum(np.multiply(part.mass_kg, _position(part)) for part in parts))
 
 
 def displaced_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of displaced volume times position in m^4."""
-    total: FloatArray = np.zeros(())
-    for part in parts:
-        volume, position = floats(_displaced(part), _position(part))
-        total = total + volume * position
-    return plain(total)
+    return plain(sum(np.multiply(_displaced(part), _position(part)) for part in parts))
 
 
 def restoring_torque(
@@ -120,12 +112,10 @@ def restoring_torque(
     The second sum is the buoyancy of what is submerged. Negative where the pendulum
     would turn over.
     """
-    (gravity,) = floats(gravity_m_per_s2)
     moment = static_moment(parts)
     if fluid is not None:
-        (density,) = floats(fluid.density_kg_per_m3)
-        moment = moment - density * displaced_moment(parts)
-    return plain(gravity * moment)
+        moment = moment - np.multiply(fluid.density_kg_per_m3, displaced_moment(parts))
+    return plain(np.multiply(gravity_m_per_s2, moment))
 
 
 def added_inertia(
@@ -151,32 +141,29 @@ def added_inertia(
     total: FloatArray = np.zeros(())
     if fluid is None:
         return plain(total)
-    (density,) = floats(fluid.density_kg_per_m3)
+    density, viscosity = floats(*fluid)
     for part in parts:
         if isinstance(part, Sphere) and part.submerged:
             coefficient = (
                 np.float64(POTENTIAL_FLOW_ADDED_MASS)
                 if plain_added_mass
                 else added_mass_coefficient(
-                    part.radius_m, angular_frequency_per_s, fluid.viscosity_pa_s, density
+                    part.radius_m, angular_frequency_per_s, viscosity, density
                 )
             )
-            (centre,) = floats(part.centre_m)
-            total = total + coefficient * density * sphere_volume(part.radius_m) * centre**2
+            displaced = density * sphere_volume(part.radius_m)
+            total = total + coefficient * displaced * np.square(part.centre_m)
     return plain(total)
 
 
 def _inertia(part: Part) -> FloatArray:
     """Moment of inertia of one part about the axis."""
-    mass, position = floats(part.mass_kg, _position(part))
+    mass, squared = np.asarray(part.mass_kg), np.square(_position(part))
     if isinstance(part, Rod):
-        (length,) = floats(part.length_m)
-        return mass * (length**2 / 12.0 + position**2)
+        return mass * (np.square(part.length_m) / 12.0 + squared)
     if isinstance(part, Sphere):
-        (radius,) = floats(part.radius_m)
-        return mass * (0.4 * radius**2 + position**2)
-    (own,) = floats(part.own_inertia_kg_m2)
-    return mass * position**2 + own
+        return mass * (0.4 * np.square(part.radius_m) + squared)
+    return mass * squared + np.asarray(part.own_inertia_kg_m2)
 
 
 def _position(part: Part) -> Numbers:

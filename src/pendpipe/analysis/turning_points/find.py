@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.turning_points.finish import State, finished, kept, last_seen
+from pendpipe.analysis.turning_points.finish import finished, kept, last_seen
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
 from pendpipe.analysis.turning_points.long_records import BLOCK, in_blocks
 from pendpipe.analysis.turning_points.loops import count_half_cycles, find_extremes, smooth_times
@@ -182,8 +182,7 @@ def follow_tail(
         if count < 1:
             return places, measured
         new = _further(places, measured, samples.noise_rms, count)
-        shape = np.zeros((count, 4 + HARMONICS))
-        tried = measure(samples, new, level, shape)
+        tried = measure(samples, new, level, np.zeros((count, 4 + HARMONICS)))
         if not _visible(tried, samples.noise_rms):
             return places, measured
         places = Places._make(np.concatenate(pair) for pair in zip(places, new, strict=True))
@@ -254,11 +253,10 @@ def _of_piece(samples: Samples, place: str | Path) -> TurningPoints:
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))
-    state = State(samples, places, measured, shape, rates, level)
-    keep = kept(state)
+    keep = kept(samples, places, measured)
     if keep.sum() < 3:
         raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
-    return finished(state, keep)
+    return finished(samples, places, measured, shape, rates, level, keep)
 
 
 def _too_few(samples: Samples, found: int) -> tuple[str, str]:
@@ -270,17 +268,12 @@ def _too_few(samples: Samples, found: int) -> tuple[str, str]:
     return f"fewer than three half cycles ({found} turning points)", "record longer"
 
 
-def _plain(number: int) -> FloatArray:
-    """The shape of a half cycle without losses: a cosine."""
-    return np.zeros((number, 4 + HARMONICS))
-
-
 def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measured]:
     """Lock on to the half cycles with a bare cosine, and follow them into the tail."""
     places, steps = first_places(rough), 3
     while True:
-        shape = _plain(len(places.number))
-        measured = measure(samples, places, rough.level, shape, stride=stride)
+        cosine = np.zeros((len(places.number), 4 + HARMONICS))
+        measured = measure(samples, places, rough.level, cosine, stride=stride)
         late = measured.phase(samples.noise_rms)[~measured.one_sided]
         places = resmoothed(places, measured, samples.noise_rms)
         if np.nanmax(np.abs(late), initial=0.0) < _LOCKED or (steps := steps - 1) == 0:

@@ -134,32 +134,27 @@ _SEEN: Final = 3.0
 """Standard deviations by which the last half cycle must stand out, with its neighbours."""
 
 
-class State(NamedTuple):
-    """All that is known before the table is made."""
-
-    samples: Samples
-    places: Places
-    measured: Measured
-    shape: FloatArray
-    rates: FloatArray
-    start: float
-    """The level that the half cycles were measured at."""
-
-
-def finished(state: State, keep: BoolArray) -> TurningPoints:
-    """Put level, amplitude and time together."""
-    samples, places, measured = state.samples, state.places, state.measured
+def finished(
+    samples: Samples,
+    places: Places,
+    measured: Measured,
+    shape: FloatArray,
+    rates: FloatArray,
+    start: float,
+    keep: BoolArray,
+) -> TurningPoints:
+    """Put level, amplitude and time together; `start` is the level of the measurement."""
     noise = samples.noise_rms
-    level = estimate_level(measured.information[keep], measured.score[keep], noise, state.start)
+    level = estimate_level(measured.information[keep], measured.score[keep], noise, start)
     side, rate = places.side[keep], places.angular_frequency[keep]
     coupling, sine = measured.coupling[keep], measured.sine[keep]
-    amplitude = measured.amplitude[keep] - side * coupling * (level.value - state.start)
+    amplitude = measured.amplitude[keep] - side * coupling * (level.value - start)
     sd = noise * np.sqrt(measured.variance[keep])
     sine_sd = noise * np.sqrt(measured.sine_variance[keep])
-    height = 1.0 + state.shape[keep, 4:].sum(axis=1)
+    height = 1.0 + shape[keep, 4:].sum(axis=1)
     turned = (amplitude + _late(amplitude, sine, sd, sine_sd)) * height
     clear = np.maximum(np.abs(amplitude), sd)
-    relative, phase = shape_error(clear, rate, state.rates)
+    relative, phase = shape_error(clear, rate, rates)
     # A period that changes from one half cycle to the next skews the wave about its turning.
     skew = np.where(measured.single | measured.one_sided, places.unsteady_phase, 0.0)[keep]
     relative, phase = np.hypot(relative, 0.1 * skew**2), np.hypot(phase, 0.1 * skew**2)
@@ -193,14 +188,12 @@ def _late(
     return np.where(strong, lost, 0.0)
 
 
-def kept(state: State) -> BoolArray:
+def kept(samples: Samples, places: Places, measured: Measured) -> BoolArray:
     """Half cycles that hold enough readings, and whose turning lies among the readings.
 
     A record that ends at rest ends here with the last half cycle that is seen.
     """
-    samples, places, measured = state.samples, state.places, state.measured
-    turning = places.centre_s
-    slack = 0.02 * places.half_period_s
+    turning, slack = places.centre_s, 0.02 * places.half_period_s
     inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
     keep = inside & (measured.coverage > _LEAST_SHARE * _usual(measured.coverage))
     keep[last_seen(measured, samples.noise_rms) + 1 :] = False

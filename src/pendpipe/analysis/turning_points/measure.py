@@ -26,24 +26,16 @@ _COSINE, _READING = ROWS - 2, ROWS - 1
 def cosine_sine(phase: float) -> tuple[float, float]:
     """Cosine and sine for |phase| < 2, to 1e-9: fast, since no range is reduced."""
     square = phase * phase
-    cosine = 1.0 / 20922789888000.0
-    cosine = cosine * square - 1.0 / 87178291200.0
-    cosine = cosine * square + 1.0 / 479001600.0
-    cosine = cosine * square - 1.0 / 3628800.0
-    cosine = cosine * square + 1.0 / 40320.0
-    cosine = cosine * square - 1.0 / 720.0
-    cosine = cosine * square + 1.0 / 24.0
-    cosine = cosine * square - 0.5
-    cosine = cosine * square + 1.0
-    sine = 1.0 / 1307674368000.0
-    sine = -sine * square + 1.0 / 6227020800.0
-    sine = sine * square - 1.0 / 39916800.0
-    sine = sine * square + 1.0 / 362880.0
-    sine = sine * square - 1.0 / 5040.0
-    sine = sine * square + 1.0 / 120.0
-    sine = sine * square - 1.0 / 6.0
-    sine = (sine * square + 1.0) * phase
-    return cosine, sine
+    # Each line adds two terms of the series, 1/n! with alternating signs.
+    cosine = (square / 20922789888000.0 - 1.0 / 87178291200.0) * square + 1.0 / 479001600.0
+    cosine = (cosine * square - 1.0 / 3628800.0) * square + 1.0 / 40320.0
+    cosine = (cosine * square - 1.0 / 720.0) * square + 1.0 / 24.0
+    cosine = (cosine * square - 0.5) * square + 1.0
+    sine = 1.0 / 6227020800.0 - square / 1307674368000.0
+    sine = (sine * square - 1.0 / 39916800.0) * square + 1.0 / 362880.0
+    sine = (sine * square - 1.0 / 5040.0) * square + 1.0 / 120.0
+    sine = (sine * square - 1.0 / 6.0) * square + 1.0
+    return cosine, sine * phase
 
 
 @kernel(any_order=True)
