@@ -58,10 +58,9 @@ def calibrated(random: np.random.Generator) -> Any:
 
 def one_campaign(tracks: list[Track], seed: list[int], method: str = "waveform") -> Pulls:
     """Record, fit, separate and compare once; the sphere is measured anew with its errors."""
-    from pendpipe.analysis.compare import compare
+    from pendpipe.analysis.compare import SharedErrors, Surroundings, compare
     from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, separate
-    from pendpipe.analysis.viscous import SharedErrors, Surroundings
     from pendpipe.estimate import Estimate
     from pendpipe.recording import Recording
 

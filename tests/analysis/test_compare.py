@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pendpipe import physics
-from pendpipe.analysis.compare import Comparison, compare
+from pendpipe.analysis.compare import Comparison, SharedErrors, Surroundings, compare
 from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, separate
-from pendpipe.analysis.viscous import SharedErrors, Surroundings
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate
 

@@ -76,18 +76,17 @@ class Branch(NamedTuple):
     name: str
     colour: str
     marker: str
-    dashes: str
 
 
 BRANCHES: Final = {
-    "high": Branch("high branch (lower weight alone)", BLUE, "o", "-"),
-    "low": Branch("low branch (pair of weights)", GREEN, "s", "-"),
+    "high": Branch("high branch (lower weight alone)", BLUE, "o"),
+    "low": Branch("low branch (pair of weights)", GREEN, "s"),
 }
 
 
 def branch(name: str) -> Branch:
     """The look of a branch; one that the paper does not have is drawn in grey."""
-    return BRANCHES.get(name, Branch(name or "no branch", GREY, "^", "-"))
+    return BRANCHES.get(name, Branch(name or "no branch", GREY, "^"))
 
 
 def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:

@@ -8,11 +8,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.compare import Comparison, compare
+from pendpipe.analysis.compare import (
+    Comparison,
+    SharedErrors,
+    SharedEstimate,
+    Surroundings,
+    compare,
+)
 from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.analysis.viscous import SharedErrors, SharedEstimate, Surroundings
 from pendpipe.arguments import add, load
 from pendpipe.campaign.design import design_of
 from pendpipe.campaign.joint import InertiaSds, inertia_sds, joint_values

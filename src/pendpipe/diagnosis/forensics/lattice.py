@@ -179,7 +179,7 @@ def whole_readings(data: Data, samples: Samples) -> slice | None:
 def noise_before_rounding(local: Local, step: float) -> float:
     """Estimate the noise before rounding by maximum likelihood, from P(code).
 
-    The likelihood is that of `analysis.fit.waveform`, but the true angle comes from local fits and
+    The likelihood is that of `fit.by_waveform`, but the true angle comes from local fits and
     has their noise. So each reading has its own standard deviation, and outliers (glitches) are
     left out.
 
