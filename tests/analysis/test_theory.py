@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.analysis.theory import Surroundings, theory_curve
+from pendpipe.analysis.theory import theory_curve
 from pendpipe.physics import Fluid, Rod, Sphere
 
-WATER = Surroundings(Fluid(998.0, 1.0e-3), 9.81)
+WATER = Fluid(998.0, 1.0e-3), 9.81
 ROD = Rod(0.2, 0.8, 0.3)
 BALL = Sphere(0.3, 0.02, 0.7, submerged=True)
 
 
 def test_the_history_term_divides_q_by_one_and_a_over_delta() -> None:
-    curve = theory_curve([ROD, BALL], WATER)
+    curve = theory_curve([ROD, BALL], *WATER)
     assert curve is not None
     delta = np.sqrt(2.0 * 1.0e-3 / (998.0 * 2.0 * np.pi * curve.frequency_hz))
     assert curve.radius_over_depth == pytest.approx(BALL.radius_m / delta)
@@ -28,5 +28,5 @@ def test_the_history_term_divides_q_by_one_and_a_over_delta() -> None:
 
 
 def test_without_a_submerged_sphere_there_is_no_theory() -> None:
-    assert theory_curve([ROD, replace(BALL, submerged=False)], WATER) is None
-    assert theory_curve([ROD], WATER) is None
+    assert theory_curve([ROD, replace(BALL, submerged=False)], *WATER) is None
+    assert theory_curve([ROD], *WATER) is None

@@ -1,7 +1,6 @@
 """What theory says of one pendulum in its fluid: inertia, Eq. 16, and the period's lengthening."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,15 +21,6 @@ class TheoryCurve(NamedTuple):
     lengthening: physics.Lengthening
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What a pendulum's theory needs beside its parts."""
-
-    fluid: Fluid
-    gravity_m_per_s2: float
-    plain_added_mass: bool = False
-
-
 def submerged_sphere(parts: Sequence[Part]) -> Sphere | None:
     """The sphere that swings in the fluid, where there is one."""
     for part in parts:
@@ -39,15 +29,17 @@ def submerged_sphere(parts: Sequence[Part]) -> Sphere | None:
     return None
 
 
-def theory_curve(parts: Sequence[Part], around: Surroundings) -> TheoryCurve | None:
+def theory_curve(
+    parts: Sequence[Part], fluid: Fluid, gravity_m_per_s2: float, *, plain_added_mass: bool = False
+) -> TheoryCurve | None:
     """Theory of a pendulum, or of many: the parts' positions may be arrays.
 
     Parameters
     ----------
     parts
         The pendulum's parts; one of them a submerged sphere, or there is no theory.
-    around
-        Fluid, gravity, form of the added mass.
+    fluid, gravity_m_per_s2, plain_added_mass
+        As in `pendpipe.physics.swing`.
 
     Returns
     -------
@@ -58,10 +50,8 @@ def theory_curve(parts: Sequence[Part], around: Surroundings) -> TheoryCurve | N
     sphere = submerged_sphere(parts)
     if sphere is None:
         return None
-    moving = physics.swing(
-        parts, around.fluid, around.gravity_m_per_s2, plain_added_mass=around.plain_added_mass
-    )
-    density, viscosity = around.fluid
+    moving = physics.swing(parts, fluid, gravity_m_per_s2, plain_added_mass=plain_added_mass)
+    density, viscosity = fluid
     oscillating, steady = (
         physics.viscous_quality_factor(
             moving.moment_of_inertia_kg_m2,
@@ -83,8 +73,8 @@ def theory_curve(parts: Sequence[Part], around: Surroundings) -> TheoryCurve | N
         radius_over_depth=np.atleast_1d(np.divide(sphere.radius_m, depth)),
         lengthening=physics.period_lengthening(
             parts,
-            around.fluid,
-            around.gravity_m_per_s2,
-            plain_added_mass=around.plain_added_mass,
+            fluid,
+            gravity_m_per_s2,
+            plain_added_mass=plain_added_mass,
         ),
     )

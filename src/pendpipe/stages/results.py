@@ -9,7 +9,7 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.analysis.fit.result import FitResult, read_fit
-from pendpipe.analysis.theory import Surroundings, TheoryCurve, theory_curve
+from pendpipe.analysis.theory import TheoryCurve, theory_curve
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design, design_of
 from pendpipe.campaign.fit import Measured, measured
@@ -119,7 +119,7 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
         "moment_of_inertia_kg_m2": float(built.swing.moment_of_inertia_kg_m2),
         "restoring_torque_n_m_per_rad": float(built.swing.restoring_torque_n_m_per_rad),
     }
-    curve = theory_curve(built.parts, _surroundings(campaign, built.fluid))
+    curve = _theory(campaign, built.parts, built.fluid)
     return content | (_as_numbers(curve) if curve else {})
 
 
@@ -135,16 +135,19 @@ def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | N
         return None
     parts = pendulum_parts(apparatus, _moved(geometries), sphere=True)
     fluid = fluid_at(campaign.configuration.fluids[records[0].fluid], records[0].temperature_c)
-    curve = theory_curve(parts, _surroundings(campaign, fluid))
+    curve = _theory(campaign, parts, fluid)
     assert curve is not None
     order = np.argsort(curve.frequency_hz)
     return {name: np.asarray(values)[order].tolist() for name, values in _columns(curve).items()}
 
 
-def _surroundings(campaign: Campaign, fluid: physics.Fluid) -> Surroundings:
+def _theory(
+    campaign: Campaign, parts: Sequence[physics.Part], fluid: physics.Fluid
+) -> TheoryCurve | None:
     apparatus = campaign.configuration.apparatus
     assert apparatus is not None
-    return Surroundings(fluid, apparatus.gravity_m_per_s2, apparatus.added_mass == "plain")
+    plain = apparatus.added_mass == "plain"
+    return theory_curve(parts, fluid, apparatus.gravity_m_per_s2, plain_added_mass=plain)
 
 
 def _moved(geometries: Sequence[Geometry]) -> dict[str, FloatArray]:
