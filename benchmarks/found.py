@@ -172,9 +172,8 @@ def main() -> None:
 
 def print_second_test(path: Any) -> None:
     """Print the second test of one recording."""
-    from pendpipe.analysis.turning_points.recorded import measure_recording
-
     import pendpipe as pp
+    from pendpipe.analysis.free_decay import measure_recording
 
     _, part = measure_recording(pp.read(path).as_motion(), path)
     samples = prepare(part, path)
