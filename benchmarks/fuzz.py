@@ -52,6 +52,7 @@ from pendpipe.acquisition.drivers.decoders import SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
+from pendpipe.formats.writing import windaq_hires
 from pendpipe.recording import Recording, check
 
 Mutation = Callable[[bytearray, Random], None]
@@ -290,7 +291,7 @@ def _hold(recording: Recording) -> None:
 
 
 def run_file(case: Case) -> bool:
-    """Read a file; inspect every other; whether it was readable."""
+    """Read a file and write it for WinDaq; inspect every other; whether it was readable."""
     path = _folder() / f"fuzzed{case.suffix}"
     path.write_bytes(case.data)
     readable = False
@@ -301,6 +302,10 @@ def run_file(case: Case) -> bool:
     else:
         readable = True
         _hold(recording)
+        try:
+            windaq_hires("out.wdh", recording)
+        except InputError as fault:
+            _one_line(fault)
     if len(case.data) % 2:
         return readable
     try:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / ".evidence"
 READERS = (
     "pendpipe.acquisition.simulated",
-    "pendpipe.formats",
+    "pendpipe.formats.writing",
     "src/pendpipe/formats/*.py",
     "benchmarks/fuzz*.py",
     "benchmarks/acquisition*.py",

@@ -314,25 +314,6 @@ def plain_lines(recording: Recording) -> Iterator[str]:
         yield ",".join(row) + "\n"
 
 
-_READ_ONLY: Final = (".wdq", ".wdh", ".wdc", ".whc", ".mat", ".xlsx", ".xls")
-
-
-def check_name(path: str | Path) -> None:
-    """Refuse, before anything is recorded, a name that promises a form which is only read.
-
-    Raises
-    ------
-    InputError
-        On the names of WinDaq, MATLAB and Excel.
-    """
-    refuse_if(
-        Path(path).suffix.lower() in _READ_ONLY,
-        path,
-        "this form is read, not written",
-        "name it OUT.csv",
-    )
-
-
 def write_plain(path: str | Path, recording: Recording) -> None:
     """Write the plain CSV form: metadata lines, header, a row a sample, all digits."""
     with replaced(path) as stream:

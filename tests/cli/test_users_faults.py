@@ -108,16 +108,3 @@ def test_a_fault_in_a_worker_process_arrives_as_it_was(kind: type[InputError]) -
     fault = kind("a.csv, line 7", "time_s falls", "sort the rows")
     there = pickle.loads(pickle.dumps(fault))
     assert (type(there), str(there)) == (kind, str(fault))
-
-
-@pytest.mark.parametrize("name", ["out.WDQ", "out.wdh", "out.mat", "out.xlsx"])
-def test_a_form_that_is_only_read_is_refused_before_anything_is_done(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for words in (
-        ["convert", str(tmp_path / "nowhere.csv"), str(tmp_path / name)],
-        ["acquire", "--device", "simulated:di2108", "--out", str(tmp_path / name)],
-    ):
-        status, error = called(words, capsys)
-        assert (status, "this form is read, not written" in error) == (2, True)
-    assert not list(tmp_path.iterdir())

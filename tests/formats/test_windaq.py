@@ -68,17 +68,6 @@ def test_markers_carry_their_comments(tmp_path: Path) -> None:
     ]
 
 
-def test_a_comment_gives_a_pause_exactly_unless_its_stamp_contradicts_it(tmp_path: Path) -> None:
-    texts = b"gap 113.250000000 s\0gap 7.000000000 s\0"
-    first, second = (place + 1 - (1 << 31) for place in (0, 20))
-    events = [0, 0, 600, 115, first, 1000, 116, second]
-    content = WindaqFile(COUNTS, hires=True, events=events, comments=texts)
-    time_s = np.arange(len(COUNTS)) * 0.004
-    time_s[600:] += 113.25
-    found = read(write(tmp_path / "a.WDH", content))
-    np.testing.assert_allclose(found.time_s, time_s, atol=1e-9)
-
-
 def test_hires_pointers_count_samples(tmp_path: Path) -> None:
     content = WindaqFile(TWO, hires=True, events=[0, 0, -1000])
     assert inspect(write(tmp_path / "a.WDH", content)).markers[1].sample == 500

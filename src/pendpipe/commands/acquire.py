@@ -51,7 +51,7 @@ _FLAGS: Final[Flags] = {
         "metavar": "S",
         "help": "how long a device that was unplugged is waited for (30)",
     },
-    "--out": {"metavar": "FILE", "help": "the recording, plain form"},
+    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"},
     "--raw": {
         "metavar": "FILE",
         "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
@@ -123,7 +123,7 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
 def _record(arguments: argparse.Namespace) -> int:
     """Record, or write what an earlier call has recorded and could not write."""
     from pendpipe.acquisition import attempts
-    from pendpipe.recording import check_name, write_plain
+    from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
     check_name(out)
@@ -154,10 +154,10 @@ def _record(arguments: argparse.Namespace) -> int:
         _from_device(arguments, raw)
     recording = attempts.decode_attempt(raw, out.parent, arguments.channel)
     with attempts.kept_in(raw, out):
-        write_plain(out, recording)
+        lost = write(out, recording)
     if not arguments.recover:
         attempts.mark_saved(raw, out)
-    for note in recording.notes:
+    for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
     print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")

@@ -1,4 +1,4 @@
-"""Write any supported recording in the plain CSV form."""
+"""Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
 
 import argparse
 import sys
@@ -14,14 +14,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "out",
         metavar="OUT",
         type=Path,
-        help="OUT.csv, the plain form; - is standard output",
+        help="OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
     )
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
-    from pendpipe.recording import check_name, plain_lines, write_plain
+    from pendpipe.formats.writing import check_name, write
+    from pendpipe.recording import plain_lines
 
     piped = str(arguments.out) == "-"
     if not piped:
@@ -31,5 +32,6 @@ def run(arguments: argparse.Namespace) -> None:
     if piped:
         sys.stdout.writelines(plain_lines(recording))
         return
-    write_plain(arguments.out, recording)
+    for note in write(arguments.out, recording):
+        print(f"{arguments.out}: {note}", file=sys.stderr)
     print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")
