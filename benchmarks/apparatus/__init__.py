@@ -6,5 +6,8 @@ Encoders, cameras and converters, torsion wheels and pendulums that swing up to 
 laws of the catalogue, laws out of it, faults of sensors and clocks. It was written from the laws,
 the file format and recordings of real apparatus, without a look at the diagnosis or at the
 challenge's generator, and shares no code with the library. Changes after the diagnosis has met a
-set are corrections of errors, and are listed here: none so far.
+set are corrections of errors, and are listed here:
+
+* a reading between a turn and the next point of the grid had the turning point before, so that play
+  in a sensor's coupling made single wrong readings (seen in the set `trial2`).
 """

@@ -154,7 +154,11 @@ class Scene:
         for shift in world.clock:
             at = at + shift(stamps)
         place = np.clip(np.searchsorted(world.grid, at, side="right") - 1, 0, len(turns) - 1)
-        seen = Seen(stamps, angle, angle(at), angle(at, 1), other(at), turns[place])
+        velocity = angle(at, 1)
+        # Between a turn and the next point of the grid the turning point is the next point's.
+        turned = np.sign(velocity) != np.sign(states[place, 1])
+        place = np.minimum(place + turned, len(turns) - 1)
+        seen = Seen(stamps, angle, angle(at), velocity, other(at), turns[place])
         y = seen.x.copy()
         for read in world.readings:
             y = read(seen, y)
