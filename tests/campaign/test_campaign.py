@@ -9,7 +9,7 @@ from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import Candidate, candidates, joint_fit, named, predict
 from pendpipe.campaign.joint import coefficient, inertia_errors, joint_values, loss_torques, only
 from pendpipe.campaign.next_measurement import next_measurements
-from pendpipe.campaign.walls import Surface, confined
+from pendpipe.campaign.walls import Surface, confined, height_sd
 
 from .campaigns import data, default
 
@@ -213,23 +213,51 @@ def test_a_branch_is_a_shape() -> None:
 
 
 @pytest.mark.parametrize("surface", ["slip", "film"])
-def test_walls_between_the_computed_ones_are_those_of_the_tank(surface: Surface) -> None:
+@pytest.mark.parametrize("higher", [0.0, 0.03, -0.05])
+def test_walls_between_the_computed_ones_are_those_of_the_tank(
+    surface: Surface, higher: float
+) -> None:
     tank = default().apparatus.tank
     assert tank is not None
     for close, depth in ((0.05, 0.04), (0.2, 0.1), (0.35, 0.03)):
         deep = 2.0 * close ** (-1.0 / 3.0)
         exact = physics.sphere_in_tank(
             1.0,
-            deep / 2.0,
+            deep * (0.5 + higher),
             depth,
-            surface_m=deep / 2.0,
+            surface_m=deep * (0.5 - higher),
             length_m=deep * tank.length_m / tank.depth_m,
             width_m=deep * tank.width_m / tank.depth_m,
+            off_centre_m=deep * tank.off_centre_m / tank.depth_m,
             surface=surface,
         )
-        drag, mass = confined(tank, surface, np.array(close), np.array(depth))
+        drag, mass = confined(tank, surface, np.array(close), np.array(depth), np.array(higher))
         assert drag == pytest.approx(exact.drag_factor, abs=0.004)
         assert mass + 0.5 + 2.25 * depth == pytest.approx(exact.added_mass_coefficient, abs=0.004)
+
+
+def test_a_sphere_that_hangs_low_has_walls_too() -> None:
+    tank = default().apparatus.tank
+    assert tank is not None
+    low = tank.model_copy(update={"height_m": 0.3 * tank.depth_m})
+    half = confined(tank, "slip", np.array(0.15), np.array(0.05))[0]
+    assert confined(low, "slip", np.array(0.15), np.array(0.05))[0] > half
+    assert height_sd(tank) == pytest.approx(0.06)
+    assert height_sd(low) == pytest.approx(np.hypot(0.06, 0.3 * 0.06))
+
+
+def test_the_height_in_the_tank_is_uncertain_and_matters_near_walls_only() -> None:
+    design = default()
+    walls = Candidate(CATALOGUE["wall-confinement"], "film")
+    row = [each.name for each in design.nuisances].index("height in the tank")
+    at = np.zeros(len(design.nuisances) + 1)
+    moved = at.copy()
+    moved[row] = 1.0
+    assert np.array_equal(predict(design, (walls,), at), predict(design, (walls,), moved))
+    at[-1] = moved[-1] = 2.0
+    changed = predict(design, (walls,), at) != predict(design, (walls,), moved)
+    assert changed[design.wet > 0.0].all()
+    assert not changed[design.wet == 0.0].any()
 
 
 def test_a_sphere_far_from_all_walls_is_free() -> None:

@@ -211,6 +211,36 @@ def test_fast_sphere_finds_no_stress_at_the_surface_and_a_slow_one_a_lid() -> No
     assert slow.force_factor == pytest.approx(slip.force_factor, rel=1e-6)
 
 
+def test_side_walls_act_as_the_images_of_the_dipole_in_them() -> None:
+    from pendpipe.physics.confinement import _side_images
+
+    length, width, aside = 0.2, 0.11, 0.015
+    n, m = np.arange(-3000, 3001)[:, None], np.arange(-3000, 3001)
+    x, y = n * length, m * width - np.where(m % 2, 2.0 * aside, 0.0)
+    square = np.where((n == 0) & (m == 0), np.inf, x**2 + y**2)
+    # The rows farther and farther along cancel in pairs: half the last ones.
+    weight = np.where(np.abs(n) == 3000, 0.5, 1.0) * (-1.0) ** n
+    direct = np.sum(weight * (y**2 - x**2) / square**2)
+    assert _side_images(length, width, aside) == pytest.approx(direct, rel=1e-3)
+
+
+def test_left_and_right_of_the_middle_are_the_same_and_a_near_side_wall_adds() -> None:
+    def force(aside: float) -> complex:
+        return sphere_in_tank(
+            RADIUS,
+            HALF,
+            5e-4,
+            surface_m=HALF,
+            length_m=0.23,
+            width_m=0.11,
+            off_centre_m=aside,
+            angular_frequency_per_s=5.0,
+        ).force_factor
+
+    assert force(0.015) == pytest.approx(force(-0.015), rel=1e-12)
+    assert force(0.0).real < force(0.015).real < force(0.03).real
+
+
 def test_large_tank_is_two_planes() -> None:
     wide = sphere_in_tank(
         RADIUS, HALF, 5e-4, surface_m=HALF, length_m=90.0, width_m=90.0, surface="film"
@@ -230,3 +260,7 @@ def test_walls_inside_the_sphere_are_refused() -> None:
         concentric_sphere(0.02, 0.019, 1e-3)
     with pytest.raises(ValueError, match="side walls"):
         sphere_in_tank(0.02, 0.03, 1e-3, surface_m=0.03, length_m=0.2, width_m=0.03)
+    with pytest.raises(ValueError, match="side walls"):
+        sphere_in_tank(
+            0.02, 0.03, 1e-3, surface_m=0.03, length_m=0.2, width_m=0.06, off_centre_m=0.02
+        )

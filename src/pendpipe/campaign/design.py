@@ -17,6 +17,7 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.campaign.walls import height_sd
 from pendpipe.configuration.apparatus import fluid_at
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Apparatus, Fluid
@@ -93,6 +94,8 @@ class Inputs:
     air_drag: FloatArray
     log_coefficient: FloatArray
     inertia_exponent: FloatArray
+    higher: FloatArray
+    """Of the sphere in the tank, in depths of the fluid."""
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,8 @@ class Design:
                 Nuisance("radius of the sphere", "m", sphere.diameter_sd_m / 2),
                 Nuisance("lever of the sphere", "m", sphere.distance_sd_m),
             ]
+            if own.tank is not None and any(run.tank for run in self.runs):
+                found.append(Nuisance("height in the tank", "depths", height_sd(own.tank)))
         if wet:
             found.append(Nuisance("thermometer", "K", max(f.temperature_sd_k for f in wet)))
             found.append(
@@ -237,6 +242,7 @@ class Design:
             - ratio,
             inertia_exponent=own.hysteresis.inertia_exponent
             + deviation("exponent of the loss torque"),
+            higher=deviation("height in the tank"),
         )
 
     def fluids(self, warmer_k: FloatArray) -> tuple[FloatArray, FloatArray]:

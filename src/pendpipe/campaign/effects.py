@@ -186,7 +186,8 @@ def walls(terms: Terms, size: FloatArray, design: Design, shape: Surface) -> Ter
     """Walls, floor and surface: the fluid goes faster past the sphere.
 
     Drag and added mass grow together. The closeness is s^3 with H the depth of a tank of the
-    given one's proportions; its surface is clean ("slip") or a film.
+    given one's proportions, in which the sphere's height is uncertain; its surface is clean
+    ("slip") or a film.
     """
     assert design.apparatus.tank is not None
     near = np.where([run.tank for run in design.runs], size, 0.0)
@@ -194,7 +195,8 @@ def walls(terms: Terms, size: FloatArray, design: Design, shape: Surface) -> Ter
     around = viscosity * (1.0 + terms.inputs.thicker), np.where(density > 0.0, density, 1.0)
     radius = terms.inputs.radius_m
     depth = physics.penetration_depth(terms.angular_frequency, *around) / radius
-    drag, mass = confined(design.apparatus.tank, shape, near, np.minimum(depth, DEPTHS[-1]))
+    thick = np.minimum(depth, DEPTHS[-1])
+    drag, mass = confined(design.apparatus.tank, shape, near, thick, terms.inputs.higher)
     # The memory's own inertia grows with its drag; the rest is the potential flow's.
     other = mass - 2.25 * depth * (drag - 1.0)
     return replace(

@@ -21,12 +21,17 @@ _ORDER: Final = 10
 
 
 def confined(
-    tank: Tank, surface: Surface, closeness: FloatArray, depth: FloatArray
+    tank: Tank,
+    surface: Surface,
+    closeness: FloatArray,
+    depth: FloatArray,
+    higher: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """Drag over that of Eq. 2, and added mass above that without walls.
 
     Tanks of the given one's proportions, from far away (closeness 0) to close: the excesses are a
-    polynomial in the closeness and in delta/a that goes through `physics.sphere_in_tank`.
+    polynomial in the closeness and in delta/a that goes through `physics.sphere_in_tank`, and a
+    parabola in the height of the sphere.
 
     Parameters
     ----------
@@ -35,20 +40,59 @@ def confined(
     surface
         ``"slip"`` (a level surface that is clean) or ``"film"`` (a lid, or a contaminated one).
     closeness
-        (2 a/H)^3 with H the depth of the fluid.
+        (2 a/H)^3 with H the depth of the fluid; walls nearer than the closest computed count
+        as these.
     depth
         delta/a; broadcasts with the closeness.
+    higher
+        Height of the sphere above the configured one, in depths of the fluid; broadcasts too.
 
     Returns
     -------
     drag, mass
         The drag's factor; the added mass less ``1/2 + 9 delta/(4 a)``, in the displaced fluid.
     """
+    nodes = _nodes(tank)
+    step = max(float(nodes[1] - nodes[0]), 1e-9)
+    scale = _closest(tank)
+    rows = _powers(*np.broadcast_arrays(np.minimum(closeness / scale, 1.0), depth))
+    proportions = tuple(
+        size / tank.depth_m for size in (tank.length_m, tank.width_m, tank.off_centre_m)
+    )
+    up = np.asarray(higher) / step
+    weights = (up * (up - 1.0) / 2.0, 1.0 - up**2, up * (up + 1.0) / 2.0)
+    drag, mass = 0.0, 0.0
+    for weight, height in zip(weights, nodes.tolist(), strict=True):
+        if not np.any(weight):
+            continue
+        more = [rows @ column for column in _table(surface, proportions, height, scale).T]
+        drag, mass = drag + weight * more[0], mass + weight * more[1]
+    return np.asarray(1.0 + drag), np.asarray(mass)
+
+
+def height_sd(tank: Tank) -> float:
+    """Standard uncertainty of the sphere's height in depths of the fluid.
+
+    Half the depth stays half the depth, however deep the fluid is.
+    """
+    height = 0.0 if tank.height_m is None else tank.height_m
+    return float(np.hypot(tank.height_sd_m, height / tank.depth_m * tank.depth_sd_m)) / tank.depth_m
+
+
+def _nodes(tank: Tank) -> FloatArray:
+    """The heights that are computed, in depths: the configured one, and one sd to each side."""
     height = 0.5 if tank.height_m is None else tank.height_m / tank.depth_m
-    shape = tank.length_m / tank.depth_m, tank.width_m / tank.depth_m, height
-    rows = _powers(*np.broadcast_arrays(closeness, depth))
-    drag, mass = (rows @ column for column in _table(surface, *shape).T)
-    return 1.0 + drag, mass
+    step = min(height_sd(tank), 0.2 * min(height, 1.0 - height))
+    return height + step * np.array([-1.0, 0.0, 1.0])
+
+
+def _closest(tank: Tank) -> float:
+    """The largest closeness at which floor, surface and side walls are outside the sphere."""
+    nodes = _nodes(tank)
+    aside = (0.5 * tank.width_m - tank.off_centre_m) / tank.depth_m
+    ahead = 0.5 * tank.length_m / tank.depth_m
+    room = 2.0 * min(nodes[0], 1.0 - nodes[-1], aside, ahead)
+    return float(min(CLOSENESS[-1], (0.95 * room) ** 3))
 
 
 def _powers(closeness: FloatArray, depth: FloatArray) -> FloatArray:
@@ -59,11 +103,14 @@ def _powers(closeness: FloatArray, depth: FloatArray) -> FloatArray:
 
 
 @cache
-def _table(surface: Surface, length: float, width: float, height: float) -> FloatArray:
+def _table(
+    surface: Surface, proportions: tuple[float, ...], height: float, closest: float
+) -> FloatArray:
     """Coefficients of the drag's and the added mass's excess; sizes in depths of the fluid."""
-    near, depth = (each.ravel() for each in np.meshgrid(CLOSENESS, DEPTHS))
+    length, width, aside = proportions
+    near, depth = (each.ravel() for each in np.meshgrid(CLOSENESS / CLOSENESS[-1], DEPTHS))
     found = []
-    for close, delta in zip(near.tolist(), depth.tolist(), strict=True):
+    for close, delta in zip((closest * near).tolist(), depth.tolist(), strict=True):
         deep = 2.0 * close ** (-1.0 / 3.0)  # in radii
         force = physics.sphere_in_tank(
             1.0,
@@ -72,6 +119,7 @@ def _table(surface: Surface, length: float, width: float, height: float) -> Floa
             surface_m=(1.0 - height) * deep,
             length_m=length * deep,
             width_m=width * deep,
+            off_centre_m=aside * deep,
             surface=surface,
             order=_ORDER,
         )

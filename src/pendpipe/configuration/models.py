@@ -72,7 +72,9 @@ class Tank(Section):
     length_m: Positive = Field(description="inner length, along the motion")
     width_m: Positive = Field(description="inner width, across it")
     depth_m: Positive = Field(description="depth of the fluid")
-    depth_sd_m: NotNegative = Field(0.0, description="standard uncertainty of the depth")
+    depth_sd_m: NotNegative = Field(
+        0.0, description="standard uncertainty of the depth, which counts where a height is given"
+    )
     height_m: Positive | None = Field(
         None, description="of the sphere's centre above the floor; blank: half the depth"
     )
@@ -108,7 +110,8 @@ class Apparatus(Section):
     bearing_torque_n_m: NotNegative = Field(0.0, description="friction torque of the bearings")
     added_mass: Literal["boundary-layer", "plain"] = Field(
         "boundary-layer",
-        description="of the displaced fluid: 1/2 + 9 delta/(4 radius), or the plain 1/2",
+        description="on the paper's route, of the displaced fluid: 1/2 + 9 delta/(4 radius), or the"
+        " plain 1/2; the fit of all records together has the whole memory of the layer",
     )
     position_sd_m: NotNegative = Field(
         1.0e-4, description="standard uncertainty of a weight's distance, each time it is clamped"

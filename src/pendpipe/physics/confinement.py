@@ -201,6 +201,7 @@ def sphere_in_tank(
     surface_m: float,
     length_m: float,
     width_m: float,
+    off_centre_m: float = 0.0,
     surface: TankSurface = "free",
     angular_frequency_per_s: float = 0.0,
     order: int = 16,
@@ -211,12 +212,16 @@ def sphere_in_tank(
     flow that is nearly uniform over the sphere: ``u = -kappa (U - u)``, so that the dipole of
     the potential grows by ``1/(1 - kappa)``. The images of the dipole in the side walls give
 
-    ``kappa = -2 p (a^3/H) S``, ``S = sum' (-1)^n (y^2 - x^2)/(x^2 + y^2)^2`` at x = n L, y = m W
+    ``kappa = -2 p (a^3/H) S``, ``S = sum' (-1)^n (y^2 - x^2)/(x^2 + y^2)^2``
 
-    with p the dipole over U a^3 (-1/2 unbounded), and each sloshing mode of wave number k adds
+    at x = n L, and y = m W for even m, m W - 2 e for odd m, with e off the centre. Here p is the
+    dipole over U a^3 (-1/2 unbounded), and each sloshing mode of wave numbers k_x = (2 n + 1) pi/L,
+    k_y = m pi/W adds
 
-    ``-8 pi p a^3 (2 - delta_m0) k_x^2 cosh^2(k h)/(L W k sinh kH cosh kH) omega^2/(omega_k^2 -
-    omega^2)``, ``omega_k^2 = g k tanh kH``, where h is the distance of the floor.
+    ``-8 pi p a^3 (2 - delta_m0) cos^2(k_y (W/2 + e)) k_x^2 cosh^2(k h)/(L W k sinh kH cosh kH)
+    omega^2/(omega_k^2 - omega^2)``, ``omega_k^2 = g k tanh kH``
+
+    where h is the distance of the floor.
 
     Parameters
     ----------
@@ -224,6 +229,8 @@ def sphere_in_tank(
         As in `sphere_between_planes`.
     length_m, width_m
         The tank's size along and across the swing, in m.
+    off_centre_m
+        Distance of the sphere from the middle, across the swing.
     surface
         ``"film"``, ``"slip"``, ``"release"``, or ``"free"``: slip, and the sloshing modes.
     angular_frequency_per_s
@@ -259,16 +266,17 @@ def sphere_in_tank(
     >>> round(lid.drag_factor, 2), round(free.drag_factor, 2)
     (1.35, 1.34)
     """
-    if radius_m >= min(length_m, width_m) / 2.0:
+    if radius_m >= min(length_m, width_m - 2.0 * abs(off_centre_m)) / 2.0:
         raise ValueError("the side walls have to be outside the sphere")
     lid = "slip" if surface == "free" else surface
     dipole, alpha = _dipole(radius_m, floor_m, depth_m, surface_m, lid, order)
     if surface == "release":
         return _confined(dipole, alpha)
     height = floor_m + surface_m
-    sent_back = 2.0 / height * _side_images(length_m, width_m)
+    sent_back = 2.0 / height * _side_images(length_m, width_m, off_centre_m)
     if surface == "free":
-        sent_back += _sloshing(length_m, width_m, height, floor_m, angular_frequency_per_s)
+        sides = length_m, width_m, off_centre_m
+        sent_back += _sloshing(sides, height, floor_m, angular_frequency_per_s)
     return _confined(dipole / (1.0 + dipole * radius_m**3 * sent_back), alpha)
 
 
@@ -296,35 +304,42 @@ def _dipole(
     return complex(solved[0][0] / scale[0]), alpha
 
 
-def _side_images(length_m: float, width_m: float) -> float:
+def _side_images(length_m: float, width_m: float, off_centre_m: float) -> float:
     """Return S: d/dx of x/(x^2 + y^2), summed over the images in the side walls.
 
-    A row of images across the tank, at distance x, sums to (pi/W)^2/sinh^2(pi x/W).
+    A row of images across the tank, 2 W apart, sums to the real part of
+    (pi/2W)^2/sinh^2(pi (x + i y)/(2 W)) with y that of one of them: 0 for the images of even
+    order, W - 2 e for those of odd order.
     """
     x = length_m * np.arange(1, 2 + int(12.0 * width_m / length_m + 1.0))
-    rows = -((-1.0) ** np.arange(1, x.size + 1)) / np.sinh(np.pi * x / width_m) ** 2
-    return float((np.pi / width_m) ** 2 * (1.0 / 3.0 + 2.0 * rows.sum()))
+    signs = -((-1.0) ** np.arange(1, x.size + 1))
+    scale = np.pi / (2.0 * width_m)
+    aside = scale * (width_m - 2.0 * off_centre_m)
+    rows = np.sinh(scale * x) ** -2.0 + (np.sinh(scale * x + 1j * aside) ** -2.0).real
+    own = 1.0 / 3.0 + 1.0 / np.sin(aside) ** 2
+    return float(scale**2 * (own + 2.0 * (signs * rows).sum()))
 
 
 def _sloshing(
-    length_m: float, width_m: float, height_m: float, floor_m: float, angular_frequency: float
+    sides: tuple[float, float, float], height_m: float, floor_m: float, angular_frequency: float
 ) -> float:
-    """Return what the sloshing modes send back, per dipole."""
+    """Return what the sloshing modes send back, per dipole; sides are L, W and e."""
     from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
+    length_m, width_m, off_centre_m = sides
     above = height_m - floor_m
-    modes = np.arange(int(_DECAY * max(length_m, width_m) / (2.0 * np.pi * above)) + 2)
+    modes = np.arange(2 * int(_DECAY * max(length_m, width_m) / (2.0 * np.pi * above)) + 3)
     along = (2 * modes + 1)[:, None] * np.pi / length_m
-    across = 2.0 * modes * np.pi / width_m
+    across = modes * np.pi / width_m
     k = np.hypot(along, across)
     height, level = k * height_m, k * floor_m
     # cosh^2(k h)/(sinh kH cosh kH), without its large exponentials
     shape = np.exp(-2.0 * k * above) * (1.0 + np.exp(-2.0 * level)) ** 2
     shape /= 1.0 - np.exp(-4.0 * height)
     own = STANDARD_GRAVITY_M_PER_S2 * k * np.tanh(height)
-    twice = np.where(modes > 0, 2.0, 1.0)
+    there = np.where(modes > 0, 2.0, 1.0) * np.cos(across * (width_m / 2.0 + off_centre_m)) ** 2
     response = angular_frequency**2 / (own - angular_frequency**2)
-    terms = 8.0 * np.pi * twice * along**2 / (length_m * width_m * k) * shape * response
+    terms = 8.0 * np.pi * there * along**2 / (length_m * width_m * k) * shape * response
     return float(terms.sum())
 
 
