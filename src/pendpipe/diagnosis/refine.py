@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -53,12 +53,15 @@ class Fit:
         Whether the last step was negligible.
     error_scale
         Factor on all standard deviations, for a misfit beyond the noise.
+    variance
+        What other descriptions of the readings add to the variance of the first values.
     """
 
     evaluation: Evaluation
     free: tuple[int, ...]
     converged: bool
     error_scale: float = 1.0
+    variance: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def model(self) -> Model:
@@ -103,7 +106,10 @@ class Fit:
         scale[scale == 0.0] = 1.0
         inverse = np.linalg.pinv(np.linalg.qr(part / scale, mode="r"), rcond=1e-12)
         matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
-        return self.error_scale**2 * matrix
+        matrix *= self.error_scale**2
+        diagonal = np.arange(len(self.variance))
+        matrix[diagonal, diagonal] += self.variance
+        return matrix
 
 
 def pulled(fit: Fit) -> list[int]:

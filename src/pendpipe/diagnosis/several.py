@@ -148,11 +148,6 @@ def diagnose_several(
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
     law = law_of(found, weighed)
-    if law.model.size < found.improved.model.size:
-        # What the law leaves to a curve, or to a doubtful name, shifts its values.
-        more = found.improved.model.size - law.model.size
-        left = math.sqrt(max(law.chi2 - found.improved.chi2, 0.0) / more)
-        law = replace(law, error_scale=max(law.error_scale, left))
     after = _Answer(found, found.improved, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.least_squares import Bounds, intervals95
+from pendpipe.analysis.fit.least_squares import CHI2_95, Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit
@@ -99,7 +99,15 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     gradient = fit.jacobian.T @ fit.residual / fit.error_scale**2
     wanted = [index for index in (A, B, C) if index in fit.free]
     found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
-    return dict(zip(wanted, found, strict=True))
+    if len(fit.variance) == 0:
+        return dict(zip(wanted, found, strict=True))
+    wider = {}
+    for index, ends in zip(wanted, found, strict=True):
+        value, more = fit.value[index], math.sqrt(CHI2_95 * fit.variance[index])
+        least = float(value - math.hypot(value - ends[0], more))
+        most = float(value + math.hypot(ends[1] - value, more))
+        wider[index] = max(least, float(low[index])), min(most, float(high[index]))
+    return wider
 
 
 def _estimate(

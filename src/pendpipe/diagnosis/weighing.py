@@ -95,20 +95,29 @@ def beside(found: Search, effect: Effect) -> Search:
 def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
     """Return the fit with the names that are more probable, with their rivals, than not.
 
-    A curve without a name, or a doubtful name, would take from the values of a, b and c.
+    A curve without a name, or a doubtful name, would take from the values of a, b and c. What it
+    takes, and what these values would be with each rival, weighs as its probability in their
+    variance.
     """
     model, value = found.improved.model, found.improved.value
+    size = found.baseline.model.size
+    variance = np.zeros(size)
     for step, each in zip(found.steps, weighed, strict=True):
         if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5:
             model, value = model.dropping(step.winner.lead.effect, value)
+            continue
+        for mate, weight in zip(each.mates, each.weights[1:], strict=False):
+            variance += weight * (mate.fit.value[:size] - found.improved.value[:size]) ** 2
     if model is found.improved.model:
-        return found.improved
-    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
+        return replace(found.improved, variance=variance)
+    bare = np.concatenate([found.baseline.value, value[size:]])
     starts = [value, bare]
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
     fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
-    return replace(fit, error_scale=remainder_of(fit, found.data, found.noise).error_scale)
+    variance += (fit.value[:size] - found.improved.value[:size]) ** 2
+    scale = remainder_of(fit, found.data, found.noise).error_scale
+    return replace(fit, error_scale=scale, variance=variance)
 
 
 def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
