@@ -148,6 +148,10 @@ def diagnose_several(
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
     law = law_of(found, weighed)
+    size = len(law.variance)
+    # What a curve takes from the shared values is an error of these.
+    taken = law.value[:size] - found.improved.value[:size]
+    law = replace(law, variance=law.variance + taken**2)
     after = _Answer(found, found.improved, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []

@@ -95,9 +95,8 @@ def beside(found: Search, effect: Effect) -> Search:
 def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
     """Return the fit with the names that are more probable, with their rivals, than not.
 
-    A curve without a name, or a doubtful name, would take from the values of a, b and c. What it
-    takes, and what these values would be with each rival, weighs as its probability in their
-    variance.
+    A curve without a name, or a doubtful name, would take from the values of a, b and c. What these
+    would be with a rival counts in their variance, as much as it is probable.
     """
     model, value = found.improved.model, found.improved.value
     size = found.baseline.model.size
@@ -115,7 +114,6 @@ def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
     fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
-    variance += (fit.value[:size] - found.improved.value[:size]) ** 2
     scale = remainder_of(fit, found.data, found.noise).error_scale
     return replace(fit, error_scale=scale, variance=variance)
 
