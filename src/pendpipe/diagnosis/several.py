@@ -29,7 +29,7 @@ from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.values import constants_of
-from pendpipe.diagnosis.weighing import effect_named, law_of
+from pendpipe.diagnosis.weighing import effect_named, law_of, with_other_descriptions
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.derivatives import jacobian
@@ -147,11 +147,7 @@ def diagnose_several(
     except NoMotionError as error:
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
-    law = law_of(found, weighed)
-    size = len(law.variance)
-    # What a curve takes from the shared values is an error of these.
-    taken = law.value[:size] - found.improved.value[:size]
-    law = replace(law, variance=law.variance + taken**2)
+    law = with_other_descriptions(law_of(found, weighed), found, weighed)
     after = _Answer(found, found.improved, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []

@@ -95,27 +95,34 @@ def beside(found: Search, effect: Effect) -> Search:
 def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
     """Return the fit with the names that are more probable, with their rivals, than not.
 
-    A curve without a name, or a doubtful name, would take from the values of a, b and c. What these
-    would be with a rival counts in their variance, as much as it is probable.
+    A curve without a name, or a doubtful name, would take from the values of a, b and c.
     """
     model, value = found.improved.model, found.improved.value
-    size = found.baseline.model.size
-    variance = np.zeros(size)
     for step, each in zip(found.steps, weighed, strict=True):
         if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5:
             model, value = model.dropping(step.winner.lead.effect, value)
-            continue
-        for mate, weight in zip(each.mates, each.weights[1:], strict=False):
-            variance += weight * (mate.fit.value[:size] - found.improved.value[:size]) ** 2
     if model is found.improved.model:
-        return replace(found.improved, variance=variance)
-    bare = np.concatenate([found.baseline.value, value[size:]])
+        return found.improved
+    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare]
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
     fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
-    scale = remainder_of(fit, found.data, found.noise).error_scale
-    return replace(fit, error_scale=scale, variance=variance)
+    return replace(fit, error_scale=remainder_of(fit, found.data, found.noise).error_scale)
+
+
+def with_other_descriptions(law: Fit, found: Search, weighed: Sequence[Weighed]) -> Fit:
+    """Count in the variance of a law's first values what they would be with other effects.
+
+    With what was left out of the law, and with each rival, as much as it is probable.
+    """
+    size = found.baseline.model.size
+    own = found.improved.value[:size]
+    variance = (law.value[:size] - own) ** 2
+    for each in weighed:
+        for mate, weight in zip(each.mates, each.weights[1:], strict=False):
+            variance = variance + weight * (mate.fit.value[:size] - own) ** 2
+    return replace(law, variance=variance)
 
 
 def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
