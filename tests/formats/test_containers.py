@@ -46,6 +46,16 @@ def test_a_matrix_with_time_in_front_and_a_rate_beside_no_time(tmp_path: Path) -
     np.testing.assert_allclose(read(path).time_s, TIME)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_clock_that_is_infinite_twice_is_refused_without_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    clock = TIME.copy()
+    clock[1:3] = np.inf
+    savemat(path, {"t": clock, "theta": ANGLE})
+    with pytest.raises(InputError):
+        read(path)
+
+
 def test_matlab_73_and_junk_are_refused_clearly(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     path.write_bytes(b"MATLAB 7.3 MAT-file, Platform" + b" " * 200)

@@ -95,6 +95,7 @@ def meaning(column: Column) -> Role:
     return role if rate else unit.kind
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choice:
     """Choose the columns; what the user gives goes before every guess.
 
@@ -312,9 +313,10 @@ def _evenness(finite: FloatArray) -> float:
 def _counts_samples(column: Column, role: Role) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
     values = column.values
-    steps = np.diff(values)
-    whole = len(steps) > 0 and np.isfinite(values).all() and np.all(values == np.rint(values))
-    return bool(whole and abs(np.median(steps)) == 1.0) and role in ("index", "unknown", "length")
+    if role not in ("index", "unknown", "length") or len(values) < 2:
+        return False
+    whole = np.isfinite(values).all() and np.all(values == np.rint(values))
+    return bool(whole and abs(np.median(np.diff(values))) == 1.0)
 
 
 def _readings(

@@ -222,6 +222,8 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     )
 
 
+# Infinite cells are refused in the end; until then their differences are no numbers.
+@np.errstate(invalid="ignore", over="ignore")
 def recording_of(table: Table, options: ReadOptions) -> Recording:
     """Choose the columns of a table and turn them into a recording."""
     choice = choose(table, options)
