@@ -2,10 +2,10 @@
 
 This is the only type that crosses from acquisition and formats to the analysis. The
 plain form is a CSV (contract of the project): a header with ``time_s`` and one of
-``angle_rad``, ``volts``, ``displacement_m``, ``reading``, optionally ``quality``, and before
-it any number of lines ``# key: value``. A ``reading`` is anything else that swings (counts,
-pixels, m/s^2, light), in the unit that ``# unit: counts`` gives: Q, period and relative decay
-need no constant of the sensor.
+``angle_rad``, ``volts``, ``displacement_m``, ``reading``, optionally ``quality`` and
+``radius_excess``, and before it any number of lines ``# key: value``. A ``reading`` is
+anything else that swings (counts, pixels, m/s^2, light), in the unit that ``# unit: counts``
+gives: Q, period and relative decay need no constant of the sensor.
 """
 
 from __future__ import annotations
@@ -63,6 +63,9 @@ class Recording:
     weak_guesses
         What it guessed on slender grounds, with the option that overrides it: whoever
         prints an answer prints these first.
+    radius_excess
+        Where the angles are those of positions: the distance from the pivot over its median,
+        less 1, shape (n,). A string keeps it, so that it shows the errors of the tracking.
     angle_rad, volts, displacement_m
         The readings by the name of their quantity; exactly one of these or `values`.
     volts_per_radian
@@ -91,6 +94,7 @@ class Recording:
     resolution: float | None = None
     notes: tuple[str, ...] = ()
     weak_guesses: tuple[str, ...] = ()
+    radius_excess: FloatArray | None = None
 
     def __init__(
         self,
@@ -102,6 +106,7 @@ class Recording:
         resolution: float | None = None,
         notes: tuple[str, ...] = (),
         weak_guesses: tuple[str, ...] = (),
+        radius_excess: FloatArray | None = None,
         *,
         angle_rad: ArrayLike | None = None,
         volts: ArrayLike | None = None,
@@ -127,7 +132,7 @@ class Recording:
             "give one time for each reading",
         )
         kept = (times, readings, quantity, quality, metadata, resolution, notes, weak_guesses)
-        for name, value in zip(self.__dataclass_fields__, kept, strict=True):
+        for name, value in zip(self.__dataclass_fields__, (*kept, radius_excess), strict=True):
             object.__setattr__(self, name, value)
         if given:
             check("Recording", self)
@@ -183,6 +188,7 @@ class Recording:
             time_s=self.time_s[keep],
             values=self.values[keep],
             quality=None if self.quality is None else self.quality[keep],
+            radius_excess=None if self.radius_excess is None else self.radius_excess[keep],
         )
 
     def as_motion(
@@ -305,6 +311,9 @@ def plain_lines(recording: Recording) -> Iterator[str]:
     if recording.quality is not None:
         columns.append("quality")
         rows.append(map(str, recording.quality.tolist()))
+    if recording.radius_excess is not None:
+        columns.append("radius_excess")
+        rows.append(map(repr, recording.radius_excess.tolist()))
     for key, value in recording.metadata.items():
         yield f"# {key}: {' '.join(str(value).split())}\n"
     for number, guess in enumerate(recording.weak_guesses, start=1):
@@ -354,12 +363,14 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     metadata = {key.strip(): value.strip() for key, _, value in told if value}
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
-    table = _numbers(place, lines, first + 1, picked, len(names))
+    table = _numbers(place, lines, first + 1, [*picked.values()], len(names))
+    column = dict(zip(picked, np.ascontiguousarray(table.T), strict=True))
     recording = Recording(
-        time_s=np.ascontiguousarray(table[:, 0]),
-        values=np.ascontiguousarray(table[:, 1]),
+        time_s=column["time_s"],
+        values=column[quantity],
         quantity=quantity,
-        quality=_quality(place, table[:, 2], first + 2) if len(picked) > 2 else None,
+        quality=_quality(place, column["quality"], first + 2) if "quality" in column else None,
+        radius_excess=column.get("radius_excess"),
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
         notes=notes,
         weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
@@ -389,7 +400,7 @@ def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:
     return lines[:-1], ("the last row has no line end and may be cut: not used",)
 
 
-def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[int]]:
+def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, dict[str, int]]:
     """Find the columns of the plain form in its header."""
     where, headed = f"{place}, line {line}", f"(found {', '.join(names)})"
     refuse_if(
@@ -402,8 +413,8 @@ def _columns(place: Path, line: int, names: list[str]) -> tuple[Quantity, list[i
         f"exactly one of {', '.join(QUANTITIES)} is needed {headed}",
         "rename the column, or run pendpipe convert",
     )
-    wanted = ("time_s", found[0], "quality")
-    return found[0], [names.index(name) for name in wanted if name in names]
+    wanted = ("time_s", found[0], "quality", "radius_excess")
+    return found[0], {name: names.index(name) for name in wanted if name in names}
 
 
 def _numbers(

@@ -71,6 +71,7 @@ MEASUREMENT = [
     "jitter",
     "dropped-samples",
     "glitches",
+    "tracking-noise",
     "coloured-noise",
 ]
 """The identifiers that people outside rely on."""

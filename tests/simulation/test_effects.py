@@ -26,6 +26,7 @@ FORENSIC: dict[str, dict[str, float]] = {
     "coarse-quantisation": {"step": 2e-3},
     "jitter": {"sigma_t": 2e-3},
     "glitches": {"number": 5, "rms": 0.02},
+    "tracking-noise": {"rms": 3e-3},
     "coloured-noise": {"corner": 0.3, "exponent": 1.5},
 }
 

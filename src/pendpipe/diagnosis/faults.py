@@ -18,14 +18,14 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.evidence import Rival
-from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips
+from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips, tracking
 from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, Location
-from pendpipe.diagnosis.state import Fault, State, is_gross
+from pendpipe.diagnosis.state import Fault, State, is_gross, loses_phase
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 
@@ -60,6 +60,7 @@ class Forensics:
 
     def __init__(self, samples: Samples, level: float) -> None:
         self.samples, self.level = samples, level
+        self._recorded = samples
         self._quiet: dict[str, float] = {}
         self.clock_notes: list[str] = []
 
@@ -76,6 +77,7 @@ class Forensics:
         """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""
         self._correct_time_stamps(state, progress)
         self._correct_lost_samples(state, progress)
+        self._correct_tracking(state, progress)
         self._correct_slips(state, progress)
         if is_gross(state.fit, state.data):
             self._examine("glitches", state, progress, find_in_misfit)
@@ -208,6 +210,28 @@ class Forensics:
             + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
         state.faults.append(Fault(found, 0.0, len(state.steps)))
+        state.settle(fit, corrected)
+
+    def _correct_tracking(self, state: State, progress: Progress) -> None:
+        """Take the wander of a tracked mark from the readings: more with each better model."""
+        if loses_phase(state.fit):
+            return
+        known = [f for f in state.faults if f.finding.identifier == tracking.TRACKING_NOISE]
+        taken = known[0].finding.parameters["kappa"].value if known else 0.0
+        corrected, finding = tracking.find(state.data, state.fit, self._recorded, taken)
+        p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
+        kappa = finding.parameters.get("kappa")
+        if p_value > self.level or kappa is None or abs(kappa.value - taken) < kappa.sd:
+            return
+        fit = refine(state.fit.model, corrected, state.noise, state.fit.value, held=state.held)
+        gain = state.fit.chi2 - fit.chi2
+        if gain <= 0.0:
+            return
+        progress(finding.summary)
+        whole = replace(finding, delta_chi2=gain + sum(f.finding.delta_chi2 for f in known))
+        state.faults = [each for each in state.faults if not any(each is one for one in known)]
+        state.faults.append(Fault(whole, p_value, len(state.steps)))
+        self._correct_samples(state.data, corrected)
         state.settle(fit, corrected)
 
     def _correct_slips(self, state: State, progress: Progress) -> None:

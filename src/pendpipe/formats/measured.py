@@ -393,6 +393,7 @@ class Readings:
     unit: str
     notes: tuple[str, ...] = ()
     weak_guesses: tuple[str, ...] = ()
+    radius_excess: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -684,4 +685,6 @@ def _position(x: Column, y: Column) -> Readings:
     """Turn a position seen from the pivot into an angle: atan2(x, -y), 0 straight down."""
     down, sign = (-1.0, "-") if float(np.nanmedian(y.values)) < 0 else (1.0, "")
     note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
-    return Readings(np.arctan2(x.values, down * y.values), "angle_rad", 1.0, "rad", (note,))
+    angle, radius = np.arctan2(x.values, down * y.values), np.hypot(x.values, y.values)
+    excess = radius / np.nanmedian(radius) - 1.0
+    return Readings(angle, "angle_rad", 1.0, "rad", (note,), radius_excess=excess)

@@ -264,6 +264,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         resolution=own_step * found.factor if own_step is not None else resolution(values),
         notes=tuple(notes),
         weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
+        radius_excess=None if found.radius_excess is None else found.radius_excess[base.rows],
     )
     check(table.place, recording)
     return recording

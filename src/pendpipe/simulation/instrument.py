@@ -137,6 +137,14 @@ class Instrument:
         lines *= np.sqrt(1.0 + (colour["corner"] / frequency) ** colour["exponent"])
         return np.asarray(np.fft.irfft(lines, len(noise)))
 
+    def wander(self, count: int) -> FloatArray | None:
+        """What a wandering mark adds to the distance from the pivot; some 20 samples long."""
+        if "tracking-noise" not in self.settings:
+            return None
+        steps = np.exp(-np.arange(100) / 20.0)
+        drawn = np.convolve(self.random.standard_normal(count + 99), steps, "valid")
+        return np.asarray(drawn / np.std(drawn) * self.settings["tracking-noise"]["rms"])
+
     def spoilt(self, angle: FloatArray) -> FloatArray:
         """Add slips and glitches, then clip, then round coarsely."""
         angle = angle.copy()

@@ -184,12 +184,16 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
     angle = _angles(model, given, instrument, time, place)
     random = np.random.default_rng(model.seed)
     angle += instrument.coloured(model.noise_rad * random.standard_normal(len(time)), rate)
+    along = instrument.wander(len(time))
+    if along is not None:
+        angle += instrument.settings["tracking-noise"]["kappa"] * along
     metadata = {"source": source, "seed": str(model.seed)}
     if given:
         metadata["effects"] = ", ".join(one.effect.identifier for one in given)
     sensor, converter = model.sensor, model.converter
     if sensor is None:
-        return Recording(time, instrument.spoilt(angle), "angle_rad", metadata=metadata)
+        read = instrument.spoilt(angle)
+        return Recording(time, read, "angle_rad", metadata=metadata, radius_excess=along)
     noise = sensor.noise_volts * random.standard_normal(len(time))
     angle += instrument.coloured(noise, rate) / sensor.volts_per_radian
     volts = sensor.offset_volts + sensor.volts_per_radian * instrument.spoilt(angle)

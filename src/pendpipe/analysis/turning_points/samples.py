@@ -37,6 +37,8 @@ class Samples:
     promised_step
         The converter's step, where only every so manieth of its codes comes and `step` is
         as much larger; None elsewhere.
+    radius_excess
+        Of positions: distance from the pivot over its median, less 1, shape (n,).
     """
 
     time_s: FloatArray
@@ -46,6 +48,7 @@ class Samples:
     noise_rms: float
     counts: bool = False
     promised_step: float | None = None
+    radius_excess: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -65,10 +68,11 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     """
     if recording.quantity == "volts":
         recording = recording.as_motion(place=place)
-    time, values = recording.time_s, recording.values
+    time, values, radius = recording.time_s, recording.values, recording.radius_excess
     low, high = _range(values)
     if recording.quality is not None or not math.isfinite(high - low):
         time, values = time[recording.usable], values[recording.usable]
+        radius = None if radius is None else radius[recording.usable]
         low, high = _range(values)
     if len(values) < _FEWEST:
         raise NotAnalysableError(
@@ -82,7 +86,8 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     step = recording.resolution or find_step(values)
     if step is not None and _one_row_a_count(time, values, step):
         return _edges(time, values, recording.unit, step)
-    return Samples(time, values, recording.unit, step, noise_rms(values, step))
+    noise = noise_rms(values, step)
+    return Samples(time, values, recording.unit, step, noise, radius_excess=radius)
 
 
 def _range(values: FloatArray) -> tuple[float, float]:

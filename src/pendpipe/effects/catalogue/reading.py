@@ -394,6 +394,23 @@ GLITCHES: Final[Effect] = without_template(
     parameters=(Parameter("number", "1", 0.0, 1e6), Parameter("rms", "rad", 0.0, math.inf)),
     discriminating_test="change cable and supply, and record at rest",
 )
+TRACKING_NOISE: Final[Effect] = without_template(
+    __name__,
+    """The tracked mark wanders on the bob, or the tracker on the mark.
+
+    Where the recording holds both coordinates, the distance r from the pivot shows it: a string
+    keeps that, so that w, what r is more than a smooth function of the angle, is the wander
+    along the string, over its length. What goes across it, in the angle, is taken in proportion.
+    """,
+    identifier="tracking-noise",
+    name="wander of the tracked mark",
+    equation=r"y = x + \kappa\, w(t), \quad w = r/\bar r - P(x)",
+    parameters=(
+        Parameter("kappa", "rad", -100.0, 100.0, 1.0),
+        Parameter("rms", "1", 0.0, 1.0),
+    ),
+    discriminating_test="track another mark on the bob, or the same mark once more",
+)
 COLOURED_NOISE: Final[Effect] = without_template(
     __name__,
     """Noise that grows to low frequencies.
