@@ -118,13 +118,14 @@ def test_motion_is_that_of_the_law(identifier: str) -> None:
     assert error < (1e-3 if effect > 1e-3 else 1e-2) * effect
 
 
-def test_play_is_right_to_two_hundredths() -> None:
-    """Its corners at +-b/2 lie between the nodes of the clock; b is 1 % wrong at order 14."""
-    law = with_extra(lambda t, x, v, s, turn: OMEGA**2 * min(max(x, -1e-3), 1e-3))
+@pytest.mark.parametrize("gap", [1e-4, 2e-3, 2e-2])
+def test_play_is_right_to_a_ten_thousandth(gap: float) -> None:
+    """Its corners lie between the nodes of the clock, and enter by their harmonics."""
+    law = with_extra(lambda t, x, v, s, turn: OMEGA**2 * min(max(x, -gap / 2), gap / 2))
     expected = integrate(law, START, 0.0, TIME)
-    found = evaluated("backlash", (2e-3,), BASE, TIME).sampled.angle
+    found = evaluated("backlash", (gap,), BASE, TIME).sampled.angle
     effect = np.max(np.abs(expected - plain(BASE, TIME)))
-    assert np.max(np.abs(found - expected)) < 0.02 * effect
+    assert np.max(np.abs(found - expected)) < 1e-4 * effect
 
 
 def test_x_times_its_size_is_right_to_a_thousandth() -> None:

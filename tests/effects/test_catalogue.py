@@ -149,7 +149,7 @@ def test_at_size_zero_it_is_absent(identifier: str) -> None:
     effect = by_identifier(identifier)
     values = np.array(VALUES[identifier])
     values[: effect.sizes] = 0.0
-    model = Model(RECORD, 0.05)
+    model = Model(RECORD, 0.05, order=max(14, effect.nodes))
     found = model.adding(effect).reading(np.append(BASE, values))
     np.testing.assert_allclose(found, model.reading(BASE), rtol=0.0, atol=3e-10)
 

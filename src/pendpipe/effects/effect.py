@@ -176,6 +176,8 @@ class Effect:
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
 
+    nodes: ClassVar[int] = 0
+    """Nodes of half a cycle that its torque needs: more than usual where it has corners."""
     in_time: ClassVar[bool] = False
     """Whether it is drawn against time, and so can follow anything that happens once."""
 

@@ -264,6 +264,10 @@ class Model:
             pieces.append((kick.time_s, motion))
         return pieces
 
+    @property
+    def _nodes(self) -> int:
+        return max([self.order, *(effect.nodes for effect in self.effects)])
+
     def _kicks(self, value: FloatArray) -> list[Kick]:
         """The sudden changes within the record, as they come."""
         kicks = [effect.kick(value[place]) for effect, place in self.places()]
@@ -276,7 +280,7 @@ class Model:
         More would ask for motion beyond the stop.
         """
         if self.half_cycles is not None:
-            return self._from_guesses(law, value, Clock(self.half_cycles, self.order))
+            return self._from_guesses(law, value, Clock(self.half_cycles, self._nodes))
         omega, begin = float(value[OMEGA]), float(value[TIME])
         needed = (self.time_s[-1] - begin) * omega / math.pi
         if not 1.0 <= needed < 2e5:
@@ -287,7 +291,7 @@ class Model:
         for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
             if not needed - 1.0 < count < min(1.3 * needed + 4.0, stops):
                 continue
-            clock = Clock(count, self.order)
+            clock = Clock(count, self._nodes)
             try:
                 motion = self._from_guesses(law, value, clock)
             except NoMotionError:

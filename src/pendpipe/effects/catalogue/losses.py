@@ -241,10 +241,15 @@ def _at_reversals(left: FloatArray) -> FloatArray:
     return np.array(found)
 
 
+_RESOLVED: Final = 0.65
+"""Harmonics over nodes of half a cycle, up to which these resolve them."""
+
+
 @enters(
     "acceleration",
     identifier="backlash",
     name="play in the pivot",
+    nodes=48,
     equation=(
         r"\omega^2 x \to \omega^2 \left(x -"
         r" \operatorname{clip}(x, -\tfrac b2, \tfrac b2)\right)"
@@ -256,12 +261,26 @@ def _at_reversals(left: FloatArray) -> FloatArray:
     ),
 )
 def backlash(motion: Motion, pendulum: Pendulum, gap: float) -> FloatArray:
-    """No restoring torque within a gap b: the frequency falls by 2/pi b/(2 y) of itself."""
-    half = 0.5 * gap
+    """No restoring torque within a gap b: the frequency falls by 2/pi b/(2 y) of itself.
+
+    The torque has corners, which the nodes of the clock would miss: it enters by its first
+    harmonics, clip(r cos psi) = r (c_1 cos psi + c_3 cos 3 psi + ...) with b/2 = r cos(theta),
+    c_m = 4/pi [int_0^theta cos(theta) cos(m psi) dpsi + int_theta^(pi/2) cos psi cos(m psi) dpsi].
+    """
+    half, amplitude = 0.5 * gap, motion.amplitude
     if half == 0.0:
         return np.zeros_like(motion.angle)
-    within = half * np.clip(motion.angle / abs(half), -1.0, 1.0)
-    return np.asarray(pendulum.angular_frequency**2 * within)
+    psi = np.arccos(np.clip(motion.angle / amplitude, -1.0, 1.0))
+    corner = np.arccos(np.clip(abs(half) / amplitude, 0.0, 1.0))
+    within = np.zeros_like(motion.angle)
+    for m in range(1, int(_RESOLVED * psi.shape[1]) + 1, 2):
+        # sin((m - 1) theta)/(m - 1) is theta at m = 1, where the upper limit counts too.
+        below = corner - 0.5 * math.pi if m == 1 else np.sin((m - 1) * corner) / (m - 1)
+        beyond = -0.5 * (below + np.sin((m + 1) * corner) / (m + 1))
+        share = np.cos(corner) * np.sin(m * corner) / m + beyond
+        within += 4.0 / math.pi * share * np.cos(m * psi)
+    size = math.copysign(pendulum.angular_frequency**2, half)
+    return np.asarray(size * amplitude * within)
 
 
 @enters(
