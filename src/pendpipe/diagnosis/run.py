@@ -16,6 +16,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
+from pendpipe.diagnosis.forensics import lost_time
 from pendpipe.diagnosis.forensics.coloured_noise import level_note
 from pendpipe.diagnosis.forensics.lattice import with_true_step
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
@@ -240,7 +241,7 @@ def diagnose_decay(
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
-    effects = _in_order(found, weighed)
+    effects = _in_order(found, weighed, samples)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     changing = None if found.data.time_noise else level_note(found.noise)
     stamps = (*([gap] if gap else []), *found.clock_notes, *([changing] if changing else []))
@@ -319,7 +320,9 @@ def _searched(
     return *swap_in_likelier(found, beginning, progress), beginning
 
 
-def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, ...]:
+def _in_order(
+    found: Search, weighed: Sequence[Weighed], samples: Samples
+) -> tuple[FoundEffect, ...]:
     """List effects and measurement faults in the order in which they were added."""
     effects = [
         (number, effect_named(found, step, each))
@@ -327,7 +330,17 @@ def _in_order(found: Search, weighed: Sequence[Weighed]) -> tuple[FoundEffect, .
     ]
     faults = [(fault.after, fault_named(found, fault)) for fault in found.faults]
     # The sort is stable: a fault goes before the effect that followed it.
-    return tuple(each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0]))
+    order = [each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0])]
+    return tuple(_checked(each, found, samples) for each in order)
+
+
+def _checked(effect: FoundEffect, found: Search, samples: Samples) -> FoundEffect:
+    """Test a loss of samples in the readings as they are."""
+    if effect.identifier != "dropped-samples" or effect.location.time_s is None:
+        return effect
+    when, period_s = effect.location.time_s, found.improved.at.span.period_s
+    at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
+    return replace(effect, confirmed=lost_time.confirmed(samples, at, period_s))
 
 
 def _small_swings(law: Fit, found: Search) -> SmallSwings | None:
