@@ -167,7 +167,8 @@ def best_fit(
 ) -> Fit | None:
     """Refine from the best of several starts, and from the next best where that gets stuck.
 
-    None if the model has no motion from any. A start with values of another model is left out.
+    Where even the best can't reach a chi^2 of `useful`, the others are not tried. None if the model
+    has no motion from any. A start with values of another model is left out.
     """
     fixed, found, begun = tuple(held), None, []
     for start in starts:
@@ -178,7 +179,7 @@ def best_fit(
         with suppress(NoMotionError, np.linalg.LinAlgError):
             refining.go(ROUNDS, useful)
             found = better(found, refining.fit)
-            if refining.fit.converged:
+            if refining.fit.converged or refining.hopeless:
                 break
     return found
 
@@ -213,7 +214,7 @@ class Refining:
         self._gains: list[float] = []
         self._radius = math.inf
         self._stalled = ((2, little), (3, max(little, _SLOW_GAIN)))
-        self._ended = self._converged = False
+        self._ended = self._converged = self.hopeless = False
 
     @property
     def chi2(self) -> float:
@@ -242,12 +243,13 @@ class Refining:
             what the last ones did, would not reach it.
         """
         for left in range(rounds, 0, -1):
-            if self._ended or self._hopeless(left, useful):
+            self.hopeless = self._cannot_reach(useful, left)
+            if self._ended or self.hopeless:
                 break
             self._round()
         self._steps.forget()
 
-    def _hopeless(self, left: int, useful: float) -> bool:
+    def _cannot_reach(self, useful: float, left: int) -> bool:
         last = self._gains[-_LAST_STEPS:]
         return len(last) == _LAST_STEPS and self.chi2 - left * sum(last) / _LAST_STEPS > useful
 

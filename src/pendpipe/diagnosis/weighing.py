@@ -257,7 +257,10 @@ def refitted(
         held = effect.without(held)
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
-    model, starts = without.model.adding(effect), [start, rival.fit.value]
+    # With its shape but no size yet it begins where the fit without it ended.
+    absent = start.copy()
+    absent[len(without.value) :][: effect.sizes] = 0.0
+    model, starts = without.model.adding(effect), [start, absent, rival.fit.value]
     return best_fit(model, found.data, found.noise, starts, held=held, useful=useful)
 
 
