@@ -32,7 +32,7 @@ def test_a_jump_of_the_clock_is_confirmed_and_its_size_told(lost_s: float) -> No
     found = second_test(swing(STAMPS + np.where(STAMPS >= AT, lost_s, 0.0)), 1)
     assert found.p_value < 1e-3
     for value, sd in re.findall(r"by (\S+) ± (\S+) ms", found.summary):
-        assert abs(float(value) - 1e3 * lost_s) < 4.0 * float(sd) + 0.1
+        assert abs(float(value) - 1e3 * lost_s) < 4.0 * float(sd) + 0.02 * abs(1e3 * lost_s)
 
 
 def test_neither_a_knock_nor_an_offset_nor_nothing_is_a_jump_of_the_clock() -> None:

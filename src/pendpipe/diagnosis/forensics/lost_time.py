@@ -18,8 +18,8 @@ from pendpipe.diagnosis.result import Confirmation
 
 _DEGREE: Final = 5
 """Of the polynomial in time on each side."""
-_WITHIN: Final = 0.3
-"""Length of a side, in periods: there the polynomial follows a swing to 1e-4 of it."""
+_WITHIN: Final = 0.4
+"""Length of a side, in periods: what a polynomial leaves of a swing it leaves elsewhere, too."""
 _INSTANTS: Final = 0.1
 """Within this part of a period the instant is sought."""
 _ELSEWHERE: Final = 20
