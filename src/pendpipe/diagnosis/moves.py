@@ -41,6 +41,8 @@ _LOST_AT_KNOTS: Final = 0.012
 """Part of a curve's gain lost between its knots, where it is straight: h^2 F''/12 at the knots of
 `effects.curves`; it is credited, as far as the names leave as much, where only noise is left."""
 _MOST_MOVES: Final = 6
+_MOST_RARE: Final = 2
+"""Rare names that may take the place of one curve."""
 _FIRST_TRIED: Final = 2
 """Named effects tried as the first of two."""
 _SECOND_TRIED: Final = 3
@@ -71,11 +73,14 @@ def _is_further(step: Step) -> bool:
     return not (known or effect.kind == "unnamed")
 
 
-def improve(state: State, progress: Progress) -> None:
-    """Make the best move, again and again, until none lowers the score."""
+def improve(state: State, progress: Progress, rare: Sequence[Effect] = ()) -> None:
+    """Make the best move, again and again, until none lowers the score.
+
+    `rare` are the names that may take the place of a curve.
+    """
     for _ in range(_MOST_MOVES):
         here = Proposed(state.fit, tuple(state.steps))
-        there = list(_moves(state))
+        there = [*_drops(state), *_curves_for_names(state), *_rare_for_a_curve(state, rare)]
         best = _best(here, there, state)
         if best is here:
             return
@@ -90,11 +95,6 @@ def _best(here: Proposed, there: Sequence[Proposed], state: State) -> Proposed:
     best = min(found, key=lambda each: each.fit.chi2)
     scale = Scale.of(best.fit, state.data, state.noise)
     return min(found, key=lambda each: scale.lost_by(each.fit, each.credit) + price(each.steps))
-
-
-def _moves(state: State) -> Iterator[Proposed]:
-    yield from _drops(state)
-    yield from _curves_for_names(state)
 
 
 def _drops(state: State) -> Iterator[Proposed]:
@@ -153,6 +153,33 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         )
 
 
+def _rare_for_a_curve(state: State, rare: Sequence[Effect]) -> Iterator[Proposed]:
+    """Put a rare name, or two, in the place of a curve: a camera is oblique, and has a shutter."""
+    for step in [step for step in state.steps if step.winner.drawn]:
+        fit = refit_without(state, [step])
+        steps = [other for other in state.steps if other is not step]
+        for _ in range(_MOST_RARE):
+            fits = _with_each(fit, rare, state) if fit else []
+            if fit is None or not fits:
+                break
+            scale = Scale.of(state.fit, state.data, state.noise)
+            names = ranked([_rival(fit, each, scale) for each in fits])
+            steps.append(Step(tuple(names), step.p_value, fit))
+            fit = names[0].fit
+            yield Proposed(fit, tuple(steps), f"{names[0].name} in place of {step.winner.name}")
+
+
+def _with_each(bare: Fit, names: Sequence[Effect], state: State) -> list[Fit]:
+    """Fit each of some names beside the effects of a model that has it not."""
+    present = {effect.identifier for effect in bare.model.effects}
+    starts = [
+        (each, np.full(each.count, float(each.parameter_free)))
+        for each in names
+        if each.identifier not in present
+    ]
+    return [fit for pair in starts if (fit := _with(bare, *pair, state))]
+
+
 def refit_without(state: State, steps: Sequence[Step]) -> Fit | None:
     """Refit the model without some effects, from the present values and from the baseline's.
 
@@ -196,9 +223,7 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
     tone = tone and not off_harmonics(leader.fit, leader.lead.effect)
     if not (leader.drawn or tone):
         return list(rivals)
-    rare = applicable(task.catalogue, before, task.baseline, state.data.unit, rare=True)
-    starts = [(each, np.full(each.count, float(each.parameter_free))) for each in rare]
-    fits = [fit for pair in starts if (fit := _with(before, *pair, state))]
+    fits = _with_each(before, task.rare(state), state)
     if not fits:
         return list(rivals)
     lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)

@@ -174,9 +174,9 @@ def _grow(state: State, task: Task) -> None:
         task.forensics.before(state, task.progress)
         if not _add_one(state, task):
             break
-    improve(state, task.progress)
+    improve(state, task.progress, task.rare(state))
     if task.forensics.again(state, task.progress):
-        improve(state, task.progress)
+        improve(state, task.progress, task.rare(state))
 
 
 def _described(state: State, task: Task) -> Fit | None:

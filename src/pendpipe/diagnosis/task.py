@@ -86,6 +86,10 @@ class Task:
         """The catalogue's part of the significance level."""
         return self.level * CATALOGUE_SHARE
 
+    def rare(self, state: State) -> list[Effect]:
+        """Return the names that are asked where a curve would be added."""
+        return applicable(self.catalogue, state.fit, self.baseline, state.data.unit, rare=True)
+
     def scanned(self, state: State) -> list[Effect]:
         """Score all that may be missing on a state's residual (into `state.now`)."""
         effects = [
