@@ -20,8 +20,16 @@ if TYPE_CHECKING:
     from pendpipe.recording import Recording
 
 Flags = dict[str, dict[str, Any]]
+"""Arguments by their names, each with its options; see `declare`."""
+ALTERNATIVES: Final = "alternatives"
 
-READING: Final[Flags] = {
+
+def under(heading: str, arguments: Flags) -> Flags:
+    """Put arguments under a heading of the help."""
+    return {name: options | {"heading": heading} for name, options in arguments.items()}
+
+
+_OVERRIDES: Final[Flags] = {
     "--channel": {"metavar": "CHANNEL", "help": "number (from 1) or name, see inspect"},
     "--column": {
         "metavar": "COLUMN",
@@ -50,6 +58,11 @@ READING: Final[Flags] = {
     },
 }
 """Overrides of a reader's guesses, one a field of `pendpipe.formats.ReadOptions`."""
+_READING: Final = under("where a guess is wrong", _OVERRIDES)
+_A_RECORDING: Final = "a recording in any supported format; - is standard input"
+FILE: Final[Flags] = {"file": {"metavar": "FILE", "help": _A_RECORDING}} | _READING
+FILES: Final[Flags] = {"files": {"metavar": "FILE", "nargs": "+", "help": _A_RECORDING}} | _READING
+"""The argument of a command that reads a recording, or several, with the overrides."""
 
 SHARED: Final[Flags] = {
     "--json": {"action": "store_true", "help": "print one JSON object"},
@@ -91,24 +104,26 @@ SHARED: Final[Flags] = {
 """Arguments of more than one command."""
 
 
-def declare(parser: argparse._ActionsContainer, flags: Flags) -> None:
-    """Declare arguments that stand in a table."""
-    for name, options in flags.items():
-        parser.add_argument(name, **options)
+def shared(*names: str, **more: Any) -> Flags:
+    """Look up arguments that other commands have as well."""
+    return {name: SHARED[name] | more for name in names}
 
 
-def add(parser: argparse._ActionsContainer, *names: str, **more: Any) -> None:
-    """Declare shared arguments."""
-    for name in names:
-        parser.add_argument(name, **SHARED[name], **more)
+def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
+    """Declare a command's arguments, each by its name and the options of argparse.
 
-
-def add_file(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
-    """Declare FILE (or `several`, as ``files``) and the overrides of a reader's guesses."""
-    about = "a recording in any supported format; - is standard input"
-    named = ("files", "+") if several else ("file", None)
-    parser.add_argument(named[0], metavar="FILE", nargs=named[1], help=about)
-    declare(parser.add_argument_group("where a guess is wrong"), READING)
+    One option is our own: the `heading` that it stands under in the help. Of those under
+    `ALTERNATIVES` a call gives one at most.
+    """
+    groups: dict[str | None, argparse._ActionsContainer] = {None: parser}
+    for name, options in arguments.items():
+        heading = options.get("heading")
+        if heading == ALTERNATIVES and heading not in groups:
+            groups[heading] = parser.add_mutually_exclusive_group()
+        elif heading not in groups:
+            groups[heading] = parser.add_argument_group(heading)
+        of_argparse = {key: value for key, value in options.items() if key != "heading"}
+        groups[heading].add_argument(name, **of_argparse)
 
 
 def read_options(arguments: argparse.Namespace) -> ReadOptions:

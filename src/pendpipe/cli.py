@@ -1,10 +1,11 @@
 """The command line: it picks a command and turns user errors into one line and a status.
 
 Every command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
-campaign and no more, with two functions, ``add_arguments(parser)`` and ``run(arguments)``, which
-returns the exit status where it is not 0.
+campaign and no more, with the table ``ARGUMENTS`` (see `pendpipe.arguments.declare`) and the
+function ``run(arguments)``, which returns the exit status where it is not 0.
 Only the module of the command that was asked for is imported, since a job's cost is its imports.
-Other packages add commands by entry points of the group ``pendpipe.commands``.
+Other packages add commands by entry points of the group ``pendpipe.commands``; one that has
+commands of its own declares them by a function ``add_arguments(parser)`` instead.
 """
 
 from __future__ import annotations
@@ -111,7 +112,12 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add_arguments(parser)
+        if hasattr(module, "ARGUMENTS"):
+            from pendpipe.arguments import declare
+
+            declare(parser, module.ARGUMENTS)
+        else:
+            module.add_arguments(parser)
         arguments = parser.parse_args(argv[1:])
         arguments.run = module.run
         return arguments

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from pendpipe.arguments import Flags, add, declare, load
+from pendpipe.arguments import ALTERNATIVES, Flags, load, shared, under
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_writable
 
@@ -33,7 +33,7 @@ _SOURCES: Final[Flags] = {
         "help": "be a simulated instrument for other programs: di2108, ...",
     },
 }
-_FLAGS: Final[Flags] = {
+_OWN: Final[Flags] = {
     "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
     "--model": {"help": "the instrument on --port: di154rs, di2108, ..."},
     "--channel": {"type": int, "help": "as printed on the box (1)"},
@@ -69,17 +69,15 @@ _FLAGS: Final[Flags] = {
     },
     "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Describe the arguments."""
-    declare(parser.add_mutually_exclusive_group(), _SOURCES)
-    declare(parser, _FLAGS)
-    workflow = parser.add_argument_group("as a stage of a campaign")
-    add(workflow, "--campaign", "--record", "--refused")
-    workflow.add_argument(
-        "--caliper", action="store_true", help="the campaign's caliper run instead of a record"
-    )
+_OF_A_STAGE: Final[Flags] = shared("--campaign", "--record", "--refused") | {
+    "--caliper": {
+        "action": "store_true",
+        "help": "the campaign's caliper run instead of a record",
+    }
+}
+ARGUMENTS: Final = (
+    under(ALTERNATIVES, _SOURCES) | _OWN | under("as a stage of a campaign", _OF_A_STAGE)
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

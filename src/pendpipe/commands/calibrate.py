@@ -15,13 +15,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import SHARED, Flags, add, declare, print_answer
+from pendpipe.arguments import SHARED, Flags, print_answer, shared, under
 
 if TYPE_CHECKING:
     from pendpipe.analysis.calibrate import Calibration
 
 
-_FLAGS: Final[Flags] = {
+_OWN: Final[Flags] = {
     "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"},
     "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"},
     "--json": SHARED["--json"],
@@ -36,18 +36,11 @@ _FLAGS: Final[Flags] = {
     "--delimiter": {"help": "between the cells; guessed from the header"},
     "--decimal": {"choices": ".,", "help": "decimal mark; guessed from the delimiter"},
 }
-_OF_A_RECORD: Final[Flags] = {
+_OF_A_RECORD: Final = shared("--record", "--refused") | {
     "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"},
     "--volts-per-radian": {"type": float, "metavar": "V/RAD", "help": "a known constant"},
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe calibrate``."""
-    declare(parser, _FLAGS)
-    workflow = parser.add_argument_group("with --record")
-    add(workflow, "--record", "--refused")
-    declare(workflow, _OF_A_RECORD)
+ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator
 from typing import Any, Final
 
+from pendpipe.arguments import ALTERNATIVES, Flags
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.configuration.models import Configuration
 from pendpipe.templates import render
@@ -13,14 +14,15 @@ BEGIN: Final = "<!-- made by `pendpipe config --manual`: begin -->"
 END: Final = "<!-- end -->"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe config``."""
-    parser.add_argument(
-        "file", nargs="?", default="config/config.yaml", help="configuration to check"
-    )
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument("--schema", action="store_true", help="print the JSON schema")
-    shown.add_argument("--manual", action="store_true", help="print the tables of the manual")
+ARGUMENTS: Final[Flags] = {
+    "file": {"nargs": "?", "default": "config/config.yaml", "help": "configuration to check"},
+    "--schema": {"heading": ALTERNATIVES, "action": "store_true", "help": "print the JSON schema"},
+    "--manual": {
+        "heading": ALTERNATIVES,
+        "action": "store_true",
+        "help": "print the tables of the manual",
+    },
+}
 
 
 def run(arguments: argparse.Namespace) -> None:

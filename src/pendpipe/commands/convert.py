@@ -3,19 +3,17 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import Final
 
-from pendpipe.arguments import add_file, announce, read_options
+from pendpipe.arguments import FILE, announce, read_options
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe convert``."""
-    add_file(parser)
-    parser.add_argument(
-        "out",
-        metavar="OUT",
-        type=Path,
-        help="OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
-    )
+ARGUMENTS: Final = FILE | {
+    "out": {
+        "metavar": "OUT",
+        "type": Path,
+        "help": "OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
+    }
+}
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.arguments import Flags, add, add_file, declare, print_answer, print_json, read_motion
+from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import distinct_names, make_folder, write_json, write_whole
@@ -43,7 +43,7 @@ def _probability(text: str) -> float:
     return value
 
 
-_FLAGS: Final[Flags] = {
+_OWN: Final[Flags] = {
     "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"},
     "--level": {
         "type": _probability,
@@ -78,15 +78,13 @@ _FLAGS: Final[Flags] = {
         "help": "of several recordings: the sensor's errors are shared as well",
     },
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe diagnose``."""
-    add_file(parser, several=True)
-    declare(parser, _FLAGS)
-    add(parser, "--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
+ARGUMENTS: Final = (
+    FILES
+    | _OWN
+    | shared("--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
-    add(parser, "--calibration", nargs="+", default=[])
+    | shared("--calibration", nargs="+", default=[])
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe import manifest
-from pendpipe.arguments import add, print_answer
+from pendpipe.arguments import SHARED, print_answer
 from pendpipe.errors import InputError
 from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
 
@@ -21,20 +21,17 @@ _NO_RESULTS: Final = (FOLDER, "logs", "raw", "challenge", "challenge-sealed")
 _RUN: Final = "snakemake makes it again"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe doctor``."""
-    parser.add_argument(
-        "folder",
-        nargs="?",
-        type=Path,
-        default=Path("results"),
-        metavar="DIR",
-        help="a folder of results (%(default)s)",
-    )
-    add(parser, "--json")
-    parser.add_argument(
-        "--fail-on", choices=("findings",), help="end with status 3 if anything is wrong"
-    )
+ARGUMENTS: Final = {
+    "folder": {
+        "nargs": "?",
+        "type": Path,
+        "default": Path("results"),
+        "metavar": "DIR",
+        "help": "a folder of results (%(default)s)",
+    },
+    "--json": SHARED["--json"],
+    "--fail-on": {"choices": ("findings",), "help": "end with status 3 if anything is wrong"},
+}
 
 
 def run(arguments: argparse.Namespace) -> int:

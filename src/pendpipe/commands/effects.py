@@ -4,14 +4,13 @@ With --list, one line an effect: identifier, kind, name.
 """
 
 import argparse
+from typing import Final
 
-from pendpipe.arguments import add, print_answer
+from pendpipe.arguments import print_answer, shared
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe effects``."""
-    parser.add_argument("--list", action="store_true", help="one line an effect")
-    add(parser, "--json")
+ARGUMENTS: Final = {"--list": {"action": "store_true", "help": "one line an effect"}} | shared(
+    "--json"
+)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Flags, add, declare
+from pendpipe.arguments import shared
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 
-_FLAGS: Final[Flags] = {
+ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
     "--out": {
         "required": True,
         "type": Path,
@@ -27,12 +27,6 @@ _FLAGS: Final[Flags] = {
         "help": "how many may draw at once (1)",
     },
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe figures``."""
-    add(parser, "--campaign", "--comparison", required=True)
-    declare(parser, _FLAGS)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -18,14 +18,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import Flags, add, add_file, declare, print_answer, print_json, read_motion
+from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
 from pendpipe.errors import InputError, refuse_if
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit import FitResult
 
 
-_FLAGS: Final[Flags] = {
+_OWN: Final[Flags] = {
     "--out": {"metavar": "JSON", "help": "the result; - is standard output"},
     "--figure": {
         "type": Path,
@@ -50,14 +50,12 @@ _FLAGS: Final[Flags] = {
     },
     "--seed": {"type": int, "metavar": "N", "help": "recorded only"},
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe fit``."""
-    add_file(parser, several=True)
-    declare(parser, _FLAGS)
-    add(parser, "--json", "--baseline", "--fix", "--turning-points", "--calibration")
-    add(parser, "--record", "--refused")
+ARGUMENTS: Final = (
+    FILES
+    | _OWN
+    | shared("--json", "--baseline", "--fix", "--turning-points", "--calibration")
+    | shared("--record", "--refused")
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from pendpipe.arguments import add, add_file, print_answer, read_options
+from pendpipe.arguments import FILE, print_answer, read_options, shared
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe inspect``."""
-    add_file(parser)
-    add(parser, "--json")
+ARGUMENTS: Final = FILE | shared("--json")
 
 
 def run(arguments: argparse.Namespace) -> None:

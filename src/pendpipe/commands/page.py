@@ -6,16 +6,18 @@ The page is a single HTML file that needs no network.
 import argparse
 import sys
 from pathlib import Path
+from typing import Final
 
-from pendpipe.arguments import add, add_file, read_motion
+from pendpipe.arguments import FILE, read_motion, shared
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe page``."""
-    add_file(parser)
-    parser.add_argument("--out", metavar="HTML", help="the page (FILE.html); - is standard output")
-    parser.add_argument("--no-diagnosis", action="store_true", help="the fit alone, in a second")
-    add(parser, "--calibration")
+ARGUMENTS: Final = (
+    FILE
+    | {
+        "--out": {"metavar": "HTML", "help": "the page (FILE.html); - is standard output"},
+        "--no-diagnosis": {"action": "store_true", "help": "the fit alone, in a second"},
+    }
+    | shared("--calibration")
+)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Flags, add, declare
+from pendpipe.arguments import shared
 
-_FLAGS: Final[Flags] = {
+ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
     "--summary": {
         "required": True,
         "type": Path,
@@ -31,12 +31,6 @@ _FLAGS: Final[Flags] = {
     },
     "--out": {"required": True, "type": Path, "metavar": "PAGE.html", "help": "the page"},
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe report``."""
-    add(parser, "--campaign", "--comparison", required=True)
-    declare(parser, _FLAGS)
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -7,13 +7,15 @@ with every key.
 
 import argparse
 from pathlib import Path
+from typing import Final
 
+from pendpipe.arguments import Flags
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe simulate``."""
-    parser.add_argument("model", metavar="MODEL.toml", help="what to simulate")
-    parser.add_argument("out", metavar="OUT.csv", type=Path, help="the recording, plain form")
-    parser.add_argument("--seed", type=int, help="seed of the noise, instead of the model's")
+ARGUMENTS: Final[Flags] = {
+    "model": {"metavar": "MODEL.toml", "help": "what to simulate"},
+    "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"},
+    "--seed": {"type": int, "help": "seed of the noise, instead of the model's"},
+}
 
 
 def run(arguments: argparse.Namespace) -> None:

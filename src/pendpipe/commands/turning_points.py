@@ -8,15 +8,15 @@ holds what they share: noise, the level's standard deviation, the spans that wer
 import argparse
 import sys
 from pathlib import Path
+from typing import Final
 
-from pendpipe.arguments import add, add_file, read_motion
+from pendpipe.arguments import FILE, read_motion, shared
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe turning-points``."""
-    add_file(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="the table")
-    add(parser, "--calibration", "--record", "--refused")
+ARGUMENTS: Final = (
+    FILE
+    | {"--out": {"type": Path, "required": True, "metavar": "CSV", "help": "the table"}}
+    | shared("--calibration", "--record", "--refused")
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

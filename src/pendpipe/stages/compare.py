@@ -18,7 +18,7 @@ from pendpipe.analysis.compare import (
 from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import add, load
+from pendpipe.arguments import load, shared
 from pendpipe.campaign.design import design_of
 from pendpipe.campaign.joint import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
@@ -42,13 +42,11 @@ from pendpipe.stages.results import (
 from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.version import __version__
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe compare``."""
-    add(parser, "--campaign", required=True)
-    parser.add_argument("--separation", type=Path, required=True, help="the stage before's JSON")
-    parser.add_argument("--out", type=Path, required=True, help="the comparison, JSON")
-    parser.add_argument("--summary", type=Path, required=True, help="campaign.json")
+ARGUMENTS: Final = shared("--campaign", required=True) | {
+    "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"},
+    "--out": {"type": Path, "required": True, "help": "the comparison, JSON"},
+    "--summary": {"type": Path, "required": True, "help": "campaign.json"},
+}
 
 
 def run(arguments: argparse.Namespace) -> None:

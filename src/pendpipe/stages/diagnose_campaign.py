@@ -8,9 +8,9 @@ goes to standard output as one paragraph.
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from pendpipe.arguments import add, load, print_answer
+from pendpipe.arguments import SHARED, load, print_answer, shared
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
@@ -21,17 +21,22 @@ from pendpipe.version import __version__
 FILE_NAME = "campaign_diagnosis.json"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe diagnose-campaign``."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="the campaign's results")
-    add(parser, "--campaign", default=Path("config/config.yaml"))
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE", help=f"the answer; DIR/{FILE_NAME} by default"
-    )
-    add(parser, "--json")
-    parser.add_argument(
-        "--fail-on", choices=("missing-physics",), help="end with status 3 on that verdict"
-    )
+ARGUMENTS: Final = (
+    {"folder": {"type": Path, "metavar": "DIR", "help": "the campaign's results"}}
+    | shared("--campaign", default=Path("config/config.yaml"))
+    | {
+        "--out": {
+            "type": Path,
+            "metavar": "FILE",
+            "help": f"the answer; DIR/{FILE_NAME} by default",
+        },
+        "--json": SHARED["--json"],
+        "--fail-on": {
+            "choices": ("missing-physics",),
+            "help": "end with status 3 on that verdict",
+        },
+    }
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pendpipe.analysis.separate import (
     Benchmark,
@@ -12,7 +12,7 @@ from pendpipe.analysis.separate import (
     fit_benchmark,
     separate,
 )
-from pendpipe.arguments import add, load
+from pendpipe.arguments import load, shared
 from pendpipe.campaign.joint import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
@@ -26,11 +26,9 @@ from pendpipe.stages.results import (
     record_theory,
 )
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``pendpipe separate``."""
-    add(parser, "--campaign", required=True)
-    parser.add_argument("--out", type=Path, required=True, help="the separation, JSON")
+ARGUMENTS: Final = shared("--campaign", required=True) | {
+    "--out": {"type": Path, "required": True, "help": "the separation, JSON"}
+}
 
 
 def run(arguments: argparse.Namespace) -> None:
