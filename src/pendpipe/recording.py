@@ -369,7 +369,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
         time_s=column["time_s"],
         values=column[quantity],
         quantity=quantity,
-        quality=_quality(place, column["quality"], first + 2) if "quality" in column else None,
+        quality=_as_bytes(column["quality"]) if "quality" in column else None,
         radius_excess=column.get("radius_excess"),
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
         notes=notes,
@@ -445,14 +445,10 @@ def _numbers(
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
 
 
-def _quality(place: Path, column: FloatArray, first_line: int) -> ByteArray:
-    """Turn the column into bytes; what is no byte can't be cast."""
-    odd = np.flatnonzero(~np.isin(column, (GOOD, SUSPECT, MISSING)))
-    if odd.size:
-        raise InputError(
-            f"{place}, line {first_line + odd[0]}", "quality is not 0, 1 or 2", "correct the row"
-        )
-    return column.astype(np.uint8)
+def _as_bytes(quality: FloatArray) -> ByteArray:
+    """Turn the column into bytes; what is no quality becomes 255, which `check` refuses."""
+    known = np.isin(quality, (GOOD, SUSPECT, MISSING))
+    return np.where(known, quality, 255).astype(np.uint8)
 
 
 def check(place: str | Path, recording: Recording, *, first_line: int | None = None) -> None:

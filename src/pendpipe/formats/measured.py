@@ -56,6 +56,11 @@ class TimeBase:
     weak_guesses: list[str] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
 
+    def keep(self, rows: slice | BoolArray | IntArray, note: str) -> None:
+        """Keep some of the rows, or put them into another order, and say so."""
+        self.time_s, self.rows = self.time_s[rows], self.rows[rows]
+        self.notes.append(note)
+
 
 def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     """Find the time of every row.
@@ -189,8 +194,8 @@ def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
 def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> TimeBase:
     """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
     if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
-        base.time_s, base.rows = base.time_s[::-1].copy(), base.rows[::-1].copy()
-        base.notes.append("the newest row stands first: rows turned round")
+        newest_last = np.arange(len(base.rows))[::-1]
+        base.keep(newest_last, "the newest row stands first: rows turned round")
     if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
         start = float(base.time_s[0])
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
@@ -263,8 +268,8 @@ def _drop_repeats(choice: Choice, base: TimeBase) -> None:
                 same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
                 again &= same
     if again.any():
-        base.notes.append(f"{again.sum()} row(s) that repeat the time of an earlier row left out")
-        base.time_s, base.rows = base.time_s[~again], base.rows[~again]
+        note = f"{again.sum()} row(s) that repeat the time of an earlier row left out"
+        base.keep(~again, note)
 
 
 def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
@@ -292,8 +297,7 @@ def _sorted(choice: Choice, base: TimeBase) -> None:
     if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
         return
     moved = int(np.sum(order != np.arange(len(order))))
-    base.notes.append(f"{moved} row(s) out of order: sorted by time")
-    base.time_s, base.rows = base.time_s[order], base.rows[order]
+    base.keep(order, f"{moved} row(s) out of order: sorted by time")
 
 
 def _rounded(time: FloatArray) -> FloatArray | None:
@@ -365,10 +369,8 @@ def _keep_last(choice: Choice, base: TimeBase) -> None:
     count = float(np.median(jumps)) if len(jumps) and np.all(np.diff(base.time_s) >= 0) else 0.0
     if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:
         last = np.append(np.diff(base.time_s) > 0, True)
-        base.time_s, base.rows = base.time_s[last], base.rows[last]
-        base.notes.append(
-            f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
-        )
+        merged = f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
+        base.keep(last, merged)
 
 
 _RADIAN = Unit("angle", 1.0, "rad")

@@ -11,50 +11,34 @@ from pendpipe.arrays import IntArray
 
 
 class TextDialect(Dialect):
-    """Commands of text, ended by CR."""
+    """Commands of text, ended by CR; while data flow only ``stop`` is obeyed."""
 
     full_scales: ClassVar[tuple[float, ...]] = (10.0,)
+    information: ClassVar[dict[str, str]]
+    """Answers to ``info N``; 0 and 1 are the maker and the model."""
+    unknown: ClassVar[bytes] = b""
+    """Answer to a command that the box does not know."""
+    echoes_start: ClassVar[bool] = True
 
     def __init__(self) -> None:
         super().__init__()
         self._line = b""
+        self._list = [0]
+
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The enabled channels, from 1, in the order of the scan."""
+        return tuple((word & 0x0F) + 1 for word in self._list)
+
+    @property
+    def range_volts(self) -> float:
+        """Full scale, by the code in the first word of the list."""
+        return self.full_scales[min(len(self.full_scales) - 1, self._list[0] >> 8 & 0x0F)]
 
     def respond(self, data: bytes) -> bytes:
         """Take bytes from the host; return the echoes and answers."""
         *complete, self._line = (self._line + data).split(b"\r")
         return b"".join(self._execute(line.decode("latin-1").strip("\0\n ")) for line in complete)
-
-    @abstractmethod
-    def _execute(self, text: str) -> bytes:
-        """Execute one command and return its echo."""
-
-
-class SimulatedDI149(TextDialect, model="DI-149", bits=12):
-    """Eight channels of 12 bits, +-10 V, text commands ended by CR.
-
-    Every command is echoed with its CR, ``start`` too. While data flow only ``stop`` is
-    obeyed. The scan list ends where ``xffff`` is written.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._list = [0]
-        self._divisor = 7500
-
-    @property
-    def channels(self) -> tuple[int, ...]:
-        """The enabled channels, from 1, in the order of the scan."""
-        return tuple(word % 16 + 1 for word in self._list)
-
-    @property
-    def range_volts(self) -> float:
-        """Full scale, by the gain code of the first word of the list."""
-        return self.full_scales[self._list[0] // 256 % 8 % len(self.full_scales)]
-
-    @property
-    def scan_rate_hz(self) -> float:
-        """Scans a second: 750 kHz over srate."""
-        return 750e3 / self._divisor
 
     def _execute(self, text: str) -> bytes:
         """Execute one command and return its echo."""
@@ -65,18 +49,47 @@ class SimulatedDI149(TextDialect, model="DI-149", bits=12):
         if name in ("start", "stop"):
             self.streaming = name == "start"
             self.starts += self.streaming
+            if self.streaming and not self.echoes_start:
+                return b""
         elif name == "info" and arguments:
-            answers = {"0": "DATAQ", "1": self.model.split("-")[1], "2": "65", "6": "0012345601"}
-            answer = " " + answers.get(arguments[0], "")
+            known = {"0": "DATAQ", "1": self.model.removeprefix("DI-"), **self.information}
+            answer = " " + known.get(arguments[0], "")
         elif name == "slist" and len(arguments) == 2:
             place, word = int(arguments[0]), arguments[1]
             value = int(word[1:], 16) if word[0] == "x" else int(word)
-            self._list[place:] = [] if value == 0xFFFF else [value]
-        elif name == "srate" and arguments:
-            self._divisor = min(65535, max(75 * len(self._list), int(arguments[0])))
-        elif name not in ("asc", "bin", "float", "din", "dout", "reset", "R1"):
-            return b""
+            # A list is written from its first place on, and ends with its last.
+            self._list[place:] = [] if value == _END_OF_LIST else [value]
+        elif not self._set(name, arguments):
+            return self.unknown
         return f"{text}{answer}\r".encode("latin-1")
+
+    @abstractmethod
+    def _set(self, name: str, arguments: list[str]) -> bool:
+        """Make a setting; return whether the box knows the command."""
+
+
+_END_OF_LIST: Final = 0xFFFF
+
+
+class SimulatedDI149(TextDialect, model="DI-149", bits=12):
+    """Eight channels of 12 bits, +-10 V. Every command is echoed, ``start`` too."""
+
+    information: ClassVar[dict[str, str]] = {"2": "65", "6": "0012345601"}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._divisor = 7500
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Scans a second: 750 kHz over srate."""
+        return 750e3 / self._divisor
+
+    def _set(self, name: str, arguments: list[str]) -> bool:
+        """Make a setting; return whether the box knows the command."""
+        if name == "srate" and arguments:
+            self._divisor = min(65535, max(75 * len(self._list), int(arguments[0])))
+        return name in ("srate", "asc", "bin", "float", "din", "dout", "reset", "R1")
 
     def encode(self, codes: IntArray) -> bytes:
         """Two bytes a sample, 14 bits with a frame mark."""
@@ -92,13 +105,15 @@ class SimulatedDI155(
     """Four channels of 14 bits, +-50 V over eight gains."""
 
 
-class SimulatedDI2108(TextDialect, model="DI-2108", bits=16):
-    """Eight channels of 16 bits, +-10 V, text commands ended by CR.
+class SimulatedDI2108(
+    TextDialect, model="DI-2108", bits=16, unknown=b"Command not found\r", echoes_start=False
+):
+    """Eight channels of 16 bits, +-10 V; data leave in packets (``ps``).
 
-    Commands are echoed with their CR; ``start`` is not, and ``info N`` is followed by the
-    answer. While data flow only ``stop`` is obeyed. Data leave in packets (``ps``).
+    Commands are echoed, but for ``start``.
     """
 
+    information: ClassVar[dict[str, str]] = {"2": "0.141", "6": "5F2A9C01", "9": "60000000"}
     limits: ClassVar[dict[str, tuple[int, int]]] = {
         "srate": (375, 65535),
         "dec": (1, 512),
@@ -109,18 +124,7 @@ class SimulatedDI2108(TextDialect, model="DI-2108", bits=16):
 
     def __init__(self) -> None:
         super().__init__()
-        self._list: dict[int, int] = {0: 0}
         self._setting = {"srate": 60000, "dec": 1, "deca": 1, "ps": 0, "encode": 0}
-
-    @property
-    def channels(self) -> tuple[int, ...]:
-        """The enabled channels, from 1, in the order of the scan."""
-        return tuple((self._list[place] & 0x0F) + 1 for place in sorted(self._list))
-
-    @property
-    def range_volts(self) -> float:
-        """Full scale, by the range code of the first word of the list."""
-        return self.full_scales[min(len(self.full_scales) - 1, self._list[0] >> 8 & 0x0F)]
 
     @property
     def scan_rate_hz(self) -> float:
@@ -132,32 +136,13 @@ class SimulatedDI2108(TextDialect, model="DI-2108", bits=16):
         """16, 32, ... 2048 bytes for ``ps`` 0 to 7."""
         return 16 << self._setting["ps"]
 
-    def _execute(self, text: str) -> bytes:
-        """Execute one command and return its echo."""
-        name, *arguments = text.split()[:3] or [""]
-        if self.streaming and name != "stop":
-            return b""
-        if name == "start":
-            self.streaming = True
-            self.starts += 1
-            return b""
-        if name == "stop":
-            self.streaming = False
-        elif name == "info" and arguments:
-            number = self.model.removeprefix("DI-")
-            answers = {"0": "DATAQ", "1": number, "2": "0.141", "6": "5F2A9C01", "9": "60000000"}
-            return f"{text} {answers.get(arguments[0], '')}\r".encode()
-        elif name == "slist" and len(arguments) == 2:
-            place = int(arguments[0])
-            # A list is written from its first place on, and ends with its last.
-            kept = {key: word for key, word in self._list.items() if key < place}
-            self._list = {**kept, place: int(arguments[1])}
-        elif name in self._setting and arguments:
+    def _set(self, name: str, arguments: list[str]) -> bool:
+        """Make a setting; return whether the box knows the command."""
+        if name in self._setting and arguments:
             low, high = self.limits[name]
             self._setting[name] = min(high, max(low, int(arguments[0])))
-        elif name not in ("filter", "eol", "led", "din", "reset"):
-            return b"Command not found\r"
-        return f"{text}\r".encode()
+            return True
+        return name in ("filter", "eol", "led", "din", "reset")
 
     def encode(self, codes: IntArray) -> bytes:
         """One signed 16-bit word a sample, low byte first, its bits at the top."""

@@ -140,13 +140,12 @@ class Driver(ABC):
             On a channel or a range that the box does not have, or a rate out of its reach.
         """
         chosen = tuple(sorted(set(channels)))
-        if not chosen or chosen[0] < 1 or chosen[-1] > self.channels:
-            listed = ", ".join(map(str, channels)) or "none"
-            raise InputError(
-                self.line.port,
-                f"the {self.model} has no channel {listed}",
-                f"choose from 1 to {self.channels}",
-            )
+        refuse_if(
+            not chosen or chosen[0] < 1 or chosen[-1] > self.channels,
+            self.line.port,
+            f"the {self.model} has no channel {', '.join(map(str, channels)) or 'none'}",
+            f"choose from 1 to {self.channels}",
+        )
         full_scale = self.range_volts
         if range_volts is not None:
             enough = [high for high in self.ranges if high >= range_volts > 0]
@@ -247,9 +246,11 @@ class Driver(ABC):
             f"check {self.checks} and --model (asked for a {self.model})",
         )
 
-    def _no_rate(self, what: str, rate_hz: float, slowest: str, fastest: float) -> InputError:
-        return InputError(
+    def _refuse_rate(self, rate_hz: float, slowest: float, fastest: float, what: str = "") -> None:
+        """Refuse a rate of scans (of so many channels) that is out of reach."""
+        refuse_if(
+            not slowest <= rate_hz <= fastest,
             self.line.port,
             f"the {self.model} can't scan {what}at {rate_hz:g} Hz",
-            f"choose a rate between {slowest} and {fastest:g} Hz",
+            f"choose a rate between {slowest:.3g} and {fastest:g} Hz",
         )

@@ -64,17 +64,16 @@ class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4
         return Identity(_IDENTITIES.get(name) or f"device that calls itself {name!r}")
 
     def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:  # noqa: ARG002 - it has one range
-        samples = len(channels) * rate_hz
-        baudrate = 4800 if samples <= 4800 / _BITS_PER_SAMPLE else 9600
-        count = round(baudrate / rate_hz) - _BITS_PER_SAMPLE * len(channels) if rate_hz > 0 else -1
-        if samples > baudrate / _BITS_PER_SAMPLE or not 0 <= count <= _SLOWEST_COUNT:
-            what = f"{len(channels)} channel(s) "
-            raise self._no_rate(what, rate_hz, "0.15", 480 / len(channels))
+        scan_bits = _BITS_PER_SAMPLE * len(channels)
+        slowest, fastest = 4800 / (scan_bits + _SLOWEST_COUNT), 9600 / scan_bits
+        self._refuse_rate(rate_hz, slowest, fastest, f"{len(channels)} channel(s) ")
+        baudrate = 4800 if rate_hz <= 4800 / scan_bits else 9600
+        count = round(baudrate / rate_hz) - scan_bits
         self._set_baudrate(baudrate)
         self._command(b"C", bytes([sum(1 << (channel - 1) for channel in channels)]))
         self._command(b"L", bytes([count & 0xFF]))
         self._command(b"M", bytes([count >> 8]))
-        return baudrate / (_BITS_PER_SAMPLE * len(channels) + count)
+        return baudrate / (scan_bits + count)
 
     def _start_stream(self) -> None:
         self._command(b"S", b"1", undo=True)
@@ -149,9 +148,7 @@ class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RAN
         count = len(channels)
         wanted = rate_hz * count
         slowest, fastest = _burst_hz(_DIVISORS[-1], _FILTERS[-1]), _burst_hz(0, 1)
-        if not slowest <= wanted <= fastest:
-            what = f"{count} channel(s) "
-            raise self._no_rate(what, rate_hz, f"{slowest / count:.3g}", fastest / count)
+        self._refuse_rate(rate_hz, slowest / count, fastest / count, f"{count} channel(s) ")
         divisor, average = min(
             ((divisor, average) for average in _FILTERS for divisor in _DIVISORS),
             key=lambda pair: (abs(_burst_hz(*pair) - wanted), pair[1]),

@@ -45,8 +45,7 @@ class DI149(TextDriver, model="DI-149", bits=12):
             _DI149_HZ / _SLOWEST_DIVISOR,
             _DI149_HZ / _FASTEST_DIVISOR / len(channels),
         )
-        if not slowest <= rate_hz <= fastest:
-            raise self._no_rate(f"{len(channels)} channel(s) ", rate_hz, f"{slowest:.4g}", fastest)
+        self._refuse_rate(rate_hz, slowest, fastest, f"{len(channels)} channel(s) ")
         divisor = round(_DI149_HZ / rate_hz)
         self._send_line("asc")  # the scan list is written in this mode
         for position, channel in enumerate(channels):
@@ -132,8 +131,7 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
         """Find srate, dec and deca whose rate is nearest to `rate_hz`."""
         low, high = self.divisors
         slowest = _CDC_HZ / (high * self.decimations * self.further_decimations)
-        if not slowest <= rate_hz <= _CDC_HZ / low:
-            raise self._no_rate("", rate_hz, f"{slowest:.3g}", _CDC_HZ / low)
+        self._refuse_rate(rate_hz, slowest, _CDC_HZ / low)
         product = _CDC_HZ / rate_hz
         further = math.ceil(product / (high * self.decimations))
         further = min(self.further_decimations, max(1, further))
