@@ -18,7 +18,7 @@ from pendpipe.acquisition.raw import COMPLETE, Hole, NothingRecordedError, RawRe
 from pendpipe.acquisition.slips import find_slips
 from pendpipe.acquisition.timebase import TimeBase, find_clock_losses, measure_rate
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
 _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
@@ -63,9 +63,12 @@ def decode_recording(
     _check_description(place, raw)
     channels: list[int] = list(raw.header["channels"])
     chosen = channels[0] if channel is None else channel
-    if chosen not in channels:
-        listed = ", ".join(map(str, channels))
-        raise InputError(place, f"channel {chosen} was not recorded", f"choose from {listed}")
+    refuse_if(
+        chosen not in channels,
+        place,
+        f"channel {chosen} was not recorded",
+        f"choose from {', '.join(map(str, channels))}",
+    )
     driver = find_driver(raw.header["model"])
     segments = split(raw, driver)
     kept = raw.event("stopped").get("keep_scans")
@@ -105,10 +108,10 @@ def _check_description(place: str, raw: RawRecording) -> None:
     InputError
         On a missing or impossible entry, or time stamps that fall.
     """
-    if fault := next(_faults(raw), None):
-        raise InputError(
-            place, f"the description of the recording is damaged ({fault})", "give another copy"
-        )
+    fault = next(_faults(raw), None)
+    refuse_if(
+        fault, place, f"the description of the recording is damaged ({fault})", "give another copy"
+    )
 
 
 def _faults(raw: RawRecording) -> Iterator[str]:

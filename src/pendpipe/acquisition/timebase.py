@@ -114,17 +114,12 @@ def measure_rate(
         stretch[np.argmin(late[stretch])]
         for stretch in np.array_split(np.arange(len(scans)), _RATE_STRETCHES)
     ]
-    x, y = scans[first], arrival_s[first]
-    x_mean, y_mean = x.mean(), y.mean()
-    spread = float(np.sum((x - x_mean) ** 2))
-    interval = float(np.sum((x - x_mean) * (y - y_mean))) / spread
+    (interval, _), covariance = np.polyfit(scans[first], arrival_s[first], 1, cov=True)
     if interval <= 0:
         return nothing
-    residual = y - y_mean - interval * (x - x_mean)
-    variance = float(np.sum(residual**2)) / (_RATE_STRETCHES - 2) / spread
     floor = math.hypot(interval / math.sqrt(12.0), _RATE_STAMP_S * clock_scale)
-    sd = math.hypot(math.sqrt(variance), floor / (scans[-1] - scans[0]))
-    return TimeBase(nominal_hz, 1.0 / interval, sd / interval**2)
+    sd = math.hypot(math.sqrt(covariance[0, 0]), floor / (scans[-1] - scans[0]))
+    return TimeBase(nominal_hz, float(1.0 / interval), float(sd / interval**2))
 
 
 @dataclass(frozen=True)

@@ -115,13 +115,12 @@ def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
     if options.start_s is None and options.stop_s is None:
         return recording
     part = recording.between(options.start_s, options.stop_s)
-    if not len(part):
-        first, last = recording.time_s[0], recording.time_s[-1]
-        raise InputError(
-            place,
-            "there is no sample between --start and --stop",
-            f"the recording runs from {first:.6g} to {last:.6g} s",
-        )
+    refuse_if(
+        not len(part),
+        place,
+        "there is no sample between --start and --stop",
+        f"the recording runs from {recording.time_s[0]:.6g} to {recording.time_s[-1]:.6g} s",
+    )
     return part
 
 

@@ -15,7 +15,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.configuration.faults import as_input_error, read_text
 from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 from pendpipe.simulation.instrument import Given, Instrument, read_effects
 
@@ -124,36 +124,56 @@ def refuse_inert_effects(model: Model, given: Sequence[Given], place: str) -> No
     InputError
         Which effect, what is missing, what to do.
     """
-    seen: set[str] = set()
+    pendulum, seen = model.pendulum, set[str]()
+    damped = any(
+        (
+            pendulum.a,
+            pendulum.c,
+            pendulum.quality_factor_hysteretic,
+            pendulum.quality_factor_viscous,
+        )
+    )
     for number, one in enumerate(given, start=1):
         name = one.effect.identifier
         where = f"{place}, effects {number} ({name})"
-        if not one.effect.has_signature and name in seen:
-            raise InputError(where, "it is given before", "write one table of it")
+        levels = [one.named().get(level, math.nan) for level in ("lower_level", "upper_level")]
+        for wrong, problem, remedy in (
+            (
+                not one.effect.has_signature and name in seen,
+                "it is given before",
+                "write one table of it",
+            ),
+            *(
+                (
+                    not getattr(pendulum, need),
+                    f"it does nothing where the pendulum's {need} is 0",
+                    f"give {need}",
+                )
+                for need in one.effect.needs
+            ),
+            (
+                name == "damping-step" and not damped,
+                "it does nothing where the pendulum has no damping",
+                "give a, c or a quality factor",
+            ),
+            (
+                name == "missing-codes" and model.converter is None,
+                "there are no missing codes without a converter",
+                "add [converter]",
+            ),
+            (
+                name == "coloured-noise" and not _noise(model),
+                "it colours the noise, and there is none",
+                "give noise_rad, or noise_volts",
+            ),
+            (
+                name == "clipping" and not np.isfinite(levels).any(),
+                "neither of its levels is given",
+                "give upper_level or lower_level, in rad",
+            ),
+        ):
+            refuse_if(wrong, where, problem, remedy)
         seen.add(name)
-        lacking = _lacking(model, one)
-        if lacking is not None:
-            raise InputError(where, *lacking)
-
-
-def _lacking(model: Model, one: Given) -> tuple[str, str] | None:
-    """What an effect acts on and a model lacks, and what to do; None where it has it."""
-    name, pendulum = one.effect.identifier, model.pendulum
-    for need in one.effect.needs:
-        if not getattr(pendulum, need):
-            return f"it does nothing where the pendulum's {need} is 0", f"give {need}"
-    linear = pendulum.quality_factor_hysteretic or pendulum.quality_factor_viscous
-    if name == "damping-step" and not (pendulum.a or pendulum.c or linear):
-        return "it does nothing where the pendulum has no damping", "give a, c or a quality factor"
-    if name == "missing-codes" and model.converter is None:
-        return "there are no missing codes without a converter", "add [converter]"
-    if name == "coloured-noise" and not _noise(model):
-        return "it colours the noise, and there is none", "give noise_rad, or noise_volts"
-    if name == "clipping" and not any(
-        math.isfinite(one.named()[level]) for level in ("lower_level", "upper_level")
-    ):
-        return "neither of its levels is given", "give upper_level or lower_level, in rad"
-    return None
 
 
 def _noise(model: Model) -> bool:
@@ -238,11 +258,19 @@ def _angles(
     release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
     taken = instrument.times(time)
     moving = [one for one in given if one.effect.has_signature]
-    if equation.restoring == "sine" and not abs(release.angle_rad) < math.pi:
-        raise InputError(place, "with sin x it is released beyond pi", "release it below 3.14 rad")
-    if moving and equation.restoring == "sine":
-        remedy = 'leave restoring out and add the effect "circular-error"'
-        raise InputError(place, "effects are solved for a linear torque", remedy)
+    is_sine = equation.restoring == "sine"
+    refuse_if(
+        is_sine and not abs(release.angle_rad) < math.pi,
+        place,
+        "with sin x it is released beyond pi",
+        "release it below 3.14 rad",
+    )
+    refuse_if(
+        is_sine and moving,
+        place,
+        "effects are solved for a linear torque",
+        'leave restoring out and add the effect "circular-error"',
+    )
     if moving:
         from pendpipe.simulation.motion import angles
 
