@@ -16,6 +16,9 @@ CLOSENESS: Final = np.array([0.03, 0.08, 0.16, 0.28, 0.42, 0.5])
 """(2 a/H)^3 of the tanks that are computed; 0.44 is the paper's 3.8 cm in 5 cm."""
 DEPTHS: Final = np.array([0.02, 0.06, 0.14, 0.3])
 """Penetration depths, in radii: those of water between 1 Hz and 0.05 Hz, and of glycerol."""
+_FEW_NEAR: Final = CLOSENESS[[0, 2, 3, 5]]
+_FEW_DEPTHS: Final = DEPTHS[::3]
+"""Those at which other heights are computed, which change less."""
 _ORDER: Final = 10
 """Of the multipoles: 1e-5 of the force at the closest walls."""
 
@@ -52,22 +55,21 @@ def confined(
     drag, mass
         The drag's factor; the added mass less ``1/2 + 9 delta/(4 a)``, in the displaced fluid.
     """
-    nodes = _nodes(tank)
-    step = max(float(nodes[1] - nodes[0]), 1e-9)
-    scale = _closest(tank)
-    rows = _powers(*np.broadcast_arrays(np.minimum(closeness / scale, 1.0), depth))
+    nodes, scale = _nodes(tank), _closest(tank)
+    near, thick = np.broadcast_arrays(np.minimum(closeness / scale, 1.0), depth)
     proportions = tuple(
         size / tank.depth_m for size in (tank.length_m, tank.width_m, tank.off_centre_m)
     )
-    up = np.asarray(higher) / step
-    weights = (up * (up - 1.0) / 2.0, 1.0 - up**2, up * (up + 1.0) / 2.0)
-    drag, mass = 0.0, 0.0
-    for weight, height in zip(weights, nodes.tolist(), strict=True):
-        if not np.any(weight):
-            continue
-        more = [rows @ column for column in _table(surface, proportions, height, scale).T]
-        drag, mass = drag + weight * more[0], mass + weight * more[1]
-    return np.asarray(1.0 + drag), np.asarray(mass)
+    whole = _table(surface, proportions, nodes[1], scale)
+    excess = _powers(near, thick, len(CLOSENESS), len(DEPTHS)) @ whole
+    up = np.asarray(higher) / max(nodes[1] - nodes[0], 1e-9)
+    # Lagrange's parabola through three heights; the middle one is `whole`.
+    for weight, height in ((up * (up - 1.0) / 2.0, nodes[0]), (up * (up + 1.0) / 2.0, nodes[2])):
+        if np.any(weight):
+            moved = _moved(surface, proportions, (nodes[1], height), scale)
+            rows = _powers(near, thick, len(_FEW_NEAR), len(_FEW_DEPTHS))
+            excess = excess + weight[..., None] * (rows @ moved)
+    return np.asarray(1.0 + excess[..., 0]), np.asarray(excess[..., 1])
 
 
 def height_sd(tank: Tank) -> float:
@@ -79,11 +81,11 @@ def height_sd(tank: Tank) -> float:
     return float(np.hypot(tank.height_sd_m, height / tank.depth_m * tank.depth_sd_m)) / tank.depth_m
 
 
-def _nodes(tank: Tank) -> FloatArray:
+def _nodes(tank: Tank) -> tuple[float, float, float]:
     """The heights that are computed, in depths: the configured one, and one sd to each side."""
     height = 0.5 if tank.height_m is None else tank.height_m / tank.depth_m
     step = min(height_sd(tank), 0.2 * min(height, 1.0 - height))
-    return height + step * np.array([-1.0, 0.0, 1.0])
+    return height - step, height, height + step
 
 
 def _closest(tank: Tank) -> float:
@@ -95,10 +97,10 @@ def _closest(tank: Tank) -> float:
     return float(min(CLOSENESS[-1], (0.95 * room) ** 3))
 
 
-def _powers(closeness: FloatArray, depth: FloatArray) -> FloatArray:
+def _powers(closeness: FloatArray, depth: FloatArray, nears: int, depths: int) -> FloatArray:
     """The polynomial's terms: every one has the closeness as a factor."""
-    near = [closeness**power for power in range(1, len(CLOSENESS) + 1)]
-    thick = [depth**power for power in range(len(DEPTHS))]
+    near = [closeness**power for power in range(1, nears + 1)]
+    thick = [depth**power for power in range(depths)]
     return np.stack([one * other for one in near for other in thick], axis=-1)
 
 
@@ -107,10 +109,36 @@ def _table(
     surface: Surface, proportions: tuple[float, ...], height: float, closest: float
 ) -> FloatArray:
     """Coefficients of the drag's and the added mass's excess; sizes in depths of the fluid."""
-    length, width, aside = proportions
     near, depth = (each.ravel() for each in np.meshgrid(CLOSENESS / CLOSENESS[-1], DEPTHS))
+    found = _excess(surface, proportions, height, closest * near, depth)
+    return np.asarray(np.linalg.solve(_powers(near, depth, len(CLOSENESS), len(DEPTHS)), found))
+
+
+@cache
+def _moved(
+    surface: Surface, proportions: tuple[float, ...], heights: tuple[float, float], closest: float
+) -> FloatArray:
+    """Coefficients of the change of both from one height to another, at fewer nodes."""
+    near, depth = (each.ravel() for each in np.meshgrid(_FEW_NEAR / CLOSENESS[-1], _FEW_DEPTHS))
+    before = _powers(near, depth, len(CLOSENESS), len(DEPTHS)) @ _table(
+        surface, proportions, heights[0], closest
+    )
+    after = _excess(surface, proportions, heights[1], closest * near, depth)
+    rows = _powers(near, depth, len(_FEW_NEAR), len(_FEW_DEPTHS))
+    return np.asarray(np.linalg.solve(rows, after - before))
+
+
+def _excess(
+    surface: Surface,
+    proportions: tuple[float, ...],
+    height: float,
+    closeness: FloatArray,
+    depth: FloatArray,
+) -> FloatArray:
+    """Excess of drag and added mass in tanks, shape (tanks, 2)."""
+    length, width, aside = proportions
     found = []
-    for close, delta in zip((closest * near).tolist(), depth.tolist(), strict=True):
+    for close, delta in zip(closeness.tolist(), depth.tolist(), strict=True):
         deep = 2.0 * close ** (-1.0 / 3.0)  # in radii
         force = physics.sphere_in_tank(
             1.0,
@@ -125,4 +153,4 @@ def _table(
         )
         free = physics.POTENTIAL_FLOW_ADDED_MASS + 2.25 * delta
         found.append((force.drag_factor - 1.0, force.added_mass_coefficient - free))
-    return np.asarray(np.linalg.solve(_powers(near, depth), np.array(found)))
+    return np.array(found)

@@ -450,13 +450,16 @@ def _sent_back(
     u_x = p J_0 + q J_2 cos 2 phi, u_y = q J_2 sin 2 phi. With d = q - p and t = q + p
     continuity is k d + dw/dz = 0, and t, alone, is the part without divergence.
     """
-    from scipy.special import jv
+    from scipy.special import j0 as bessel_0
+    from scipy.special import j1 as bessel_1
 
     k, weight = _wave_numbers(min(floor, above or floor) - 1.0)
     gamma = np.sqrt(k**2 + alpha**2)
     amplitudes = _reflected(order, alpha, k, gamma, floor, above, surface)
     sine = np.sqrt(1.0 - cosine**2)
-    j0, j1, j2 = (jv(m, np.outer(sine, k)) for m in (0, 1, 2))
+    rho = np.outer(sine, k)
+    j0, j1 = bessel_0(rho), bessel_1(rho)
+    j2 = 2.0 * j1 / np.maximum(rho, 1e-12) - j0
     total = np.zeros((3 * cosine.size, 3 * order), dtype=np.complex128)
     for distance, sign, waves in amplitudes:
         away = (distance - sign * cosine)[:, None]
