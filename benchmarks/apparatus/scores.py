@@ -15,9 +15,9 @@ Kept = Mapping[str, Any]
 
 
 def catalogue() -> frozenset[str]:
-    """Names that the library knows, by its page."""
+    """Names that the library knows, by its page, and can know from a file of angles."""
     page = (ROOT / "docs/effects.md").read_text(encoding="utf-8")
-    return frozenset(re.findall(r"^### ([\w-]+)$", page, re.MULTILINE))
+    return frozenset(re.findall(r"^### ([\w-]+)$", page, re.MULTILINE)) - {"tracking-noise"}
 
 
 def judge(kept: Kept, names: frozenset[str]) -> dict[str, Any]:
