@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.arguments import FILE, print_answer, read_options, shared
@@ -23,26 +22,31 @@ def run(arguments: argparse.Namespace) -> None:
     print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))
 
 
-def _lines(file: str, found: Inspection) -> Iterator[str]:
+def _lines(file: str, found: Inspection) -> list[str]:
     """Print it in words, a fact a line; what is uncertain first."""
-    for guess in found.weak_guesses:
-        yield f"a guess: {guess}"
-    yield file
-    yield f"  format      {found.format}"
-    for number, (name, unit) in enumerate(found.channels, start=1):
-        yield f"  channel {number:<3} {name}" + (f" [{unit}]" if unit else "")
     even = "evenly spaced" if found.uniform else "not evenly spaced (median interval)"
-    if found.chosen:
-        yield f"  read        {found.chosen}, in {found.unit or 'no known unit'}"
-        yield f"  hangs at    {found.level:.6g} {found.unit}".rstrip()
-    yield f"  samples     {found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"
-    yield f"  span        {found.duration_s:.6g} s"
-    step = "none found" if found.resolution is None else f"{found.resolution:.6g} {found.unit}"
-    yield f"  step        {step}"
-    yield f"  clipped     {found.clipped_samples} sample(s)"
-    for gap in found.gaps:
-        yield f"  gap         {gap.missing_s:.6g} s after sample {gap.after_sample}"
-    for mark in found.markers:
-        yield f"  marker      {mark.time_s:.6g} s (sample {mark.sample}) {mark.comment}".rstrip()
-    for warning in found.warnings:
-        yield f"  note        {warning}"
+    read = [
+        ("read", f"{found.chosen}, in {found.unit or 'no known unit'}"),
+        ("hangs at", f"{found.level:.6g} {found.unit}"),
+    ]
+    known_step = found.resolution is not None
+    facts = [
+        ("format", found.format),
+        *(
+            (f"channel {number}", name + (f" [{unit}]" if unit else ""))
+            for number, (name, unit) in enumerate(found.channels, start=1)
+        ),
+        *(read if found.chosen else []),
+        ("samples", f"{found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"),
+        ("span", f"{found.duration_s:.6g} s"),
+        ("step", f"{found.resolution:.6g} {found.unit}" if known_step else "none found"),
+        ("clipped", f"{found.clipped_samples} sample(s)"),
+        *(("gap", f"{gap.missing_s:.6g} s after sample {gap.after_sample}") for gap in found.gaps),
+        *(
+            ("marker", f"{mark.time_s:.6g} s (sample {mark.sample}) {mark.comment}")
+            for mark in found.markers
+        ),
+        *(("note", warning) for warning in found.warnings),
+    ]
+    guesses = [f"a guess: {guess}" for guess in found.weak_guesses]
+    return [*guesses, file, *(f"  {name:<12}{text}".rstrip() for name, text in facts)]

@@ -15,7 +15,7 @@ from pendpipe.configuration.faults import nearest
 from pendpipe.dynamics import Eq8
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 
 class Given(NamedTuple):
@@ -53,8 +53,7 @@ def _read(place: str, table: dict[str, Any]) -> Given:
     place = f"{place} ({identifier})"
     known = [parameter.name for parameter in effect.parameters]
     for name in table:
-        if name not in known:
-            raise InputError(place, f"unknown parameter '{name}'", nearest(name, known))
+        refuse_if(name not in known, place, f"unknown parameter '{name}'", nearest(name, known))
     values = [_value(place, parameter, table) for parameter in effect.parameters]
     return Given(effect, np.array([1.0] * effect.parameter_free + values))
 
@@ -62,16 +61,16 @@ def _read(place: str, table: dict[str, Any]) -> Given:
 def _value(place: str, parameter: Parameter, table: Mapping[str, Any]) -> float:
     given = table.get(parameter.name, parameter.default)
     unit = f", in {parameter.unit}" if parameter.unit_in("rad") else ""
-    if given is None:
-        raise InputError(place, f"'{parameter.name}' is missing", f"add it{unit}")
-    if isinstance(given, bool) or not isinstance(given, int | float):
-        raise InputError(place, f"'{parameter.name}' is no number", f"give a number{unit}")
-    if not parameter.low <= given <= parameter.high:
-        raise InputError(
-            place,
-            f"'{parameter.name}' is {given:g}",
-            f"give a number from {parameter.low:g} to {parameter.high:g}{unit}",
-        )
+    name = f"'{parameter.name}'"
+    refuse_if(given is None, place, f"{name} is missing", f"add it{unit}")
+    is_number = isinstance(given, int | float) and not isinstance(given, bool)
+    refuse_if(not is_number, place, f"{name} is no number", f"give a number{unit}")
+    refuse_if(
+        not parameter.low <= given <= parameter.high,
+        place,
+        f"{name} is {given:g}",
+        f"give a number from {parameter.low:g} to {parameter.high:g}{unit}",
+    )
     return float(given)
 
 
@@ -158,10 +157,12 @@ class Instrument:
             angle[where] += glitches["rms"] * self.random.standard_normal(number)
         if "clipping" in self.settings:
             levels = self.settings["clipping"]
-            if not levels["lower_level"] < levels["upper_level"]:
-                raise InputError(
-                    self.place, "clipping: lower_level is not below upper_level", "swap them"
-                )
+            refuse_if(
+                not levels["lower_level"] < levels["upper_level"],
+                self.place,
+                "clipping: lower_level is not below upper_level",
+                "swap them",
+            )
             angle = _limited(angle, levels["lower_level"], levels["upper_level"], levels["width"])
         step = self.settings.get("coarse-quantisation", {}).get("step", 0.0)
         return step * np.round(angle / step) if step else angle
@@ -172,10 +173,12 @@ class Instrument:
         if not number:
             return codes
         low, high = int(codes.min()), int(codes.max())
-        if number > (high - low) // 4:
-            raise InputError(
-                self.place, f"{number} missing codes of {high - low + 1}", "leave most of them"
-            )
+        refuse_if(
+            number > (high - low) // 4,
+            self.place,
+            f"{number} missing codes of {high - low + 1}",
+            "leave most of them",
+        )
         missing = self.random.choice(np.arange(low + 1, high), number, replace=False)
         while np.any(lost := np.isin(codes, missing)):
             codes = np.where(lost, codes + self.random.choice([-1.0, 1.0], len(codes)), codes)
