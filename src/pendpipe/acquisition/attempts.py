@@ -7,7 +7,7 @@ A campaign keeps the attempts at a record in ``results/<record>/raw/``, the comm
 import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -155,10 +155,8 @@ def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Reco
 
 def mark_saved(path: Path, out: Path) -> None:
     """Note in a raw file that its recording was written; without a right to it, do not."""
-    try:
+    with suppress(OSError):
         append_event(path, event="saved", file=out.name)
-    except OSError:
-        return
 
 
 @contextmanager

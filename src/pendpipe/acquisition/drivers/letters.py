@@ -39,6 +39,27 @@ class LetterDriver(Driver):
         echo = self.line.read(1, self.patience_s)
         return echo == argument, echo
 
+    def _command(self, letter: bytes, argument: bytes, reply: int = 0, undo: bool = False) -> bytes:
+        """Send a command; return the reply.
+
+        A wrong or missing echo is tried again after half a second; with `undo` the device
+        is stopped first, since it may have started although its echo was lost.
+        """
+        echo = b""
+        for attempt in range(self.attempts):
+            if attempt:
+                self._doubt = True
+                self._clock.sleep(0.5)
+                if undo:
+                    super().stop()
+                self.line.discard(self.quiet_s)
+            echoed, echo = self._send_letters(letter, argument)
+            if echoed:
+                answer = self.line.read(reply, self.patience_s) if reply else b""
+                if len(answer) == reply:
+                    return answer
+        raise self._no_answer(letter.decode(), echo)
+
     def _echo(self) -> bytes:
         return self.line.read(1, self.patience_s)
 
@@ -90,27 +111,6 @@ class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4
             self.line.set_baudrate(baudrate)
             self._baudrate = baudrate
 
-    def _command(self, letter: bytes, argument: bytes, reply: int = 0, undo: bool = False) -> bytes:
-        """Send a command; return the reply.
-
-        A wrong or missing echo is tried again after half a second; with `undo` the device
-        is stopped first, since it may have started although its echo was lost.
-        """
-        echo = b""
-        for attempt in range(self.attempts):
-            if attempt:
-                self._doubt = True
-                self._clock.sleep(0.5)
-                if undo:
-                    super().stop()
-                self.line.discard(self.quiet_s)
-            echoed, echo = self._send_letters(letter, argument)
-            if echoed:
-                answer = self.line.read(reply, self.patience_s) if reply else b""
-                if len(answer) == reply:
-                    return answer
-        raise self._no_answer(letter.decode(), echo)
-
     def _echo(self) -> bytes:
         """Return the next byte that is no start-up junk."""
         while (byte := super()._echo()) and byte in _JUNK:
@@ -160,26 +160,13 @@ class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RAN
         return burst_hz / count
 
     def _start_stream(self) -> None:
-        self._short(b"S", b"1")
+        self._command(b"S", b"1", undo=True)
 
     def _ask(self, letter: bytes, argument: bytes) -> str:
         """Send a short command and return its answer, which ends in CR or in silence."""
-        self._short(letter, argument)
+        self._command(letter, argument, undo=True)
         answer = self.line.read_until(b"\r", max(0.05, self.quiet_s))
         return answer.decode("ascii", "replace").strip("\0\r\n ")
-
-    def _short(self, letter: bytes, argument: bytes) -> None:
-        """Send NUL and two characters."""
-        echo = b""
-        for attempt in range(self.attempts):
-            if attempt:
-                # It may have started although its echo was lost.
-                self._doubt = True
-                self.stop()
-            echoed, echo = self._send_letters(letter, argument)
-            if echoed:
-                return
-        raise self._no_answer(letter.decode() + argument.decode(), echo)
 
 
 def _burst_hz(divisor: int, average: int) -> float:
