@@ -34,9 +34,8 @@ def test_di154rs_session(script: Any) -> None:
     driver = DI154RS(line, FAST)
     assert driver.identify().model == "DI-154RS"
     # Two channels take 40 bit times; 40 more make it 60 Hz.
-    assert driver.configure([3, 1], 60.0).channels == (1, 3)
-    assert driver.setup is not None
-    assert driver.setup.rate_hz == 60.0
+    setup = driver.configure([3, 1], 60.0)
+    assert (setup.channels, setup.rate_hz) == ((1, 3), 60.0)
     driver.start()
     assert driver.decoder(2).feed(driver.receive(1.0)).counts.tolist() == [[1234 - 2048, 0]]
     driver.stop()

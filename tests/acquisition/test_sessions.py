@@ -98,7 +98,7 @@ def test_the_recorders_clock_may_be_one_of_its_own() -> None:
             "di2108",
             rate_hz=100.0,
             duration_s=60.0,
-            clock=ScaledClock(device.clock_scale),
+            clock=ScaledClock(device.clock.scale),
         )
     assert recording.number("sample_rate_measured_hz") == pytest.approx(100.0, rel=0.03)
 

@@ -258,11 +258,6 @@ class SimulatedDevice:
         """The port to give to a driver."""
         return self._link.port
 
-    @property
-    def clock_scale(self) -> float:
-        """How many seconds of the device pass in one of wall-clock time."""
-        return self.clock.scale
-
     def __enter__(self) -> Self:
         self._thread.start()
         return self

@@ -94,7 +94,6 @@ class Driver(ABC):
 
     def __init__(self, line: Line, clock: ScaledClock) -> None:
         self.line = line
-        self.setup: Setup | None = None
         self._clock = clock
         # How long no byte must come until a stream is held to have ended. The adapters of
         # USB keep bytes back for up to 16 ms; a simulated line does not.
@@ -156,8 +155,7 @@ class Driver(ABC):
                 f"choose from {', '.join(f'{high:g}' for high in sorted(self.ranges))}",
             )
             full_scale = min(enough)
-        self.setup = Setup(chosen, self._set(chosen, rate_hz, full_scale), full_scale)
-        return self.setup
+        return Setup(chosen, self._set(chosen, rate_hz, full_scale), full_scale)
 
     @abstractmethod
     def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
@@ -171,8 +169,6 @@ class Driver(ABC):
         InputError
             If the device does not answer.
         """
-        if self.setup is None:
-            raise RuntimeError("configure() comes before start()")
         self._clear_the_line()
         self._start_stream()
 
