@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 LASTS_S: Final = 120.0
 CONFIRMED: Final = 0.01
 PROBABLE: Final = 0.5
+SOURCES: Final = ("pendpipe.diagnosis.run", "benchmarks/found.py")
 
 
 class Swing:
@@ -101,11 +102,15 @@ class Swing:
 
 
 class Kind(NamedTuple):
-    """A kind of fact: its effect, the test without a model, and who makes true ones and decoys."""
+    """A kind of fact: its effect, the test without a model, and who makes true ones and decoys.
+
+    Where nothing happens at one instant, the diagnosis comes first, and the test where it says.
+    """
 
     effect: str
     test: Callable[[Recording, float, float], Confirmation | None]
     makers: dict[str, Callable[[Swing, float], Recording]]
+    nowhere: tuple[str, ...] = ()
 
 
 def walk(count: int, end: float, random: np.random.Generator) -> Array:
@@ -172,8 +177,10 @@ def offset(swing: Swing, at_s: float) -> Recording:
 
 
 def drifting(swing: Swing, _: float) -> Recording:
-    """A clock that wanders."""
-    return swing.sampled(swing.angle, 0.5 + walk(int(LASTS_S / 5e-3), 0.02, swing.random))
+    """A clock that wanders, read fifty times a second."""
+    late = 0.5 + walk(int(LASTS_S / 5e-3), 0.02, swing.random)
+    whole = swing.sampled(swing.angle, late)
+    return Recording(whole.time_s[::4], whole.values[::4], "angle_rad")
 
 
 def time_test(recording: Recording, at_s: float, period_s: float) -> Confirmation:
@@ -190,6 +197,7 @@ TIME: Final = Kind(
         "decoy: an offset": offset,
         "decoy: a clock that wanders": drifting,
     },
+    ("decoy: a clock that wanders",),
 )
 
 
@@ -275,9 +283,10 @@ def is_claimed(kind: Kind, name: str, number: int) -> bool:
     random = np.random.default_rng([zlib.crc32(name.encode()), number])
     swing, at_s = Swing(random), random.uniform(0.2, 0.8) * LASTS_S
     recording = kind.makers[name](swing, at_s)
-    sure = kind.test(recording, at_s, swing.period_s)
-    if sure is None or sure.p_value >= CONFIRMED:
-        return False
+    if name not in kind.nowhere:
+        sure = kind.test(recording, at_s, swing.period_s)
+        if sure is None or sure.p_value >= CONFIRMED:
+            return False
     effects = pp.diagnose(recording).to_dict().get("effects", [])
     return any(
         each["id"] == kind.effect
@@ -288,7 +297,8 @@ def is_claimed(kind: Kind, name: str, number: int) -> bool:
 
 
 def table(number: int) -> Iterator[str]:
-    """A row for each family, and the decoys of each kind together."""
+    """A row for each family, and the decoys of each kind together; what is done is kept."""
+    done: dict[str, int] = journal.read("found", {}, SOURCES)
     yield "| effect | made | claimed |"
     yield "|---|---|---|"
     for kind in KINDS:
@@ -296,7 +306,11 @@ def table(number: int) -> Iterator[str]:
         for name in kind.makers:
             decoy = name.startswith("decoy")
             asked = number if decoy else math.ceil(number / 3)
-            claimed = sum(is_claimed(kind, name, each) for each in range(asked))
+            key = f"{kind.effect}, {name}, {asked}"
+            if key not in done:
+                done[key] = sum(is_claimed(kind, name, each) for each in range(asked))
+                journal.keep("found", done, SOURCES)
+            claimed = done[key]
             yield f"| {kind.effect} | {name} | {wilson(claimed, asked)} |"
             if decoy:
                 false, made = false + claimed, made + asked

@@ -19,7 +19,8 @@ from pendpipe.diagnosis.result import Confirmation
 _DEGREE: Final = 5
 """Of the polynomial in time on each side."""
 _WITHIN: Final = 0.4
-"""Length of a side, in periods: what a polynomial leaves of a swing it leaves elsewhere, too."""
+"""Length of a side, in periods: what a polynomial leaves of a swing it leaves elsewhere, too. Of
+simulated losses of 10 to 110 ms nine tenths are confirmed, with 0.3 periods eight tenths."""
 _INSTANTS: Final = 0.1
 """Within this part of a period the instant is sought."""
 _ELSEWHERE: Final = 20
