@@ -259,7 +259,7 @@ def refitted(
     start = np.concatenate([without.value, own])
     # With its shape but no size yet it begins where the fit without it ended.
     absent = start.copy()
-    absent[len(without.value) :][: effect.sizes] = 0.0
+    absent[len(without.value) :][: 0 if effect.parameter_free else effect.sizes] = 0.0
     model, starts = without.model.adding(effect), [start, absent, rival.fit.value]
     return best_fit(model, found.data, found.noise, starts, held=held, useful=useful)
 
