@@ -143,7 +143,7 @@ def test_history_starts_from_rest() -> None:
         expected = [float(mpmath.invertlaplace(transform, t, method="talbot")) for t in time]
     effect = np.max(np.abs(np.array(expected) - plain(baseline(), time)))
     assert effect > 0.05 * start
-    assert np.max(np.abs(exact - expected)) < 0.01 * effect
+    assert np.max(np.abs(exact - expected)) < 1e-4 * effect
     assert np.max(np.abs(found - expected)) < 0.1 * effect
 
 
@@ -205,7 +205,8 @@ def test_the_memory_of_the_release_fades_though_dry_friction_stops_the_pendulum(
             gained = np.diff(velocity[: last + 1]) / step
             exact = 2.0 / math.sqrt(math.pi) * gained[::-1] @ np.diff(ago[: last + 1])
             size = math.sqrt(OMEGA) * OMEGA * float(nodes.amplitude[row, node])
-            assert abs(-found[row, node] - exact) < 0.03 * size
+            # The readings end up to a step before the node.
+            assert abs(-found[row, node] - exact) < OMEGA * step * size
 
 
 def test_broadband_drive_has_no_template() -> None:

@@ -7,13 +7,13 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.half_derivative import half_derivative
 from pendpipe.effects.effect import Parameter, Pendulum, Span, enters
 from pendpipe.effects.scan import (
     between,
     half_cycle_of_release,
     phase_since_reversal,
     rows,
-    since_release,
 )
 
 
@@ -298,30 +298,10 @@ def backlash(motion: Motion, pendulum: Pendulum, gap: float) -> FloatArray:
 def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
     """h times the half derivative of the velocity, from rest at the release.
 
-    The fluid is at rest until the turning point at which the pendulum is let go. For a motion
-    V(t) = V(0) e^(st) from there, the half derivative of v is
-    sqrt(s) [V(t) - V(0) erfcx(sqrt(st))], erfcx(z) = e^(z^2) erfc(z); s, the local rate of decay
-    and phase, changes too slowly in a free decay to matter. What remains long after the release
-    is a viscous friction and an added mass.
+    The fluid is at rest until the turning point at which the pendulum is let go. What remains
+    long after it is a viscous friction and an added mass.
     """
-    root = np.sqrt(_local_rate(motion))
-    from scipy.special import erfcx
-
-    faded = erfcx(root * np.sqrt(since_release(motion, pendulum)))
-    # x = Re(X), X = upwards r e^(i psi), and V = i omega X.
-    swinging = motion.upwards * motion.amplitude * (motion.clock.cosine + 1j * motion.clock.sine)
-    first = half_cycle_of_release(motion, pendulum)
-    let_go = motion.angle[first, 0]
-    half_derivative = np.real(1j * pendulum.angular_frequency * root * (swinging - let_go * faded))
-    half_derivative[:first] = 0.0
-    return np.asarray(-size * half_derivative)
-
-
-def _local_rate(motion: Motion) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-    """-decay + i times the angular frequency of each half cycle, 1/s; shape (count, 1)."""
-    lasts = motion.time_s[:, -1] - motion.time_s[:, 0]
-    falls = motion.log_amplitude[:, -1] - motion.log_amplitude[:, 0]
-    return np.asarray((falls + 1j * math.pi) / lasts)[:, None]
+    return -size * half_derivative(motion, half_cycle_of_release(motion, pendulum))
 
 
 def _onsets(span: Span) -> list[tuple[float, ...]]:
