@@ -80,3 +80,12 @@ def test_a_clock_that_wanders_has_lost_nothing(step_s: float) -> None:
     arrival[2000:] += 50.0 * step_s + 1.0
     (loss,) = find_clock_losses(arrival, scans, 100.0)[0]
     assert abs(loss.first_arrival - 2000) <= 50
+
+
+@pytest.mark.parametrize(("drift_s", "chosen"), [(0.006, "nominal"), (0.025, "measured")])
+def test_a_drift_of_a_busy_hosts_delays_is_no_rate(drift_s: float, chosen: str) -> None:
+    """It does not scatter; below 10 ms of the host it is not believed, at any pace of the clock."""
+    for clock_scale in (1.0, 20.0):
+        scans = np.arange(1.0, 251.0) * 16.0
+        arrival_s = scans / 100.0 * (1.0 + drift_s * clock_scale / 40.0)
+        assert measure_rate(arrival_s, scans, 100.0, clock_scale).chosen == chosen

@@ -16,10 +16,10 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 
+_HOST_S: Final = 0.010
+"""Seconds by which a busy host's delays may step or drift within a record: less is not believed."""
 _RATE_STRETCHES: Final = 12
 _FEWEST_IN_STRETCH: Final = 3
-_RATE_STAMP_S: Final = 1e-4
-"""Standard deviation, in seconds of the host, below which no time stamp is believed."""
 _RATE_TRUST: Final = 6.0
 """How many standard deviations the measured rate must differ from the nominal one before
 it is believed: by chance alone (ten degrees of freedom) once in 8000 records."""
@@ -34,8 +34,6 @@ from a busy host."""
 _NEAR: Final = 5
 """Stretches on either side whose median tells the height of a step."""
 _FEWEST_SCANS: Final = 1.5
-_LOSS_STAMP_S: Final = 0.010
-"""Seconds of the host below which no step is believed."""
 _SPREADS: Final = 8.0
 
 
@@ -100,8 +98,9 @@ def measure_rate(
     counts (late relative to the straight line through the ends). A least-squares line through
     the twelve gives the interval, its scatter the standard deviation: a constant delay
     changes nothing, and a stretch in which the host slept throughout shows up as scatter.
-    Delays that drift do not scatter, so a time stamp is never believed to better than 0.1 ms of
-    the host (0.1 s of a clock a thousand times as fast), nor a count to better than one scan.
+    Delays that drift do not scatter: a rate is believed only where it puts the last arrival more
+    than 10 ms of the host off (10 s of a clock a thousand times as fast). Nor is a count believed
+    to better than one scan.
     """
     fresh = np.flatnonzero(np.diff(scans, prepend=-1.0) > 0)
     arrival_s, scans = arrival_s[fresh], scans[fresh]
@@ -117,7 +116,7 @@ def measure_rate(
     (interval, _), covariance = np.polyfit(scans[first], arrival_s[first], 1, cov=True)
     if interval <= 0:
         return nothing
-    floor = math.hypot(interval / math.sqrt(12.0), _RATE_STAMP_S * clock_scale)
+    floor = math.hypot(interval / math.sqrt(12.0), _HOST_S / _RATE_TRUST * clock_scale)
     sd = math.hypot(math.sqrt(covariance[0, 0]), floor / (scans[-1] - scans[0]))
     return TimeBase(nominal_hz, float(1.0 / interval), float(sd / interval**2))
 
@@ -183,7 +182,7 @@ def find_clock_losses(
     steps = np.diff(level)
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
     interval_s = slope + 1.0 / nominal_hz
-    limit_s = max(_FEWEST_SCANS * interval_s, _LOSS_STAMP_S * clock_scale, _SPREADS * spread)
+    limit_s = max(_FEWEST_SCANS * interval_s, _HOST_S * clock_scale, _SPREADS * spread)
     found: list[ClockLoss] = []
     before = np.maximum.accumulate(level)
     after = np.minimum.accumulate(level[::-1])[::-1]
