@@ -146,7 +146,7 @@ def _write(arguments: argparse.Namespace, result: FitResult) -> None:
 
 def _print(arguments: argparse.Namespace, result: FitResult) -> None:
     """Print the summary."""
-    from pendpipe.analysis.fit.summary import gravity_line, lines
+    from pendpipe.analysis.fit.result import gravity_line, lines
 
     for option, value in (("--length", arguments.length), ("--gravity", arguments.gravity)):
         refuse_if(
@@ -168,7 +168,7 @@ def _status(arguments: argparse.Namespace, result: FitResult) -> int:
 
 def _table(arguments: argparse.Namespace) -> int:
     """Fit several recordings; what can't be fitted gets its reason, and the others go on."""
-    from pendpipe.analysis.fit.summary import row, table
+    from pendpipe.analysis.fit.result import row, table
 
     for option in ("out", "figure", "turning_points", "record"):
         refuse_if(

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import held_values
+from pendpipe.analysis.fit.by_points import held_values, start_of
+from pendpipe.analysis.fit.by_waveform import start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline
-from pendpipe.analysis.fit.start import start_of, start_values, usable_span
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.two_modes import BEAT, two_modes

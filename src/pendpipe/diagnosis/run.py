@@ -367,7 +367,7 @@ def _as_fit_prints(
     diagnosis follows it along the motion, and its own numbers stand.
     """
     from pendpipe.analysis.fit import fit_recording
-    from pendpipe.analysis.fit.start import restoring_of
+    from pendpipe.analysis.fit.by_points import restoring_of
 
     taken = restoring_of(points, stated=part.unit_is_stated)
     try:

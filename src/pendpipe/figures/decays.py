@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from pendpipe.analysis.fit.summary import seen_qualities
+from pendpipe.analysis.fit.result import seen_qualities
 from pendpipe.arrays import FloatArray
 from pendpipe.figures.data import Decay
 from pendpipe.figures.style import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
-from pendpipe.analysis.fit.summary import (
+from pendpipe.analysis.fit.result import (
     LOSSES,
     WITHOUT_LAW,
     qualities,

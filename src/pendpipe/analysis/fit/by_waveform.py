@@ -18,20 +18,26 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.assemble import (
-    Bounded,
-    Numbers,
-    estimates,
-    misfit,
-    quality_factor,
-    with_intervals,
+from pendpipe.analysis.fit.by_points import (
+    TOP,
+    Period,
+    clear,
+    envelope_and_period,
+    fit_period,
+    held_values,
+    period_excess,
+    share_of,
 )
-from pendpipe.analysis.fit.assemble import warn as warnings_of
-from pendpipe.analysis.fit.by_points import held_values
-from pendpipe.analysis.fit.decrement import check_decrement, light_of
-from pendpipe.analysis.fit.least_squares import Bounds, Minimum, Quadratic, covariance, minimise
-from pendpipe.analysis.fit.result import PARAMETERS, Baseline, FitResult, Restoring
-from pendpipe.analysis.fit.start import Start, start_values, usable_span
+from pendpipe.analysis.fit.fixed import loss_rates_of
+from pendpipe.analysis.fit.least_squares import (
+    Bounds,
+    Minimum,
+    Quadratic,
+    covariance,
+    intervals95,
+    minimise,
+)
+from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.separate import quality_of_rate
 from pendpipe.analysis.turning_points import TurningPoints
@@ -47,6 +53,7 @@ from pendpipe.dynamics import (
 from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Estimate
+from pendpipe.physics.decay import amplitude, time_at
 
 ROOT_HALF = math.sqrt(0.5)
 DENSITY = 1.0 / math.sqrt(2.0 * math.pi)
@@ -260,6 +267,133 @@ class Waveform:
         return likelihood._replace(chi2=likelihood.chi2 + PRIOR_INVERSE * off**2)
 
 
+_SURE: Final = 0.7
+"""Phase in rad by which the start may be off: half a radian and some more converges."""
+_STOP: Final = 6.0
+"""In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
+
+
+class Start(NamedTuple):
+    """Where the search begins."""
+
+    value: FloatArray
+    before: int
+    """Half cycles from the release to the first turning point kept."""
+    reliable: int
+    """How many turning points the start predicts to a fraction of a radian."""
+    warnings: tuple[str, ...]
+
+
+def start_values(
+    points: TurningPoints,
+    held: Mapping[str, float],
+    fixed: Mapping[str, float],
+    baseline: Baseline,
+    restoring: Restoring = "linear",
+) -> Start:
+    """Turn a fit of the turning points into the waveform's eight parameters.
+
+    The release is a turning point before the first reading (a virtual one, if need be),
+    unless the amplitude is held: then it is the first turning point itself. So it is with sin x:
+    there may be none before it below pi.
+    """
+    points = points if restoring == "linear" else clear(points)
+    omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
+    parts = loss_rates_of(fixed, points.apparent_frequency_hz)
+    envelope, period = envelope_and_period(
+        points, held, parts, fixed, baseline, restoring, tolerance=0.3
+    )
+    a, b, c, y0, level = (float(number) for number in envelope.value)
+    share = share_of(parts, b, baseline)
+    known, reliable, warnings = period, len(points), []
+    # What is not known to a fraction of a radian accuses nobody.
+    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
+    if np.max(np.abs(late), initial=0.0) > _SURE and omega is None:
+        reliable, known = _sure_part(points, envelope.amplitude, (a, b, c), share, restoring)
+        warnings.append(
+            "the period changes with the amplitude or the time as Eq. 8's does not:"
+            f" {np.ptp(late):.2g} rad of phase along the record"
+        )
+    middle_share = 0.5 if share is None else share
+    angle, time, before = _release(
+        points,
+        (a, b, c, y0),
+        middle_share,
+        known,
+        at_first="amplitude" in fixed or restoring == "sine",
+    )
+    if restoring == "sine":
+        angle = math.copysign(min(abs(angle), TOP), angle)
+    offset = float(np.mean(points.level_rad)) - level
+    value = np.array([a, b, c, middle_share, known.angular_frequency, angle, time, offset])
+    return Start(value, before, reliable, tuple(warnings))
+
+
+def _sure_part(
+    points: TurningPoints,
+    amplitudes: FloatArray,
+    rates: tuple[float, float, float],
+    share: float | None,
+    restoring: Restoring,
+) -> tuple[int, Period]:
+    """The longest beginning over which one frequency describes the times, and that."""
+    count = len(points)
+    while True:
+        count = max(4, int(0.7 * count))
+        part = points.first(count)
+        period = fit_period(part, amplitudes[:count], *rates, share=share, restoring=restoring)
+        if np.max(np.abs(period.late_rad)) < 0.5 * _SURE or count == 4:
+            return count, period
+
+
+def _release(
+    points: TurningPoints,
+    values: tuple[float, float, float, float],
+    share: float,
+    period: Period,
+    *,
+    at_first: bool,
+) -> tuple[float, float, int]:
+    """Angle and time of the release, and half cycles from it to the first turning point."""
+    a, b, c, y0 = values
+    omega, first_s = period.angular_frequency, period.time_s
+    side = float(points.side[0])
+    if at_first:
+        return side * y0, first_s, 0
+    half_period = math.pi / omega
+    before = max(1, math.ceil((first_s - points.start_s) / half_period + 0.05))
+    earlier, back = y0, 0.0
+    for step in range(before):
+        last = earlier
+        earlier = float(amplitude(-(step + 1.0) * half_period, y0, a, b, c))
+        if not earlier < 1.5 * last:
+            earlier = last * math.exp(min((a * last + b + c / last) * half_period, 0.4))
+        middle = np.array([0.5 * (last + earlier)])
+        back += half_period * (1.0 + float(period_excess(middle, omega, a, b, c, share)[0]))
+    return side * (-1.0) ** before * earlier, first_s - back, before
+
+
+def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
+    """The readings that are compared: while the motion is seen, and not about the stop.
+
+    Where Coulomb friction has stopped the pendulum is a discontinuous function of the
+    parameters; so the last half cycles before the stop are left out.
+    """
+    a, b, c, _, omega, _, time, _ = start.value.tolist()
+    half_period = math.pi / omega
+    first = time if start.before == 0 else samples.time_s[0]
+    last = float(points.time_s[-1]) + 0.5 * half_period
+    width = 0.5 * half_period * c
+    y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
+    if 0.0 < _STOP * width < y0 and end < 2.0 * _STOP * width:
+        last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
+    least = float(points.time_s[min(3, len(points) - 1)])
+    begin = int(np.searchsorted(samples.time_s, first))
+    if start.before == 0:
+        begin = int(np.searchsorted(samples.time_s, first + 0.05 * half_period))
+    return slice(begin, int(np.searchsorted(samples.time_s, max(last, least), side="right")))
+
+
 _GROWTH: Final = 1.6
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
@@ -345,48 +479,38 @@ def _result(
     # Of where the last step began, if that was so small that it was accepted unverified.
     residual = fitted.problem.residual(fitted.minimum.at)
     dof = len(residual) - 8 + len(fitted.held)
-    noise = judge_noise(samples, points, residual, fitted.problem)
+    noise, slow = judge_noise(samples, points, residual, fitted.problem)
     gained = fitted.minimum.gained * fitted.problem.noise_rms**2
     rms = math.sqrt(max(float(residual @ residual) - gained, 0.0) / len(residual))
-    chi2_per_dof = rms**2 * len(residual) / dof / noise.rms**2
+    chi2_per_dof = rms**2 * len(residual) / dof / noise**2
     # What rounding leaves is slow by nature; its likelihood knows that already.
-    slow = noise.slow if fitted.problem.step == 0.0 else 1.0
-    stretched = max(misfit(chi2_per_dof, dof), slow)
+    random = fitted.problem.step == 0.0
+    stretched = max(misfit(chi2_per_dof, dof), slow if random else 1.0)
     # The search weighed the readings by its own first guess of the noise.
-    weighed = noise.rms if fitted.problem.step == 0.0 else fitted.problem.noise_rms
-    scale = (fitted.problem.noise_rms / weighed) ** 2 / stretched
-    numbers, matrix = _numbers(fitted, scale, float(samples.time_s[0]))
-    parameters = estimates(numbers, points.unit)
-    result = FitResult(
+    scale = ((fitted.problem.noise_rms / noise) ** 2 if random else 1.0) / stretched
+    value, matrix, ends, own = _numbers(fitted, scale, float(samples.time_s[0]))
+    hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, own, fixed)
+    times = fitted.problem.time_s
+    inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
+    return result_of(
+        value,
+        matrix,
+        ends,
+        fitted.held,
+        points.chosen(inside),
+        fitted.problem.model(fitted.minimum.value)[0],
+        stretched=stretched,
+        said=[*said, *fitted.start.warnings],
         method="waveform",
         baseline=baseline,
-        restoring=fitted.problem.restoring,
-        parameters=parameters,
-        quality_factor_limit=quality_factor(parameters["b"], parameters["frequency"].value),
-        covariance_order=PARAMETERS,
-        covariance=numbers.covariance,
-        noise_rms_rad=noise.rms,
+        noise_rms_rad=noise,
         residual_rms_rad=rms,
         chi2_per_dof=chi2_per_dof,
         samples=len(residual),
         turning_points=len(points),
-    )
-    hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, matrix, fixed)
-    warnings = [*points.notes, *warnings_of(result, stretched), *said, *fitted.start.warnings]
-    times = fitted.problem.time_s
-    inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
-    law, _ = fitted.problem.model(fitted.minimum.value)
-    checks = check_decrement(points.chosen(inside), law)
-    light, reason = light_of(checks, misfit=stretched, unit=points.unit)
-    return replace(
-        result,
         quality_factor_hysteretic=hysteretic,
         quality_factor_viscous=viscous,
-        warnings=tuple(warnings),
         settled=fitted.minimum.converged,
-        decrement_check=checks,
-        light=light,
-        light_reason=reason,
     )
 
 
@@ -470,26 +594,20 @@ def _held(
     return tuple(held)
 
 
-def _numbers(fitted: _Fitted, scale: float, start_s: float) -> tuple[Numbers, FloatArray]:
-    """The seven parameters; and the covariance of the fitted ones."""
+def _numbers(
+    fitted: _Fitted, scale: float, start_s: float
+) -> tuple[FloatArray, FloatArray, list[tuple[float, float]], FloatArray]:
+    """The seven parameters, their covariance, intervals; and the covariance of the fitted ones."""
     value, held = fitted.minimum.value, fitted.held
     quadratic = fitted.minimum.quadratic
     normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
     normal[SHARE, SHARE] += (1.0 - scale) * PRIOR_INVERSE
-    first, jacobian = _first_turning_point(fitted, start_s)
-    matrix = covariance(normal, held)
-    numbers = np.array(
-        [
-            *value[:3],
-            0.5 * value[OMEGA] / math.pi,
-            first[0],
-            first[1],
-            value[OFFSET],
-        ]
-    )
-    fit = Bounded(value, normal, gradient, held, matrix)
-    covariances = jacobian @ matrix @ jacobian.T
-    return with_intervals(numbers, covariances, fit, BOUNDS), matrix
+    (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
+    own = covariance(normal, held)
+    frequency = 0.5 * value[OMEGA] / math.pi
+    numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])
+    ends = intervals95(value, normal, gradient, BOUNDS, range(3), held, own)
+    return numbers, jacobian @ own @ jacobian.T, ends, own
 
 
 def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
@@ -528,24 +646,23 @@ _COARSE: Final = 12.0
 """Readings in a half cycle below which differences would see the motion's own misfit."""
 
 
-class Noise(NamedTuple):
-    """Noise of one reading, and how much more there is at the motion's frequency."""
-
-    rms: float
-    slow: float
-    """Variance of the half cycles' amplitudes over what white noise makes of it; 1 where
-    chance explains the difference."""
-
-
 def judge_noise(
     samples: Samples, points: TurningPoints, residual: FloatArray, problem: Waveform
-) -> Noise:
+) -> tuple[float, float]:
     """Estimate the noise from what the fit leaves.
 
     The white part comes from fourth differences, which a slow misfit cannot touch, and is
     never taken below step/sqrt(12). What a, b, c suffer from is the noise at the motion's
     own frequency: drifts and misfits show there as scatter of the half cycles' residual
     amplitudes.
+
+    Returns
+    -------
+    rms
+        Of one reading.
+    slow
+        Variance of the half cycles' amplitudes over what white noise makes of it; 1 where chance
+        explains the difference.
     """
     floor = quantisation_rms(samples.step)
     per_half_cycle = len(residual) / max(len(points), 1)
@@ -555,7 +672,7 @@ def judge_noise(
         rms = white_rms(residual)
     largest = max(float(problem.values.max()), -float(problem.values.min()))
     rms = max(rms, floor, 1e-15 * largest)
-    return Noise(rms, _slow_noise(points, residual, problem.time_s, rms))
+    return rms, _slow_noise(points, residual, problem.time_s, rms)
 
 
 def _slow_noise(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
