@@ -14,7 +14,15 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, machine_code
 from pendpipe.dynamics.kernel import Kernel, Matrix, folders, kernel, shipped
-from pendpipe.dynamics.layout import ADDRESSES, FIELDS, counts, work_size
+from pendpipe.dynamics.layout import (
+    HEAD,
+    MOST_PANELS,
+    NODE_COUNT,
+    REQUEST,
+    ROW,
+    WORK,
+    WORK_SIZE,
+)
 from pendpipe.dynamics.march import march
 
 FIRST_CALL = """
@@ -194,35 +202,26 @@ def test_the_engine_is_made_of_the_kernels_that_it_calls() -> None:
 @pytest.mark.parametrize("end_s", [5.0, 100.0], ids=["half cycle by half cycle", "by a table"])
 def test_the_engine_writes_only_where_it_may(directions: int, samples: int, end_s: float) -> None:
     # The engine works on bare memory: everything it gets is embedded in guards here.
-    guard = 100
+    guard, guarded = 100, []
 
-    def guarded(size: int) -> tuple[np.ndarray, int]:
-        array = np.full(size + 2 * guard, np.pi)
-        return array, array.ctypes.data + 8 * guard
+    def room(*shape: int) -> np.ndarray:
+        guarded.append(np.full(math.prod(shape) + 2 * guard, np.pi))
+        return guarded[-1][guard:-guard].reshape(shape)
 
     model = Eq8(3.2, 0.4, 0.01, 0.02, 1e-4)
-    columns = directions + 4 if directions else 0
-    buffer, buffer_at = guarded(work_size(directions, samples))
-    inside = buffer[guard:]
-    inside[:12] = (*model.shape(), 3.2, 0.0, 0.0, 1.0, 1.0, 0.1, end_s)
-    inside[FIELDS["rate"].offset :][:directions] = 0.1
-    derivatives = model.shape_derivatives()[:directions].ravel()
-    inside[FIELDS["directions"].offset :][: 4 * directions] = derivatives
-    time_s = np.linspace(0.0, end_s, samples)
-    angle, angle_at = guarded(samples)
-    jacobian, jacobian_at = guarded(columns * samples)
-    turning, turning_at = guarded((2 + 2 * columns) * 50)
-    places = {
-        "workspace": buffer_at,
-        "time_s": time_s.ctypes.data,
-        "angle_rad": angle_at,
-        "jacobian": jacobian_at,
-        "turning": turning_at,
-    }
-    most = 50 if samples == 0 else 2**60
-    request = [places[name] for name in ADDRESSES]
-    request += counts(directions, samples, 50, most)
-    march(np.array(request))
-    for array in (buffer, angle, jacobian, turning):
+    sensitivities, columns = (directions + 1, directions + 4) if directions else (0, 0)
+    polynomials = sensitivities + 1 if samples else 0
+    head = HEAD + 2 * sensitivities
+    per_panel = 1 + polynomials * NODE_COUNT if polynomials else 0
+    work, rows = room(WORK_SIZE), room(ROW + 1, head + MOST_PANELS * per_panel)
+    numbers = 3.2, 0.0, 0.0, 1.0, 1.0, 0.1, end_s
+    counts = 2**60 if samples else 50, directions, sensitivities, polynomials, head, per_panel
+    REQUEST.pack_into(work.data, 0, *model.shape(), *numbers, *counts)
+    work.view(WORK)["rate"] = 0.1
+    work.view(WORK)["directions"] = model.shape_derivatives()
+    out = room(1 + columns, samples) if samples else room(2 + 2 * columns, 50)
+    march(work, rows, np.linspace(0.0, end_s, samples), out)
+    assert samples == 0 or not np.any(out[0] == np.pi)
+    for array in guarded:
         np.testing.assert_array_equal(array[:guard], np.pi)
         np.testing.assert_array_equal(array[-guard:], np.pi)

@@ -7,15 +7,17 @@ from typing import Final, Literal
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.kernel import address
 from pendpipe.dynamics.layout import (
-    ADDRESSES,
     ENDINGS,
-    FIELDS,
+    HEAD,
+    MOST_PANELS,
+    NODE_COUNT,
     OVERDAMPED,
+    REQUEST,
+    ROW,
     STOPPED,
-    counts,
-    work_size,
+    WORK,
+    WORK_SIZE,
 )
 from pendpipe.dynamics.march import march
 
@@ -211,7 +213,6 @@ class Release:
 _NONE: FloatArray = np.empty(0)
 _COLUMNS = len(JACOBIAN_COLUMNS)
 _NO_LIMIT = 2**62
-_LOSSES, _DIRECTIONS = FIELDS["rate"].offset, FIELDS["directions"].offset
 
 
 @dataclass(frozen=True)
@@ -264,7 +265,6 @@ def turning_points(
         raise ValueError("give count or until_s: without Coulomb friction the motion has no end")
     if count is not None and count < 1:
         raise ValueError(f"count must be at least 1, not {count}")
-    most = _NO_LIMIT if count is None else count
     end_s = math.inf if until_s is None else until_s
     if not end_s >= release.time_s:
         raise ValueError(f"until_s is {end_s}, before the release at {release.time_s}")
@@ -272,13 +272,16 @@ def turning_points(
     half_cycles = (end_s - release.time_s) * model.angular_frequency / math.pi
     room = 1024 if math.isinf(end_s) else math.ceil(half_cycles) + 16
     while True:
-        turning = np.empty((2, min(most, room)))
-        found, stopped = _run(model, release, most=min(most, room), until_s=end_s, turning=turning)
-        if stopped or found == most or found < room:
-            break
+        turning = np.empty((2, room if count is None else min(count, room)))
+        found, stopped = _run(model, release, turning, until_s=end_s)
+        if stopped or found == count or found < room:
+            return _turning_points(turning[:, :found], stopped)
         room *= 4
-    time_s, angle_rad = turning[0, :found], turning[1, :found]
-    return TurningPoints(time_s, angle_rad, stopped, float(angle_rad[-1]) if stopped else math.nan)
+
+
+def _turning_points(turning: FloatArray, stopped: bool) -> TurningPoints:
+    rest_rad = float(turning[1, -1]) if stopped else math.nan
+    return TurningPoints(turning[0], turning[1], stopped, rest_rad)
 
 
 def turning_points_with_jacobian(
@@ -296,10 +299,9 @@ def turning_points_with_jacobian(
     if count < 1:
         raise ValueError(f"count must be at least 1, not {count}")
     turning = np.empty((2 + 2 * _COLUMNS, count))
-    found, stopped = _run(model, release, derivatives=True, most=count, turning=turning)
+    found, stopped = _run(model, release, turning, derivatives=True)
     turning = turning[:, :found]
-    rest_rad = float(turning[1, -1]) if stopped else math.nan
-    points = TurningPoints(turning[0], turning[1], stopped, rest_rad)
+    points = _turning_points(turning, stopped)
     return points, turning[2 : 2 + _COLUMNS].T, turning[2 + _COLUMNS :].T
 
 
@@ -320,9 +322,9 @@ def sample(model: Eq8, release: Release, time_s: FloatArray) -> FloatArray:
         If the times are not as required, or `model` is overdamped.
     """
     times = _checked_times(time_s, release)
-    angle_rad = np.empty(times.size)
-    _run(model, release, time_s=times, angle_rad=angle_rad)
-    return angle_rad
+    readings: FloatArray = np.empty((1, times.size))
+    _run(model, release, readings, time_s=times)
+    return np.asarray(readings[0])
 
 
 def sample_with_jacobian(
@@ -344,10 +346,10 @@ def sample_with_jacobian(
         by c is that towards c > 0.
     """
     times = _checked_times(time_s, release)
-    angle_rad, jacobian = np.empty(times.size), np.empty((_COLUMNS, times.size))
-    _run(model, release, derivatives=True, time_s=times, angle_rad=angle_rad, jacobian=jacobian)
-    jacobian[-1] = 1.0
-    return angle_rad, jacobian.T
+    readings = np.empty((1 + _COLUMNS, times.size))
+    _run(model, release, readings, derivatives=True, time_s=times)
+    readings[-1] = 1.0
+    return readings[0], readings[1:].T
 
 
 def _checked_times(time_s: FloatArray, release: Release) -> FloatArray:
@@ -366,30 +368,31 @@ def _checked_times(time_s: FloatArray, release: Release) -> FloatArray:
 def _run(
     model: Eq8,
     release: Release,
+    out: FloatArray,
     *,
     derivatives: bool = False,
-    most: int = _NO_LIMIT,
+    time_s: FloatArray = _NONE,
     until_s: float = math.inf,
-    time_s: FloatArray | None = None,
-    angle_rad: FloatArray = _NONE,
-    jacobian: FloatArray = _NONE,
-    turning: FloatArray = _NONE,
 ) -> tuple[int, bool]:
-    """Call the engine; return the number of turning points and whether the last is the stop."""
+    """Fill `out`; return the number of turning points and whether the last is the stop."""
     if model.restoring == "sine" and not abs(release.angle_rad) < math.pi:
         raise ValueError(
             f"with sin x the release must lie within pi, not at {release.angle_rad} rad"
         )
-    if time_s is None:
-        time_s = _NONE
-    elif time_s.size == 0:
+    most = out.shape[1]
+    if most == 0:
         return 0, False
-    else:
-        until_s = float(time_s[-1])
+    if time_s.size:
+        most, until_s = _NO_LIMIT, float(time_s[-1])
     rates = len(RATES) if derivatives else 0
+    sensitivities = rates + 1 if rates else 0
+    polynomials = sensitivities + 1 if time_s.size else 0
+    head, per_panel = HEAD + 2 * sensitivities, 1 + polynomials * NODE_COUNT if polynomials else 0
     side = -1.0 if release.angle_rad < 0.0 else 1.0
-    workspace = np.empty(work_size(rates, time_s.size))
-    workspace[:_LOSSES] = (
+    work, rows = np.empty(WORK_SIZE), np.empty((ROW + 1, head + MOST_PANELS * per_panel))
+    REQUEST.pack_into(
+        work.data,
+        0,
         *model.shape(),
         model.angular_frequency,
         release.time_s,
@@ -398,22 +401,17 @@ def _run(
         side,
         abs(release.angle_rad),
         until_s,
+        most,
+        rates,
+        sensitivities,
+        polynomials,
+        head,
+        per_panel,
     )
     if derivatives:
-        workspace[_LOSSES : _LOSSES + rates] = model.rates()
-        by_rates = model.shape_derivatives()
-        workspace[_DIRECTIONS : _DIRECTIONS + by_rates.size] = by_rates.ravel()
-    arrays = {
-        "workspace": workspace,
-        "time_s": time_s,
-        "angle_rad": angle_rad,
-        "jacobian": jacobian,
-        "turning": turning,
-    }
-    room = turning.shape[-1]
-    request = [address(arrays[name]) for name in ADDRESSES]
-    request += counts(rates, time_s.size, room, most)
-    found, ending = divmod(march(np.array(request)), ENDINGS)
+        record = work.view(WORK)
+        record["rate"], record["directions"] = model.rates(), model.shape_derivatives()
+    found, ending = divmod(march(work, rows, time_s, out), ENDINGS)
     if ending == OVERDAMPED:
         raise ValueError(
             f"{model} is overdamped: it creeps towards its equilibrium and does not turn"

@@ -28,7 +28,7 @@ import math
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import INTEGRATION_T
-from pendpipe.dynamics.kernel import kernel
+from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.dynamics.layout import DEGREE, HEAD, NODE_COUNT, SLOTS, Work
 from pendpipe.dynamics.panel import (
     BEND,
@@ -58,7 +58,6 @@ from pendpipe.dynamics.panel import (
     horner,
     log_amplitude,
     multiply,
-    panel_width,
     place,
     polynomial,
     solve,
@@ -149,7 +148,7 @@ def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float
     sigma, shift, columns = work.sigma, work.shift, work.columns
     _differentiate(node, shape, radius)
     _grow(node, half_width)
-    for c in range(sigma.size):
+    for c in range(work.sensitivities):
         dm, dh, dq, dg = 0.0, 0.0, 0.0, 0.0
         if c > 0:
             dm, dh = directions[c - 1, 0], directions[c - 1, 1]
@@ -207,7 +206,7 @@ def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> N
     starts.
     """
     total, amplitude, clock = work.total, work.amplitude, work.clock
-    sign, first_sign = work.signs[0], work.signs[1]
+    sign, first_sign = work.sign, work.first_sign
     columns = work.sensitivities
     waveform = polynomials[:NODE_COUNT]
     for j in range(waveform.size):
@@ -231,6 +230,8 @@ def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> N
 @kernel
 def emit(
     work: Work,
+    time_s: FloatArray,
+    out: Matrix,
     polynomials: FloatArray,
     start: float,
     duration: float,
@@ -242,6 +243,8 @@ def emit(
 
     Parameters
     ----------
+    time_s, out
+        When samples are wanted; and where the angle (row 0) and its Jacobian are written.
     polynomials
         Of the panel, as in a row of `half_cycle.py`.
     start, duration
@@ -249,13 +252,12 @@ def emit(
     first, guess
         The index of the first sample, and about how many lie in the panel.
     """
-    omega, release_s = work.motion[0], work.motion[1]
-    time_s, angle_rad = work.time_s, work.angle_rad
+    omega, release_s = work.omega, work.release_s
     end = samples_before(time_s, first, release_s + (start + duration) / omega, guess)
     if end == first:
         return end
     combine(work, polynomials, duration, y)
-    work.total[0, 0] += work.motion[2]
+    work.total[0, 0] += work.offset
     # Whole blocks keep the loops free of remainders; what is written past the panel's end is
     # written again by the next panel (or as rest).
     last = min(first + math.ceil((end - first) / _BLOCK) * _BLOCK, time_s.size)
@@ -265,50 +267,50 @@ def emit(
         z, t = work.theta[: stop - at], time_s[at:stop]
         for i in range(z.size):
             z[i] = ((t[i] - release_s) * omega - start) * (2.0 / duration) - 1.0
-        horner(work.total[0], z, angle_rad[at:stop])
+        horner(work.total[0], z, out[0, at:stop])
         if work.sensitivities > 0:
-            _emit_derivatives(work, z, t, at)
+            _emit_derivatives(work, z, t, out, at)
         at = stop
     return end
 
 
 @kernel
-def _emit_derivatives(work: Work, theta: FloatArray, time_s: FloatArray, at: int) -> None:
+def _emit_derivatives(
+    work: Work, theta: FloatArray, time_s: FloatArray, out: Matrix, at: int
+) -> None:
     """Write the columns of the Jacobian for a block of samples."""
-    omega, release_s, directions = work.motion[0], work.motion[1], work.rates
-    stop, jacobian = at + theta.size, work.jacobian
-    by_omega, by_time = jacobian[directions, at:stop], jacobian[directions + 2, at:stop]
+    omega, release_s, directions = work.omega, work.release_s, work.rates
+    stop = at + theta.size
+    by_omega, by_time = out[directions + 1, at:stop], out[directions + 3, at:stop]
     horner(work.total[1], theta, by_time)
-    horner(work.total[2], theta, jacobian[directions + 1, at:stop])
+    horner(work.total[2], theta, out[directions + 2, at:stop])
     # By omega at fixed rates: time runs faster, and delta, h, q, g fall as 1/omega.
     for i in range(theta.size):
         by_omega[i] = (time_s[i] - release_s) * by_time[i]
         by_time[i] *= -omega
     for c in range(directions):
-        column, rate = jacobian[c, at:stop], work.rate[c] / omega
+        column, rate = out[c + 1, at:stop], work.rate[c] / omega
         horner(work.total[3 + c], theta, column)
         for i in range(theta.size):
             by_omega[i] -= rate * column[i]
 
 
 @kernel
-def rest(work: Work, y: float, first: int) -> None:
+def rest(work: Work, out: Matrix, y: float, first: int) -> None:
     """Write the samples after the stop: the last turning point, exactly."""
-    angle_rad, signs = work.angle_rad, work.signs
-    level = signs[0] * angle_of(work.shape, y) + work.motion[2]
-    for i in range(first, angle_rad.size):
-        angle_rad[i] = level
+    directions = work.rates
+    _fill(out[0, first:], work.sign * angle_of(work.shape, y) + work.offset)
     if work.sensitivities == 0:
         return
-    directions, side = work.rates, signs[0] / curve(work.shape, y)
+    side = work.sign / curve(work.shape, y)
     by_omega = 0.0
     for c in range(directions):
         by_rate = side * work.amplitude[c + 1]
-        by_omega -= work.rate[c] / work.motion[0] * by_rate
-        _fill(work.jacobian[c, first:], by_rate)
-    _fill(work.jacobian[directions, first:], by_omega)
-    _fill(work.jacobian[directions + 1, first:], side * signs[1] * work.amplitude[0])
-    _fill(work.jacobian[directions + 2, first:], 0.0)
+        by_omega -= work.rate[c] / work.omega * by_rate
+        _fill(out[c + 1, first:], by_rate)
+    _fill(out[directions + 1, first:], by_omega)
+    _fill(out[directions + 2, first:], side * work.first_sign * work.amplitude[0])
+    _fill(out[directions + 3, first:], 0.0)
 
 
 @kernel
@@ -407,8 +409,7 @@ def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: F
     radius = y - m
     _start(work, radius)
     change, excess = 0.0, 0.0
-    width = panel_width(work.polynomials)
-    at = HEAD + 2 * work.sensitivities
+    width, at = work.per_panel, work.head
     for p in range(panels):
         node = work.nodes[(panels + p) % SLOTS]
         if not _solve_panel(
@@ -439,21 +440,29 @@ def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: F
 
 @kernel
 def direct_half_cycle(
-    work: Work, y: float, begin: float, level: int, first: int, guess: int
+    work: Work,
+    time_s: FloatArray,
+    out: Matrix,
+    row: FloatArray,
+    y: float,
+    begin: float,
+    level: int,
+    first: int,
+    guess: int,
 ) -> tuple[float, float, int, int]:
-    """Solve a half cycle on panels as fine as it needs, and write its samples.
+    """Solve a half cycle on panels as fine as it needs, into `row`, and write its samples.
 
     `begin` is its start in radians since the release, `level` the number of halvings to begin
     with. Returns the amplitude at its end (negative if the pendulum stops before it reaches
     its equilibrium), its duration less pi, the index of the next sample, and the number of
     halvings it began with, which is negative if the pendulum is overdamped.
     """
-    m, row = work.shape[0], work.row
+    m = work.shape[0]
     radius = y - m
     complement = complement_for(work.shape, log_amplitude(work.shape, y))
     _start(work, radius)
     change, excess, k = 0.0, 0.0, 0
-    coarsest, at = -1, HEAD + 2 * work.sensitivities
+    coarsest, at = -1, work.head
     width = work.polynomials * NODE_COUNT
     while k < 1 << level:
         panels = 1 << level
@@ -482,7 +491,7 @@ def direct_half_cycle(
         duration = math.pi / panels + node[EXCESS + DEGREE]
         if width > 0:
             begins = begin + math.pi * k / panels + excess
-            end = emit(work, row[at : at + width], begins, duration, y, first, guess)
+            end = emit(work, time_s, out, row[at : at + width], begins, duration, y, first, guess)
             first, guess = end, end - first
         excess += node[EXCESS + DEGREE]
         change += node[LOSS + DEGREE] * (1.0 + change)

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, TypeAlias, TypeVar, overload
+from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, overload
 
 import numpy as np
 
@@ -28,18 +28,31 @@ Matrix: TypeAlias = FloatArray
 Stack: TypeAlias = FloatArray
 IntMatrix: TypeAlias = IntArray
 
-KINDS: Final[dict[str, tuple[Any, int]]] = {
-    "FloatArray": (np.dtype(np.float64), 1),
-    "Matrix": (np.dtype(np.float64), 2),
-    "Stack": (np.dtype(np.float64), 3),
-    "IntArray": (np.dtype(np.int64), 1),
-    "IntMatrix": (np.dtype(np.int64), 2),
-    "Work": (np.dtype(np.int64), 1),
-    "float": (ctypes.c_double, 0),
-    "int": (ctypes.c_int64, 0),
-    "None": (None, 0),
+_WORD: Final[Any] = ctypes.c_int64
+
+
+class Kind(NamedTuple):
+    """What an annotation means."""
+
+    item: np.dtype[Any] | None
+    """The type of an array's numbers; None for a number."""
+    axes: int
+    words: list[Any]
+    """What stands for it in a call: the number; a record's address; or of an array who owns it
+    (two), its size, that of an item, its address, its shape and its strides."""
+
+
+KINDS: Final = {
+    "FloatArray": Kind(np.dtype(np.float64), 1, 7 * [_WORD]),
+    "Matrix": Kind(np.dtype(np.float64), 2, 9 * [_WORD]),
+    "Stack": Kind(np.dtype(np.float64), 3, 11 * [_WORD]),
+    "IntArray": Kind(np.dtype(np.int64), 1, 7 * [_WORD]),
+    "IntMatrix": Kind(np.dtype(np.int64), 2, 9 * [_WORD]),
+    "Work": Kind(np.dtype(np.float64), 1, [_WORD]),
+    "float": Kind(None, 0, [ctypes.c_double]),
+    "int": Kind(None, 0, [_WORD]),
+    "None": Kind(None, 0, [_WORD]),
 }
-"""What annotations mean: the type of an array's numbers and how many axes it has, or a number's."""
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """Machine code for many machines, made while the package is built (`setup.py`)."""
@@ -83,26 +96,30 @@ class Kernel:
     def __call__(self, *arguments: Any) -> Any:
         """Run the machine code."""
         words: list[Any] = []
-        for argument, name in zip(arguments, self.kinds, strict=True):
-            kind, axes = KINDS[name]
-            if axes == 0:
+        for argument, (item, axes, own) in zip(arguments, self.kinds, strict=True):
+            if item is None:
                 words.append(argument)
-            elif argument.dtype == kind and argument.ndim == axes:
-                words += (address(argument), *argument.shape)
+            elif argument.dtype != item or argument.ndim != axes:
+                raise TypeError(f"{self.__name__} needs an array of {item} with {axes} axes")
+            elif len(own) == 1:
+                words.append(address(argument))
             else:
-                raise TypeError(f"{self.__name__} needs an array of {kind} with {axes} axes")
-        return self.machine_code(*words)
+                words += (0, 0, argument.size, item.itemsize, address(argument))
+                words += (*argument.shape, *argument.strides)
+        result, fault = self.returns.words[0](), _WORD()
+        self.machine_code(ctypes.byref(result), ctypes.byref(fault), *words)
+        return result.value if self.returns is not KINDS["None"] else None
 
     @cached_property
-    def kinds(self) -> list[str]:
-        """The arguments' annotations."""
+    def kinds(self) -> list[Kind]:
+        """The arguments' kinds."""
         noted = self.function.__annotations__
-        return [kind for name, kind in noted.items() if name != "return"]
+        return [KINDS[kind] for name, kind in noted.items() if name != "return"]
 
-    @property
-    def returns(self) -> Any:
-        """The type of what is returned, None for nothing."""
-        return KINDS[self.function.__annotations__["return"]][0]
+    @cached_property
+    def returns(self) -> Kind:
+        """The kind of what is returned."""
+        return KINDS[self.function.__annotations__["return"]]
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -122,11 +139,7 @@ class Kernel:
         # It brings llvmlite, which who calls nothing compiled can do without.
         from pendpipe.dynamics import machine_code
 
-        words = [
-            word
-            for kind, axes in (KINDS[name] for name in self.kinds)
-            for word in ((ctypes.c_void_p, *axes * [ctypes.c_int64]) if axes else (kind,))
-        ]
+        words = [word for kind in self.kinds for word in kind.words]
         name = self.file_name()
         for path in (*(folder / name for folder in folders()), *shipped(name).values()):
             loaded = machine_code.load(path)
@@ -135,7 +148,7 @@ class Kernel:
         else:
             loaded = self._compiled(name)
         found, self._owner = loaded
-        return ctypes.CFUNCTYPE(self.returns, *words)(found)
+        return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *words)(found)
 
     def _compiled(self, name: str) -> tuple[int, Any]:
         """Compile, and keep the machine code."""
@@ -143,15 +156,15 @@ class Kernel:
 
         if sys.stderr.isatty():
             print(f"compiling, once: {self.__name__} (march: half a minute)", file=sys.stderr)
-        made = numba_side.compiled(self)
+        library, entry = numba_side.compiled(self)
         for folder in folders():
             try:
-                machine_code.keep(folder / name, made.inspect_llvm(), made.native_name)
+                machine_code.keep(folder / name, library.get_llvm_str(), entry)
             except OSError:
                 continue
             self._remove_older(folder, name)
             break
-        return made.address, made
+        return library.get_pointer_to_function(entry), library
 
     def ship(self) -> None:
         """Make the code for many machines, unless it is there."""
@@ -160,9 +173,9 @@ class Kernel:
         paths = {cpu: path for cpu, path in shipped(self.file_name()).items() if not path.exists()}
         if not paths:
             return
-        made = numba_side.compiled(self)
+        library, entry = numba_side.compiled(self)
         for processor, path in paths.items():
-            machine_code.keep(path, made.inspect_llvm(), made.native_name, processor)
+            machine_code.keep(path, library.get_llvm_str(), entry, processor)
 
     def _remove_older(self, folder: Path, name: str) -> None:
         """Remove the code of other sources."""

@@ -1,11 +1,14 @@
 """What the engine and its callers must agree on, free of Numba: sizes, and where what lies.
 
-A call hands over integers: the addresses of arrays (`ADDRESSES`) and numbers of things (`COUNTS`).
-One of the arrays is the workspace: the engine allocates nothing. `FIELDS` declares where in it
-each array of the engine lies.
+A call hands over one record, its workspace, and arrays for half cycles, times and results: the
+engine allocates nothing. `WORK` declares what lies in the record; kernels read its
+fields as attributes, `work.sigma`. What a call is about stands first, in the order of `REQUEST`.
 """
 
-from typing import Any, Final, NamedTuple
+import struct
+from typing import Any, Final
+
+import numpy as np
 
 DEGREE: Final = 16
 """Of the polynomials on a panel."""
@@ -22,134 +25,56 @@ MOST_PANELS: Final = 8
 """Panels to a half cycle in a table."""
 THETA: Final = 512
 
+TABLE: Final = MOST_POINTS + 1
+ROW: Final = TABLE + MOST_POINTS
+"""Half cycles are rows of one matrix (see `half_cycle.py`): those that a table is made of and one
+of scratch, from `TABLE` on the table, and in the row `ROW`, the last, the half cycle in hand."""
+
 RUNNING, STOPPED, OVERDAMPED = range(3)
 ENDINGS: Final = 3
 """How a march ends."""
 
-COUNTS: Final = (
-    "rates",
-    "sensitivities",
-    "parameters",
-    "samples",
-    "recorded",
-    "room",
-    "polynomials",
-    "width",
-    "most",
-)
-"""Numbers of rates; of sensitivities (to the amplitude and those); of columns of the Jacobian; of
-samples; of what is recorded of a turning point, and of how many; of the polynomials of a panel; the
-width of a row; how many turning points are wanted at most."""
+_RATES: Final = 4
+_S: Final = _RATES + 1
+"""Sensitivities: to the amplitude, and to the rates."""
 Work = Any
-"""What the engine works on: the arrays of `FIELDS` and the numbers of `COUNTS`, as attributes."""
-
-
-class Field(NamedTuple):
-    """An array of the engine: where it lies, and its shape.
-
-    Parameters
-    ----------
-    owner
-        The array of which it is a part.
-    offset, widths
-        Where it begins: so many numbers, and widths of a row, behind the owner's first.
-    rows, columns
-        Its shape, each a number or the name of one that the engine knows (`COUNTS`),
-        with what is added to it; `rows` is None for a vector.
-    """
-
-    owner: str
-    offset: int
-    widths: int
-    rows: tuple[str, int] | None
-    columns: tuple[str, int]
-
-
-_MOST_RATES: Final = 4
-_S: Final = _MOST_RATES + 1
-_INSIDE: Final[dict[str, tuple[int, tuple[str, int] | None, tuple[str, int]]]] = {
-    # name: room, rows, columns
-    "shape": (5, None, ("", 5)),  # m, h, q, g, k of `panel.py`
-    "motion": (3, None, ("", 3)),  # omega, the time of the release, the offset
-    "signs": (2, None, ("", 2)),  # the side of the turning point in hand, and of the release
-    "limits": (2, None, ("", 2)),  # the angle of the release, and the time of the end
-    "rate": (_MOST_RATES, None, ("rates", 0)),  # the rates themselves
-    "directions": (4 * _MOST_RATES, ("rates", 0), ("", 4)),  # of m, h, q and g by each rate
-    # d ln r/dp and dtau/dp at fixed phase, at the end of the panel in hand, and at its start
-    "sigma": (_S, None, ("sensitivities", 0)),
-    "shift": (_S, None, ("sensitivities", 0)),
-    "kept": (2 * _S, ("", 2), ("sensitivities", 0)),
-    # dy/dp and dtau/dp at the last turning point
-    "amplitude": (_S, None, ("sensitivities", 0)),
-    "clock": (_S, None, ("sensitivities", 0)),
-    "segment": (6, None, ("", 6)),  # what the table spans; see `table.py`
-    "wanted": (2, None, ("", 2)),  # how `march` lays out its tables
-    "columns": ((_S + 1) * NODE_COUNT, ("sensitivities", 1), ("", NODE_COUNT)),  # dx/dp, and x
-    "chebyshev": (NODE_COUNT * NODE_COUNT, ("", NODE_COUNT), ("", NODE_COUNT)),
-    # the polynomials of the angle, its velocity and its derivatives
-    "total": ((_S + 2) * NODE_COUNT, ("sensitivities", 2), ("", NODE_COUNT)),
-    "theta": (THETA, None, ("", THETA)),  # a block of places within a panel
-    "nodes": (SLOTS * NODE_SIZE, ("", SLOTS), ("", NODE_SIZE)),  # panels; see `panel.py`
-}
-
-
-def _placed() -> tuple[dict[str, Field], int]:
-    """Return the fields of the workspace, one behind the other, and their fixed room."""
-    fields, offset = {}, 0
-    for name, (room, rows, columns) in _INSIDE.items():
-        fields[name] = Field("workspace", offset, 0, rows, columns)
-        offset += room
-    return fields, offset
-
-
-_FIELDS, _FIXED = _placed()
-FIELDS: Final[dict[str, Field]] = _FIELDS | {
-    # the half cycle in hand (see `half_cycle.py`), those that a table is made of (and one row of
-    # scratch), and the table
-    "row": Field("workspace", _FIXED, 0, None, ("width", 0)),
-    "rows": Field("workspace", _FIXED, 1, ("", MOST_POINTS + 1), ("width", 0)),
-    "table": Field("workspace", _FIXED, MOST_POINTS + 2, ("", MOST_POINTS), ("width", 0)),
-    "time_s": Field("time_s", 0, 0, None, ("samples", 0)),
-    "angle_rad": Field("angle_rad", 0, 0, None, ("samples", 0)),
-    "jacobian": Field("jacobian", 0, 0, ("parameters", 0), ("samples", 0)),
-    "turning": Field("turning", 0, 0, ("recorded", 0), ("room", 0)),
-}
-"""Every array that the engine works on, by name."""
-
-
-def panel_width(polynomials: int) -> int:
-    """Return how many numbers of a half cycle's row belong to one panel."""
-    return 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
-
-
-def row_width(sensitivities: int, polynomials: int, panels: int) -> int:
-    """Return the length of a half cycle's row."""
-    width = 1 + polynomials * NODE_COUNT if polynomials > 0 else 0
-    return HEAD + 2 * sensitivities + panels * width
-
-
-def work_size(rates: int, samples: int) -> int:
-    """Return how many numbers the workspace has."""
-    width = counts(rates, samples, 0, 0)[COUNTS.index("width")]
-    return _FIXED + (2 * MOST_POINTS + 2) * width
-
-
-def counts(rates: int, samples: int, room: int, most: int) -> tuple[int, ...]:
-    """Return the integers of a call, in the order of `COUNTS`."""
-    sensitivities, parameters = (rates + 1, rates + 4) if rates else (0, 0)
-    polynomials = sensitivities + 1 if samples else 0
-    return (
-        rates,
-        sensitivities,
-        parameters,
-        samples,
-        2 + 2 * parameters,
-        room,
-        polynomials,
-        row_width(sensitivities, polynomials, MOST_PANELS),
-        most,
-    )
-
-
-ADDRESSES: Final = tuple({field.owner: None for field in FIELDS.values()})
-"""The arrays of a call."""
+"""A record of `WORK`."""
+WORK: Final = np.dtype(
+    [
+        ("shape", "f8", 5),  # m, h, q, g, k of `panel.py`
+        ("omega", "f8"),
+        ("release_s", "f8"),
+        ("offset", "f8"),
+        ("sign", "f8"),  # the side of the turning point in hand
+        ("first_sign", "f8"),  # and of the release
+        ("release", "f8"),  # its angle, positive
+        ("until_s", "f8"),  # after it no turning point is wanted
+        ("most", "i8"),  # turning points that are wanted
+        ("rates", "i8"),
+        ("sensitivities", "i8"),  # to the amplitude and the rates; or none
+        ("polynomials", "i8"),  # of a panel
+        ("head", "i8"),  # of a half cycle's row: its length, and that of each panel's part
+        ("per_panel", "i8"),
+        ("rate", "f8", _RATES),  # the rates themselves
+        ("directions", "f8", (_RATES, 4)),  # of m, h, q and g by each rate
+        # d ln r/dp and dtau/dp at fixed phase, at the end of the panel in hand, and at its start
+        ("sigma", "f8", _S),
+        ("shift", "f8", _S),
+        ("kept", "f8", (2, _S)),
+        # dy/dp and dtau/dp at the last turning point
+        ("amplitude", "f8", _S),
+        ("clock", "f8", _S),
+        ("segment", "f8", 6),  # what the table spans; see `table.py`
+        ("wanted", "f8", 2),  # how `march` lays out its tables
+        ("columns", "f8", (_S + 1, NODE_COUNT)),  # dx/dp, and x
+        ("chebyshev", "f8", (NODE_COUNT, NODE_COUNT)),
+        # the polynomials of the angle, its velocity and its derivatives
+        ("total", "f8", (_S + 2, NODE_COUNT)),
+        ("theta", "f8", THETA),  # a block of places within a panel
+        ("nodes", "f8", (SLOTS, NODE_SIZE)),  # panels; see `panel.py`
+    ]
+)
+WORK_SIZE: Final = WORK.itemsize // 8
+"""In numbers: Python hands it over as an array of them."""
+REQUEST: Final = struct.Struct("=12d6q")
+"""The first fields, from the shape to the length of a panel's part."""

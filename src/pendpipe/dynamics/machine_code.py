@@ -101,15 +101,6 @@ def load(path: Path) -> tuple[int, Any] | None:
 
 def _provide(name: str) -> None:
     """Give LLVM the address of a function; AttributeError if the C library lacks it."""
-    if llvm.address_of_symbol(name) is not None:
-        return
-    library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
-    if name.startswith("Py"):
-        # Named for the whole process: Numba, should it come later, will call it by this name.
-        function = getattr(ctypes.pythonapi, name)
-    else:
-        # Numba's ways to raise: the engine never does, though its entry declares them, and
-        # Numba names its own when it is imported.
-        raising = name.startswith(("numba_", "NRT_"))
-        function = getattr(library, "abort" if raising else name)
-    llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
+    if llvm.address_of_symbol(name) is None:
+        library = ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)
+        llvm.add_symbol(name, ctypes.cast(getattr(library, name), ctypes.c_void_p).value)

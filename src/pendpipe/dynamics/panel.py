@@ -34,7 +34,6 @@ from __future__ import annotations
 import math
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import layout
 from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.dynamics.layout import DEGREE, NODE_COUNT
@@ -51,9 +50,6 @@ PHASE_BELOW = -1.2
 """Up to this `log_amplitude` (0.3 rad) w = psi."""
 CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE = range(5)
 """m, h, q, g and k in the array `shape`."""
-
-panel_width = kernel(layout.panel_width)
-row_width = kernel(layout.row_width)
 
 
 @kernel(inline=True)

@@ -13,15 +13,13 @@ import math
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
-from pendpipe.dynamics.kernel import kernel
-from pendpipe.dynamics.layout import FEW_POINTS, HEAD, MOST_POINTS, Work
+from pendpipe.dynamics.kernel import Matrix, kernel
+from pendpipe.dynamics.layout import FEW_POINTS, MOST_POINTS, TABLE, Work
 from pendpipe.dynamics.panel import (
     CURVATURE,
     amplitude_at,
     complement_for,
     curve,
-    panel_width,
-    row_width,
 )
 
 _WIDEST, _FEW = 5.2, 0.31
@@ -90,8 +88,8 @@ def half_cycles_and_span(
 
 
 @kernel
-def build(work: Work, log_y: float, span: float, panels: int) -> int:
-    """Tabulate the half cycles with ln y from log_y - span to log_y.
+def build(work: Work, rows: Matrix, log_y: float, span: float, panels: int) -> int:
+    """Tabulate the half cycles with ln y from log_y - span to log_y in `rows`.
 
     Returns DONE, or what stands in the way: a half cycle needs more panels, or the span is too
     wide for the points.
@@ -100,17 +98,16 @@ def build(work: Work, log_y: float, span: float, panels: int) -> int:
     segment = work.segment
     segment[MIDDLE], segment[INVERSE] = log_y - half, 1.0 / half
     segment[POINTS], segment[PANELS] = points, panels
-    width = row_width(work.sensitivities, work.polynomials, panels)
+    width = work.head + panels * work.per_panel
     complement = complement_for(work.shape, log_y)
     nodes = _MANY_NODES if points == MOST_POINTS else _FEW_NODES
     for i in range(points):
         y = amplitude_at(work.shape, log_y - half + half * nodes[i])
-        if not even_half_cycle(work, y, complement, panels, work.rows[i]):
+        if not even_half_cycle(work, y, complement, panels, rows[i]):
             return MORE_PANELS
     # The sine's excess is no work of the losses, and not to be measured by them.
     excess = _EXCESS_TOLERANCE if work.shape[CURVATURE] > 0.0 else 0.0
-    first, per_panel = HEAD + 2 * work.sensitivities, panel_width(work.polynomials)
-    if not _interpolate(points, width, work.rows, first, per_panel, excess, work.table):
+    if not _interpolate(points, width, rows, work.head, work.per_panel, excess, rows[TABLE:]):
         return LESS_SPAN
     segment[LOW], segment[HIGH] = log_y - span, log_y
     return DONE
