@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.analysis.theory import theory_curve
+from pendpipe.analysis.compare import theory_curve
 from pendpipe.physics import Fluid, Rod, Sphere
 
 WATER = Fluid(998.0, 1.0e-3), 9.81

@@ -5,17 +5,23 @@ what the records share: 1/k of the hysteresis, the sphere, the water. Each of th
 followed by moving it by its standard deviation and making the estimate again.
 
 Fits through all records take those shared errors into their covariance.
+
+Beside them stand what theory says of one pendulum in its fluid (inertia, Eq. 16, the period's
+lengthening), and how well a decay's shape is told: Eq. 14 beside a pure exponential, and the trap
+of tails.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from pendpipe import physics
+from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
 from pendpipe.analysis.separate import SeparatedRecord
-from pendpipe.arrays import FloatArray
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import InputError
 from pendpipe.estimate import Estimate, chi_square_p_value
 
@@ -166,51 +172,35 @@ def viscous_losses(
     return ViscousLosses(tuple(row[-1] for row in rows), *columns)
 
 
-SOURCES: Final = (
-    "hysteretic coefficient",
-    "sphere's radius",
-    "distance to the axis",
-    "moment of inertia",
-    "viscosity",
-    "density",
-    "temperature",
-)
-"""What the records share, in the order of `shifted`."""
+def shifts(losses: ViscousLosses, errors: SharedErrors, sds: float) -> dict[str, ViscousLosses]:
+    """Return the losses as they would be, were each shared quantity in turn off by some sds."""
+    moved = sds * errors.inverse_k * losses.rate_per_inverse_k
+    now, then = errors.temperature_c, errors.temperature_c + sds * errors.temperature_k
+    thinner = physics.water_viscosity(then) / physics.water_viscosity(now)
+    lighter = physics.water_density(then) / physics.water_density(now)
+    inertia, viscosity = losses.moment_of_inertia_kg_m2, losses.viscosity_pa_s
+    density = losses.density_kg_per_m3
+    changed: dict[str, dict[str, Any]] = {
+        HYSTERESIS: {
+            "rate_per_s": losses.rate_per_s + moved,
+            "hysteretic_rate_per_s": losses.hysteretic_rate_per_s - moved,
+        },
+        "sphere's radius": {"radius_m": losses.radius_m + sds * errors.radius_m},
+        "distance to the axis": {"distance_m": losses.distance_m + sds * errors.distance_m},
+        "moment of inertia": {
+            "moment_of_inertia_kg_m2": inertia * (1.0 + sds * errors.relative_inertia)
+        },
+        "viscosity": {"viscosity_pa_s": viscosity * (1.0 + sds * errors.relative_viscosity)},
+        "density": {"density_kg_per_m3": density * (1.0 + sds * errors.relative_density)},
+        "temperature": {
+            "viscosity_pa_s": viscosity * thinner,
+            "density_kg_per_m3": density * lighter,
+        },
+    }
+    return {source: replace(losses, **columns) for source, columns in changed.items()}
 
 
-def shifted(losses: ViscousLosses, errors: SharedErrors, source: str, sds: float) -> ViscousLosses:
-    """Return the losses as they would be, were one shared quantity off by some sds."""
-    match source:
-        case "hysteretic coefficient":
-            moved = sds * errors.inverse_k * losses.rate_per_inverse_k
-            return replace(
-                losses,
-                rate_per_s=losses.rate_per_s + moved,
-                hysteretic_rate_per_s=losses.hysteretic_rate_per_s - moved,
-            )
-        case "sphere's radius":
-            return replace(losses, radius_m=losses.radius_m + sds * errors.radius_m)
-        case "distance to the axis":
-            return replace(losses, distance_m=losses.distance_m + sds * errors.distance_m)
-        case "moment of inertia":
-            factor = 1.0 + sds * errors.relative_inertia
-            return replace(losses, moment_of_inertia_kg_m2=losses.moment_of_inertia_kg_m2 * factor)
-        case "viscosity":
-            factor = 1.0 + sds * errors.relative_viscosity
-            return replace(losses, viscosity_pa_s=losses.viscosity_pa_s * factor)
-        case "density":
-            factor = 1.0 + sds * errors.relative_density
-            return replace(losses, density_kg_per_m3=losses.density_kg_per_m3 * factor)
-        case "temperature":
-            now, then = errors.temperature_c, errors.temperature_c + sds * errors.temperature_k
-            thinner = physics.water_viscosity(then) / physics.water_viscosity(now)
-            lighter = physics.water_density(then) / physics.water_density(now)
-            return replace(
-                losses,
-                viscosity_pa_s=losses.viscosity_pa_s * thinner,
-                density_kg_per_m3=losses.density_kg_per_m3 * lighter,
-            )
-    raise ValueError(f"unknown source {source}")
+HYSTERESIS: Final = "hysteretic coefficient"
 
 
 def shared_effects(
@@ -219,13 +209,10 @@ def shared_effects(
     errors: SharedErrors,
 ) -> dict[str, FloatArray]:
     """Change of a quantity for one standard deviation of each shared source."""
+    below = shifts(losses, errors, -1.0)
     return {
-        source: np.asarray(
-            quantity(shifted(losses, errors, source, 1.0))
-            - np.asarray(quantity(shifted(losses, errors, source, -1.0)))
-        )
-        / 2.0
-        for source in SOURCES
+        source: np.asarray(quantity(above) - np.asarray(quantity(below[source]))) / 2.0
+        for source, above in shifts(losses, errors, 1.0).items()
     }
 
 
@@ -419,8 +406,7 @@ def _derivative(
     weights = order * np.linalg.pinv(powers)[order]
     value = float(weights @ _log_quality(branch))
     own = float(np.sqrt(np.sum((weights * branch.rate_sd_per_s / branch.rate_per_s) ** 2)))
-    source = "hysteretic coefficient"
-    ends = [_log_quality(shifted(branch, errors, source, sds)) for sds in (1.0, -1.0)]
+    ends = [_log_quality(shifts(branch, errors, sds)[HYSTERESIS]) for sds in (1.0, -1.0)]
     return value, own, float(abs(weights @ (ends[0] - ends[1])) / 2.0)
 
 
@@ -628,3 +614,143 @@ def _exponents(
         if exponent is not None:
             found[branch] = exponent
     return found
+
+
+class TheoryCurve(NamedTuple):
+    """Theory along a branch; each an array of shape (n,)."""
+
+    frequency_hz: FloatArray
+    moment_of_inertia_kg_m2: FloatArray
+    quality_factor_viscous: FloatArray
+    quality_factor_steady: FloatArray
+    radius_over_depth: FloatArray
+    lengthening: physics.Lengthening
+
+
+def submerged_sphere(parts: Sequence[physics.Part]) -> physics.Sphere | None:
+    """The sphere that swings in the fluid, where there is one."""
+    for part in parts:
+        if isinstance(part, physics.Sphere) and part.submerged:
+            return part
+    return None
+
+
+def theory_curve(
+    parts: Sequence[physics.Part],
+    fluid: physics.Fluid,
+    gravity_m_per_s2: float,
+    *,
+    plain_added_mass: bool = False,
+) -> TheoryCurve | None:
+    """Theory of a pendulum, or of many: the parts' positions may be arrays.
+
+    Parameters
+    ----------
+    parts
+        The pendulum's parts; one of them a submerged sphere, or there is no theory.
+    fluid, gravity_m_per_s2, plain_added_mass
+        As in `pendpipe.physics.swing`.
+
+    Returns
+    -------
+    TheoryCurve
+        With Eq. 16's Q_v (C_H = 1) and the steady Stokes law's (C_H = 0); ``None`` where
+        nothing is submerged.
+    """
+    sphere = submerged_sphere(parts)
+    if sphere is None:
+        return None
+    moving = physics.swing(parts, fluid, gravity_m_per_s2, plain_added_mass=plain_added_mass)
+    density, viscosity = fluid
+    oscillating, steady = (
+        physics.viscous_quality_factor(
+            moving.moment_of_inertia_kg_m2,
+            moving.angular_frequency_per_s,
+            sphere.radius_m,
+            sphere.centre_m,
+            viscosity,
+            density,
+            history,
+        )
+        for history in (1.0, 0.0)
+    )
+    depth = physics.penetration_depth(moving.angular_frequency_per_s, viscosity, density)
+    return TheoryCurve(
+        frequency_hz=np.atleast_1d(moving.frequency_hz),
+        moment_of_inertia_kg_m2=np.atleast_1d(moving.moment_of_inertia_kg_m2),
+        quality_factor_viscous=np.atleast_1d(oscillating),
+        quality_factor_steady=np.atleast_1d(steady),
+        radius_over_depth=np.atleast_1d(np.divide(sphere.radius_m, depth)),
+        lengthening=physics.period_lengthening(
+            parts,
+            fluid,
+            gravity_m_per_s2,
+            plain_added_mass=plain_added_mass,
+        ),
+    )
+
+
+FEWEST_IN_A_TAIL = 8
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What two laws leave of the amplitudes, rms in rad (m)."""
+
+    amplitude_rms_rad: float
+    """By Eq. 14: a, b and c together."""
+    linear_damping_rms_rad: float
+    """By an exponential: b alone, the textbook's linear damping."""
+    half_cycles: int
+
+
+@dataclass(frozen=True)
+class Tail:
+    """a, b, c from the part of a record after `start_s`."""
+
+    start_s: float
+    amplitude_rad: float
+    a: Estimate
+    b: Estimate
+    c: Estimate
+
+
+def amplitude_misfit(points: TurningPoints) -> Misfit:
+    """Fit the amplitudes with and without a and c; the same points, the same weights."""
+
+    def left_by(held: dict[str, float]) -> float:
+        return float(np.sqrt(np.mean(fit_envelope(points, held).residual ** 2)))
+
+    return Misfit(left_by({}), left_by({"a": 0.0, "c": 0.0}), len(points))
+
+
+def tail_fits(points: TurningPoints, count: int = 12) -> list[Tail]:
+    """Fit ever later parts of a record: the first is the whole of it.
+
+    The starts are even in the logarithm of the amplitude; the last tail keeps eight
+    turning points. A fit to the tail alone depends on where it begins, which the paper
+    warns of: its a is hardly told, and what it takes from a it gives to b and c.
+    """
+    amplitude = np.abs(points.angle_rad)
+    last = len(points) - FEWEST_IN_A_TAIL
+    if last < 1:
+        return []
+    levels = np.geomspace(amplitude[0], max(amplitude[last], 1e-3 * amplitude[0]), count)
+    place = np.arange(len(points))
+    starts = np.unique(np.searchsorted(-amplitude[: last + 1], -levels))
+    return [tail for start in starts if (tail := _tail(points, place >= start))]
+
+
+def _tail(points: TurningPoints, kept: BoolArray) -> Tail | None:
+    part = points.chosen(kept)
+    try:
+        found = fit_points(part).parameters
+    except InputError:
+        return None  # too little is left of it
+    return Tail(
+        start_s=float(part.time_s[0] - points.time_s[0]),
+        amplitude_rad=float(abs(part.angle_rad[0])),
+        a=found["a"],
+        b=found["b"],
+        c=found["c"],
+    )

@@ -13,10 +13,11 @@ from pendpipe.analysis.compare import (
     SharedErrors,
     SharedEstimate,
     Surroundings,
+    amplitude_misfit,
     compare,
+    tail_fits,
 )
 from pendpipe.analysis.separate import SeparatedRecord
-from pendpipe.analysis.shape_tests import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import load, shared
 from pendpipe.campaign.design import design_of

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pendpipe import physics
+from pendpipe.analysis.compare import TheoryCurve, theory_curve
 from pendpipe.analysis.fit.result import FitResult, read_fit
-from pendpipe.analysis.theory import TheoryCurve, theory_curve
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design, design_of
 from pendpipe.campaign.fit import Measured, measured
