@@ -11,10 +11,10 @@ from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.faults import Forensics
-from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.state import Fault, State
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from pendpipe.analysis.fit.by_waveform import best_noise
 from pendpipe.diagnosis.data import Data, fast_length, gather, rounding_bias, with_lattice
-from pendpipe.diagnosis.forensics.lattice import noise_before_rounding
+from pendpipe.diagnosis.forensics.codes import noise_before_rounding
 from pendpipe.diagnosis.forensics.local import Local
 
 from .decays import rounded

@@ -13,9 +13,9 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import slips
-from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model

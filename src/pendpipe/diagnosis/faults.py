@@ -19,12 +19,11 @@ from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips, tracking
-from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.result import COLOURED_NOISE, Location
+from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location
 from pendpipe.diagnosis.state import Fault, State, is_gross, loses_phase
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
@@ -181,7 +180,7 @@ class Forensics:
         """Correct the times of the readings after lost samples."""
         data = state.data
         interval = data.interval_s / data.fold
-        lost = find_lost_samples(data, state.fit, interval)
+        lost = find_lost_samples(data, state.fit)
         if not lost:
             return
         time = data.time_s.copy()

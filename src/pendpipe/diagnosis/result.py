@@ -1,4 +1,4 @@
-"""The result of a diagnosis, and its form on disk (``diagnosis.json``)."""
+"""The results of a test and of a diagnosis, and their form on disk (``diagnosis.json``)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
+    from pendpipe.arrays import BoolArray, FloatArray
     from pendpipe.diagnosis.held_out import HeldOut
     from pendpipe.diagnosis.remainder import Remainder
     from pendpipe.diagnosis.small_swings import SmallSwings
@@ -63,6 +64,20 @@ class Location:
     adc_codes: tuple[int, ...] = ()
     summary: str = ""
 
+    @classmethod
+    def over(
+        cls,
+        time_s: FloatArray,
+        amplitude: FloatArray,
+        phase_rad: tuple[float, float] | None = None,
+        frequency_hz: tuple[float, ...] = (),
+        adc_codes: tuple[int, ...] = (),
+    ) -> Location:
+        """Return all of some readings, by their times and the motion's amplitudes then."""
+        amplitudes = float(amplitude.min()), float(amplitude.max())
+        times = float(time_s[0]), float(time_s[-1])
+        return cls(times, amplitudes, phase_rad, frequency_hz, adc_codes=adc_codes)
+
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""
 
@@ -93,6 +108,56 @@ class Confirmation(NamedTuple):
 
     summary: str
     p_value: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The result of one test, whether it found anything or not.
+
+    Parameters
+    ----------
+    identifier
+        Of the effect.
+    p_value
+        Probability that chance alone does as well in this test, its own trials included;
+        uniform for the null, or larger.
+    delta_chi2
+        Twice the gain in log-likelihood.
+    parameters
+        Measured quantities.
+    location
+        Where it shows.
+    mask
+        Readings to leave out, shape (n,); None for none.
+    time_s
+        Better times of the readings, shape (n,); None if the time stamps are as good.
+    summary
+        One clause.
+    kind
+        ``"fault"``: reported as an effect if it is significant. ``"property"``: reported as a
+        property of the record that does no harm.
+    also
+        Identifiers of effects that would give exactly the same codes.
+    confirmed
+        What a second test found that does not use the model.
+    """
+
+    identifier: str
+    p_value: float
+    delta_chi2: float = 0.0
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    location: Location = field(default_factory=Location)
+    mask: BoolArray | None = None
+    time_s: FloatArray | None = None
+    summary: str = ""
+    kind: Literal["fault", "property"] = "fault"
+    also: tuple[str, ...] = ()
+    confirmed: Confirmation | None = None
+
+
+def nothing(identifier: str) -> Finding:
+    """Return the result of a test that can't be made."""
+    return Finding(identifier, 1.0, summary="not tested")
 
 
 @dataclass(frozen=True, repr=False)

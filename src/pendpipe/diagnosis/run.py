@@ -16,9 +16,9 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
-from pendpipe.diagnosis.forensics import lost_time
+from pendpipe.diagnosis.forensics import lost_samples
+from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.coloured_noise import level_note
-from pendpipe.diagnosis.forensics.lattice import with_true_step
 from pendpipe.diagnosis.forensics.time_stamps import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.refine import Fit
@@ -340,7 +340,7 @@ def _checked(effect: FoundEffect, found: Search, samples: Samples) -> FoundEffec
         return effect
     when, period_s = effect.location.time_s, found.improved.at.span.period_s
     at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
-    return replace(effect, confirmed=lost_time.confirmed(samples, at, period_s))
+    return replace(effect, confirmed=lost_samples.confirmed(samples, at, period_s))
 
 
 def _small_swings(law: Fit, found: Search) -> SmallSwings | None:

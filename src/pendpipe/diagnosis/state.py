@@ -13,11 +13,11 @@ from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import Detection
 from pendpipe.diagnosis.evidence import Rival
-from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import INCOMPLETE
+from pendpipe.diagnosis.result import Finding
 from pendpipe.effects.baseline import OMEGA
 
 GROSS: Final = 2.0

@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedFormatter
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.lattice import find_lattice
+from pendpipe.diagnosis.forensics.codes import find_lattice
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Diagnosis

@@ -1,6 +1,6 @@
 """Tests for faults of the measurement without a smooth signature in time, a file for each.
 
-Every module has ``find(data, fit, noise, samples) -> Finding``.
+Every test is a function ``find(data, fit, noise, samples) -> Finding``.
 """
 
 from __future__ import annotations
@@ -13,17 +13,16 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import (
     broadband_drive,
     clipping,
-    coarse_quantisation,
     coloured_noise,
+    converter,
     glitches,
     jitter,
-    missing_codes,
     time_stamps,
 )
-from pendpipe.diagnosis.forensics.finding import Finding
 from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Finding
 
 Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
@@ -31,8 +30,8 @@ TESTS: Final[dict[str, Test]] = {
     "time-stamps": time_stamps.find_irregular,
     "clipping": clipping.find,
     "glitches": glitches.find,
-    "missing-codes": missing_codes.find,
-    "coarse-quantisation": coarse_quantisation.find,
+    "missing-codes": converter.find_missing_codes,
+    "coarse-quantisation": converter.find_coarse_steps,
     "jitter": jitter.find,
     "coloured-noise": coloured_noise.find,
     "broadband-drive": broadband_drive.find,

@@ -10,12 +10,11 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.local import residual_of
-from pendpipe.diagnosis.forensics.weighted_squares import tail_of_squares
+from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.diagnosis.scores import tangent_basis
 from pendpipe.estimate import Estimate
 
@@ -168,11 +167,7 @@ def _described(
         p_value,
         gain,
         {"acceleration_density": Estimate(best, sd, f"({data.unit}/s^2)^2/Hz")},
-        Location(
-            (float(data.time_s[0]), float(data.time_s[-1])),
-            (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
-            frequency_hz=(omega / (2.0 * math.pi),),
-        ),
+        Location.over(data.time_s, sampled.amplitude, frequency_hz=(omega / (2.0 * math.pi),)),
         summary="amplitude and phase fluctuate as under a random torque"
         f" ({best:.2g} (rad/s^2)^2/Hz; it would sustain {floor:.2g} {data.unit} rms)",
     )

@@ -1,30 +1,223 @@
-"""Codes of the converter, and the angles that the motion had."""
+"""Codes of a converter: their lattice, rounding, and the angles that the motion had."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.special import ndtr
 
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.lattice import (
-    Lattice,
-    lattice_of,
-    noise_before_rounding,
-    whole_readings,
-)
-from pendpipe.diagnosis.forensics.local import error_of, local_residual
+from pendpipe.diagnosis.forensics.local import Local, error_of, local_residual
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.sampling import lagrange
 
+_NOISE_RATIOS: Final = np.array(
+    [0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56]
+)
+"""Noise before rounding, in steps, at which the likelihood is computed."""
+_DITHERED: Final = 0.6
+"""Rms of the errors in steps from which rounding is dithered."""
+_FIRST_CODES: Final = 256
+_FEWEST_CODES: Final = 16
+"""Number of different codes that lie on a coarser lattice by chance with 2^-16 at most."""
+_ROUNDS: Final = 4
+_TOLERANCE: Final = 0.05
+"""Tolerance of readings about their codes, in steps."""
+_LARGEST_ROUNDING: Final = 0.6
+"""Largest rounding of a coarser step's readings, in steps of the converter (half, and a margin)."""
 _MOST_READINGS: Final = 12000
 """Largest number of readings used: of more, every second, third, ..."""
 _GOOD_MODEL: Final = 0.15
 """Misfit of the model in steps from which the angles come from local fits."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Readings as integer multiples of a step.
+
+    Parameters
+    ----------
+    step
+        In the unit of the readings.
+    code
+        Of each reading: its value is ``step code + origin``; shape (n,).
+    origin
+        The value of code 0: within half a step of zero.
+    """
+
+    step: float
+    code: IntArray
+    origin: float
+
+    def position(self, value: FloatArray) -> FloatArray:
+        """Return values in steps from code 0."""
+        return np.asarray((value - self.origin) / self.step)
+
+
+def find_lattice(
+    values: FloatArray, step: float | None, slack: float = _TOLERANCE
+) -> Lattice | None:
+    """Number the codes of readings; None if they lie on no lattice within a tolerance `slack`.
+
+    The step is refined over the whole range, so that codes far from zero are numbered right.
+    """
+    if step is None or not step > 0.0:
+        return None
+    distinct, inverse = np.unique(values, return_inverse=True)
+    if len(distinct) < 3:
+        return None
+    gaps = np.round(np.diff(distinct) / step).astype(np.int64)
+    number = np.concatenate([[0], np.cumsum(gaps)])
+    if number[-1] < 2:
+        return None
+    refined, origin = np.polyfit(number, distinct, 1).tolist()
+    if np.max(np.abs(distinct - origin - refined * number)) > slack * refined:
+        return None
+    shift = round(origin / refined)
+    return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
+
+
+def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
+    """Number the codes of a recording's readings (or some of them), as `find_lattice`.
+
+    The coarser step of an earlier stage is rounded to the converter's own.
+    """
+    if samples.step is None or samples.promised_step is None:
+        return find_lattice(values, samples.step)
+    rounded = _LARGEST_ROUNDING * samples.promised_step / samples.step
+    return find_lattice(values, samples.step, max(rounded, _TOLERANCE))
+
+
+def with_true_step(samples: Samples) -> Samples:
+    """Use the step of the observed codes if it is larger than the converter's.
+
+    A converter with k dead bits gives every 2^k-th code: its step is 2^k times its nominal one.
+    If an earlier stage has a step of its own, of any size, the observed codes are multiples of
+    it, each rounded to the nearest code.
+    """
+    if samples.counts or samples.step is None:
+        return samples
+    codes = (samples.values - samples.values[0]) / samples.step
+    whole = np.rint(codes)
+    if np.max(np.abs(codes - whole)[:_FIRST_CODES]) > _TOLERANCE:
+        return samples
+    times = spacing_of(np.unique(whole))
+    if times is None:
+        return samples
+    step = times * samples.step
+    noise = max(samples.noise_rms, noise_rms(samples.values, step))
+    return replace(samples, step=step, noise_rms=noise, promised_step=samples.step)
+
+
+def spacing_of(distinct: FloatArray) -> float | None:
+    """Return the spacing of the observed codes in steps; None if they have none.
+
+    Parameters
+    ----------
+    distinct
+        Observed codes (whole numbers), rising.
+
+    Returns
+    -------
+    float or None
+        Whole if all codes are its multiples (from one of them on); else the spacing of a lattice
+        of which they are the roundings.
+    """
+    gaps = np.diff(distinct)
+    if len(distinct) < _FEWEST_CODES or gaps.min() < 2.0:
+        return None
+    common = int(np.gcd.reduce(gaps.astype(np.int64)))
+    if common > 1:
+        return float(common)
+    # Neighbours are one spacing apart, rounded down or up; others two, three, ...
+    spacing = float(np.mean(gaps[gaps <= 1.5 * gaps.min()]))
+    number = np.append(0.0, np.cumsum(np.round(gaps / spacing)))
+    for _ in range(_ROUNDS):
+        spacing, first = np.polyfit(number, distinct, 1).tolist()
+        if float(np.ptp(distinct - spacing * number)) < 2.0 * _LARGEST_ROUNDING:
+            return float(spacing)
+        # A gap may have been counted wrong: recount by the line through all of them.
+        number = np.round((distinct - first) / spacing)
+    return None
+
+
+def whole_readings(data: Data, samples: Samples) -> slice | None:
+    """Return the samples that the data are; None if the data are means of several.
+
+    They have the samples' times, or their values if the times have been corrected.
+    """
+    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
+    part = slice(first, first + len(data))
+    if part.stop > len(samples):
+        return None
+    if np.allclose(samples.time_s[part], data.time_s, rtol=0.0, atol=1e-9):
+        return part
+    same = samples.values[part] == data.values
+    return part if np.count_nonzero(same) > 0.5 * len(data) else None
+
+
+def noise_before_rounding(local: Local, step: float) -> float:
+    """Estimate the noise before rounding by maximum likelihood, from P(code).
+
+    The likelihood is that of `fit.by_waveform`, but the true angle comes from local fits and
+    has their noise. So each reading has its own standard deviation, and outliers (glitches) are
+    left out.
+
+    Parameters
+    ----------
+    local
+        Readings minus their smooth part, which is taken as the true angle.
+    step
+        Of the readings.
+    """
+    if local.rms > _DITHERED * step:
+        # Rounding is dithered: variances add.
+        return math.sqrt(local.rms**2 - step**2 / 12.0)
+    left = local.left[local.used] / step
+    near = np.abs(left) < 5.0 * local.rms / step + 1.0
+    left = left[near]
+    extra = np.maximum(local.leverage[local.used][near], -0.9)
+    spread = _NOISE_RATIOS[:, None] * np.sqrt(1.0 + extra)
+    chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
+    likelihood = np.sum(np.log(np.maximum(chance, 1e-12)), axis=1)
+    return float(_NOISE_RATIOS[np.argmax(likelihood)]) * step
+
+
+def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance of the squared error due to rounding and noise.
+
+    Parameters
+    ----------
+    fraction
+        Position of the value between codes, in steps: 0 at a code; shape (n,).
+    ratio
+        Noise before rounding, in steps.
+
+    Returns
+    -------
+    square, variance
+        E[e^2] in steps^2 and Var[e^2] in steps^4, e = code - value; shape (n,).
+    """
+    grid = np.linspace(-0.5, 0.5, 65)
+    reach = int(np.ceil(5.0 * ratio)) + 1
+    codes = np.arange(-reach, reach + 1)
+    chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(
+        (codes - 0.5 - grid[:, None]) / ratio
+    )
+    error = codes - grid[:, None]
+    square = np.sum(chance * error**2, axis=1)
+    fourth = np.sum(chance * error**4, axis=1)
+    position = fraction - np.round(fraction)
+    return (
+        np.interp(position, grid, square),
+        np.interp(position, grid, np.maximum(fourth - square**2, 0.0)),
+    )
 
 
 @dataclass(frozen=True)
@@ -84,16 +277,9 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     sampled, reading = fit.at.sampled, fit.at.reading
     part = whole_readings(data, samples)
     if part is not None:
-        index = np.arange(part.start, part.stop)
-        return Raw(
-            samples.values[part],
-            error_of(data, fit),
-            sampled.phase,
-            data.weight > 0.0,
-            index,
-        )
-    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    last = int(np.searchsorted(samples.time_s, data.time_s[-1] + 1e-9))
+        error, index = error_of(data, fit), np.arange(part.start, part.stop)
+        return Raw(samples.values[part], error, sampled.phase, data.weight > 0.0, index)
+    first, last = np.searchsorted(samples.time_s, data.time_s[[0, -1]] + [-1e-9, 1e-9]).tolist()
     index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
     when, values = samples.time_s[index], samples.values[index]
     return Raw(
@@ -114,23 +300,19 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     if samples.counts or samples.step is None:
         return None
     raw = raw_readings(data, fit, samples)
-    values, residual, used = raw.values, raw.residual, raw.used
-    lattice = lattice_of(values, samples)
+    lattice = lattice_of(raw.values, samples)
     if lattice is None:
         return None
-    local = local_residual(raw.phase, residual, used)
-    step = lattice.step
-    taken = float(np.mean((residual - local.left)[used] ** 2))
-    noise = local.rms**2 * float(np.mean(np.abs(local.leverage[used])))
+    local, step = local_residual(raw.phase, raw.residual, raw.used), lattice.step
+    taken = float(np.mean((raw.residual - local.left)[raw.used] ** 2))
+    noise = local.rms**2 * float(np.mean(np.abs(local.leverage[raw.used])))
     misfit = math.sqrt(max(taken - noise, 0.0)) / step
-    good = used & (np.abs(local.scaled) < 6.0)
+    good = raw.used & (np.abs(local.scaled) < 6.0)
     ratio = noise_before_rounding(local, step) / step
+    error, blur = local.left, math.sqrt(noise) / step
     if misfit < _GOOD_MODEL:
-        true, blur = values - residual, min(0.5 * misfit, 0.05)
-    else:
-        true = values - local.left
-        blur = math.sqrt(noise) / step
-    position = lattice.position(true[good])
+        error, blur = raw.residual, min(0.5 * misfit, 0.05)
+    position = lattice.position((raw.values - error)[good])
     return Coded(lattice, lattice.code[good], position, blur, ratio, raw.index[good])
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
+from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import COLOURED_NOISE, Location
+from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location, nothing
 from pendpipe.estimate import Estimate
 
 _HARMLESS_RATIO: Final = 1.5
@@ -68,7 +68,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     word = "stronger" if ratio > 1.0 else "weaker"
     return Finding(
         COLOURED_NOISE,
-        0.5 * math.erfc(score / math.sqrt(2.0)),
+        upper_tail(score),
         max(gain, 0.0),
         {
             "slope": Estimate(slope, math.sqrt(float(across @ noise.uncertainty @ across)), ""),

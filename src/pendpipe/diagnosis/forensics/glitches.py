@@ -12,7 +12,6 @@ from scipy.special import bdtrc
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.local import (
     Local,
     error_of,
@@ -22,7 +21,7 @@ from pendpipe.diagnosis.forensics.local import (
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.noise import TAPS, Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
 
 _GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
@@ -72,7 +71,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED_BY_CHANCE
         if smeared:
             # The filter spreads a wrong reading over its neighbours: take the largest first.
-            beyond &= error == _largest_about(error)
+            beyond &= error == _about(error, _NEIGHBOURS).max(axis=1)
         if not beyond.any():
             break
         size[beyond] = local.scaled[beyond]
@@ -107,11 +106,12 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
         # A wrong reading biases its window: take the largest first.
         local = local_residual(phase, values, used, leave_out=mask)
         error = np.where(mask | ~used, 0.0, np.abs(local.scaled))
-        beyond = (error > _FAR_SD) & (error == _largest_about(error))
+        beyond = (error > _FAR_SD) & (error == _about(error, _NEIGHBOURS).max(axis=1))
         if not beyond.any():
             break
         mask |= beyond
-    single = mask & (_largest_beside(np.abs(local.scaled)) < _LARGE_SD)
+    beside = np.delete(_about(np.abs(local.scaled), 2), 2, axis=1)
+    single = mask & (beside.max(axis=1) < _LARGE_SD)
     # Several displaced readings bias their window, so that others there seem wrong.
     bent = phase[mask & ~single]
     single[single] = [np.all(np.abs(bent - at) > _WINDOW_RAD) for at in phase[single]]
@@ -122,13 +122,6 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     step = _rounding_in(data, local.rms)
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
     return _described(data, fit, values, local.scaled, single, p_value, tail)
-
-
-def _largest_beside(error: FloatArray) -> FloatArray:
-    """Return the largest of each reading's neighbours, two on each side."""
-    left = np.pad(error, (2, 0))
-    right = np.pad(error, (0, 2))
-    return np.asarray(np.max([left[:-2], left[1:-1], right[1:-1], right[2:]], axis=0))
 
 
 def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolArray) -> BoolArray:
@@ -188,21 +181,18 @@ def _local_scale(error: FloatArray) -> FloatArray:
 def own_error(local: Local) -> FloatArray:
     """Return |error| in standard deviations, less the part that neighbours share."""
     scaled = local.scaled
-    around = np.zeros(len(scaled))
-    around[1:-1] = 0.5 * (scaled[:-2] + scaled[2:])
-    around[0], around[-1] = scaled[1], scaled[-2]
+    padded = np.pad(scaled, 1, mode="reflect")
+    around = 0.5 * (padded[:-2] + padded[2:])
     # Only for large errors: the distribution of the others must not change.
     shared = (np.abs(around) > _SHARED_ERROR * np.abs(scaled)) & (np.abs(scaled) > _LARGE_SD)
     alone = np.abs(scaled - around) * math.sqrt(2.0 / 3.0)
     return np.asarray(np.where(shared, np.minimum(np.abs(scaled), alone), np.abs(scaled)))
 
 
-def _largest_about(error: FloatArray) -> FloatArray:
-    """Return the largest of each reading and its neighbours."""
-    padded = np.pad(error, _NEIGHBOURS)
-    return np.asarray(
-        np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1).max(axis=1)
-    )
+def _about(error: FloatArray, neighbours: int) -> FloatArray:
+    """Return each reading with its neighbours on both sides, shape (n, 2 neighbours + 1)."""
+    padded = np.pad(error, neighbours)
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * neighbours + 1)
 
 
 def _rounding_in(data: Data, error_rms: float) -> float:
@@ -216,13 +206,12 @@ def _smallest_p_value(sorted_error: FloatArray, step: float) -> float:
     numbers = [k for k in _GLITCH_NUMBERS if k <= count // 30]
     best = 1.0
     for k in numbers:
-        if sorted_error[count - k] < _LARGE_SD:
+        largest = sorted_error[count - k]
+        if largest < _LARGE_SD:
             break  # not larger than noise
-        tail = fit_tail(sorted_error, k, step=step)
-        chance = float(tail.beyond(sorted_error[count - k]))
-        p_value = float(bdtrc(k - 1, count, min(chance, 1.0)))
+        chance = min(float(fit_tail(sorted_error, k, step=step).beyond(largest)), 1.0)
         share = 0.5 if k == 1 else 0.5 / (len(numbers) - 1)
-        best = min(p_value / share, best)
+        best = min(float(bdtrc(k - 1, count, chance)) / share, best)
     return best
 
 
@@ -243,16 +232,10 @@ def _described(
     tail: Tail,
 ) -> Finding:
     sampled = fit.at.sampled
-    size = sizes[mask]
-    used = data.weight > 0.0
-    local = local_residual(sampled.phase, residual, used, leave_out=mask)
-    reading = local.left[mask]
-    when = data.time_s[mask]
-    amplitude = sampled.amplitude[mask]
-    largest = int(np.argmax(np.abs(size)))
-    number = int(np.count_nonzero(mask))
+    local = local_residual(sampled.phase, residual, data.weight > 0.0, leave_out=mask)
+    reading, when, rms = local.left[mask], data.time_s[mask], local.rms
+    largest, number = int(np.argmax(np.abs(sizes[mask]))), int(np.count_nonzero(mask))
     own = math.sqrt(float(np.mean(reading**2)))
-    rms = local.rms
     parameters = {
         "number": Estimate(float(number), 0.0, ""),
         "share": Estimate(number / data.used, math.sqrt(number) / data.used, ""),
@@ -276,11 +259,9 @@ def _described(
     return Finding(
         "glitches",
         p_value,
-        float(np.sum(size**2)),
+        float(np.sum(sizes[mask] ** 2)),
         parameters,
-        Location(
-            (float(when[0]), float(when[-1])), (float(amplitude.min()), float(amplitude.max()))
-        ),
+        Location.over(when, sampled.amplitude[mask]),
         mask=mask,
         summary=summary,
     )

@@ -10,14 +10,12 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.codes import Coded, read_codes
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
-from pendpipe.diagnosis.forensics.lattice import rounding_moments, whole_readings
+from pendpipe.diagnosis.forensics.codes import Coded, read_codes, rounding_moments, whole_readings
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
-from pendpipe.diagnosis.forensics.weighted_squares import tail_of_squares
+from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 
@@ -41,18 +39,16 @@ class Squares(NamedTuple):
     Parameters
     ----------
     square
-        In units of the variance `unit`.
+        In units of the variance of one reading.
     expected, variance
         Their mean and variance without jitter.
     gain
         Derivative of `expected` by the variance before rounding (1 where dithered).
     mean, double
         The parts of v^2 that vary with the amplitude, (omega A)^2/2, and at twice the
-        frequency, -(omega A)^2 cos(2 psi)/2; in units of `speed`.
-    unit
-        Variance of one reading, rad^2.
-    speed
-        Mean of v^2, (rad/s)^2.
+        frequency, -(omega A)^2 cos(2 psi)/2; over the mean of v^2.
+    seconds_squared
+        The variance of one reading over the mean of v^2, s^2.
     shared
         Part of the degrees of freedom used by the local fits.
     """
@@ -63,8 +59,7 @@ class Squares(NamedTuple):
     gain: FloatArray
     mean: FloatArray
     double: FloatArray
-    unit: float
-    speed: float
+    seconds_squared: float
     shared: float = 0.0
 
     @property
@@ -114,7 +109,7 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     mean, double, speed = _speeds(fit, np.flatnonzero(used))
     ones = np.ones(len(scaled))
     shared = float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5))
-    return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit, speed, shared)
+    return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit / speed, shared)
 
 
 def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
@@ -136,7 +131,6 @@ def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | 
     square = coded.error[moving] ** 2
     unit = float(np.mean(square))
     mean, double, speed = _speeds(fit, index[moving])
-    step = coded.lattice.step
     return Squares(
         square / unit,
         expected / unit,
@@ -144,8 +138,7 @@ def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | 
         np.maximum(gain, 0.0),
         mean,
         double,
-        unit * step**2,
-        speed,
+        unit * coded.lattice.step**2 / speed,
     )
 
 
@@ -200,17 +193,15 @@ def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, Floa
 def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
     speed = squares.mean + squares.double
     size, covariance = _fitted(squares, [speed])
-    lowest = 0.1 * squares.expected
-    model = squares.expected + squares.gain * (size[0] + size[1] * speed)
-    null = squares.expected + squares.gain * _fitted(squares, [])[0][0]
-    model, null = np.maximum(model, lowest), np.maximum(null, lowest)
+    model, null = (
+        np.maximum(squares.expected + squares.gain * more, 0.1 * squares.expected)
+        for more in (size[0] + size[1] * speed, _fitted(squares, [])[0][0])
+    )
     gain = np.log(null / model) + squares.square * (1.0 / null - 1.0 / model)
-    to_seconds = squares.unit / squares.speed
-    share = max(float(size[1]), 0.0)
-    seconds = math.sqrt(share * to_seconds)
-    sd = math.sqrt(covariance[1, 1])
+    share, sd = max(float(size[1]), 0.0), math.sqrt(covariance[1, 1])
+    seconds = math.sqrt(share * squares.seconds_squared)
     # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the size of the square root itself.
-    error = 0.5 * sd * to_seconds / math.sqrt(max(share, 0.25 * sd) * to_seconds)
+    error = 0.5 * sd * math.sqrt(squares.seconds_squared / max(share, 0.25 * sd))
     sampled = fit.at.sampled
     omega = sampled.motion.angular_frequency
     return Finding(
@@ -218,11 +209,8 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
         p_value,
         max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
         {"sigma_t": Estimate(seconds, error, "s")},
-        Location(
-            (float(data.time_s[0]), float(data.time_s[-1])),
-            (float(sampled.amplitude.min()), float(sampled.amplitude.max())),
-            (0.25 * math.pi, 0.75 * math.pi),
-            (omega / math.pi,),
+        Location.over(
+            data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi), (omega / math.pi,)
         ),
         summary="the noise is largest where the motion is fastest, as if the sampling times"
         f" were uncertain by {with_error(seconds, error, 's')}",

@@ -1,6 +1,7 @@
 """Samples that were lost, or doubled, without a trace in the time stamps.
 
-This is tested before any fit: one lost sample changes chi^2 more than most physics.
+This is tested before any fit: one lost sample changes chi^2 more than most physics. A second test
+looks at the readings as they are: the clock jumped, the motion did not.
 """
 
 from __future__ import annotations
@@ -9,10 +10,13 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.special import stdtr
 
+from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Confirmation
 from pendpipe.diagnosis.unwrapped import alignment
 
 _SIGNIFICANT_SD: Final = 7.0
@@ -24,6 +28,16 @@ _LARGEST_ERROR: Final = 0.12
 _MOST_STEPS: Final = 40
 _TREND_STEPS: Final = 6
 """Neighbouring steps on each side whose median is the misfit of the model."""
+_DEGREE: Final = 5
+"""Of the polynomial in time on each side."""
+_WITHIN: Final = 0.4
+"""Length of a side, in periods: what a polynomial leaves of a swing it leaves elsewhere, too. Of
+simulated losses of 10 to 110 ms nine tenths are confirmed, with 0.3 periods eight tenths."""
+_INSTANTS: Final = 0.1
+"""Within this part of a period the instant is sought."""
+_ELSEWHERE: Final = 20
+"""Places of the same phase on each side, which tell how far such steps scatter."""
+_AGREE_SD: Final = 3.0
 
 
 class LostSamples(NamedTuple):
@@ -45,7 +59,7 @@ class LostSamples(NamedTuple):
     sd: float
 
 
-def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> list[LostSamples]:
+def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
     """Find sudden steps of the phase that are whole numbers of sampling intervals.
 
     After n lost samples the readings are n intervals ahead of their time stamps, so that the
@@ -56,8 +70,6 @@ def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> 
     ----------
     data, fit
         The readings, and a model good enough to number their cycles.
-    interval_s
-        Between samples, where `data` are means of several.
 
     Returns
     -------
@@ -70,15 +82,16 @@ def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> 
     _, phase, centre = alignment(data, fit.at, data.residual(fit.at.reading))
     if len(phase) < 8:
         return []
-    sampled = fit.at.sampled
-    interval = sampled.motion.angular_frequency * (interval_s or data.interval_s)
+    interval = fit.at.sampled.motion.angular_frequency * data.interval_s / data.fold
     spread = _spread(data, fit, phase, centre)
     rest = phase.copy()
-    found: list[tuple[int, int, float, float]] = []
+    found: list[LostSamples] = []
     for _ in range(_MOST_STEPS):
         step = rest[2:] - rest[:-2]
         step = step - _trend(step)
-        error = np.maximum(np.hypot(spread[2:], spread[:-2]), _scatter(step))
+        # The local scatter of the steps has a misfit in it.
+        scatter = 1.4826 * _trend(np.abs(step))
+        error = np.maximum(np.hypot(spread[2:], spread[:-2]), scatter)
         number = np.round(step / interval)
         significant = (number != 0.0) & (np.abs(step) > _SIGNIFICANT_SD * error)
         significant &= np.abs(step - number * interval) < _WHOLE_WITHIN * interval + 2.5 * error
@@ -86,18 +99,14 @@ def find_lost_samples(data: Data, fit: Fit, interval_s: float | None = None) -> 
         if not significant.any():
             break
         at = int(np.argmax(np.where(significant, np.abs(step) / error, 0.0)))
-        found.append((at + 1, int(number[at]), float(step[at]), float(error[at])))
+        when = _instant(data, fit, phase, centre, at + 1)
+        measured, sd = float(step[at] / interval), float(error[at] / interval)
+        found.append(LostSamples(when, int(number[at]), measured, sd))
         rest[at + 2 :] -= number[at] * interval
         # The cycle in which it happened has an intermediate phase.
         rest[at + 1] = 0.5 * (rest[at] + rest[at + 2])
-    signs = sum(number for _, number, _, _ in found)
-    return sorted(
-        LostSamples(
-            _instant(data, fit, phase, centre, cycle), number, step / interval, error / interval
-        )
-        for cycle, number, step, error in found
-        if number * signs > 0
-    )
+    signs = sum(each.number for each in found)
+    return sorted(each for each in found if each.number * signs > 0)
 
 
 def _spread(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray) -> FloatArray:
@@ -111,17 +120,9 @@ def _spread(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray) -> Floa
     return np.asarray(max(usual, floor, 1e-9) / amplitude)
 
 
-def _scatter(step: FloatArray) -> FloatArray:
-    """Return the local scatter of the steps, a misfit included."""
-    return np.asarray(1.4826 * _trend(np.abs(step)))
-
-
 def _trend(step: FloatArray) -> FloatArray:
     """Return the running median of the steps, which go on at the ends as they are there."""
-    if len(step) > _TREND_STEPS:
-        padded = np.pad(step, _TREND_STEPS, mode="reflect", reflect_type="odd")
-    else:
-        padded = np.pad(step, _TREND_STEPS, mode="edge")
+    padded = np.pad(step, _TREND_STEPS, mode="reflect", reflect_type="odd")
     return np.asarray(
         np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _TREND_STEPS + 1), axis=1)
     )
@@ -142,3 +143,67 @@ def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle:
     best = int(np.argmin(total))
     rows = np.flatnonzero(inside)
     return float(data.time_s[rows[min(best, len(rows) - 1)]])
+
+
+def confirmed(samples: Samples, about_s: float, period_s: float) -> Confirmation:
+    """Test without the model whether angle and velocity step by one and the same time.
+
+    What follows a loss of time lies on the same path, farther along. A knock changes the velocity
+    and no angle, an offset the angle and no velocity.
+
+    A polynomial in time is fitted to each side of the instant that leaves least. The steps of angle
+    and velocity, over their slopes, are two estimates of the lost time. What they are half periods
+    before and after tells their errors; the p-value is that of one of them being none, and 1 where
+    they disagree.
+    """
+    here = None if samples.counts else _lost_time(samples, about_s, period_s)
+    places = [
+        about_s + 0.5 * k * period_s for k in range(-_ELSEWHERE, _ELSEWHERE + 1) if abs(k) > 1
+    ]
+    others = [lost for at in places if (lost := _lost_time(samples, at, period_s)) is not None]
+    if here is None or len(others) < _ELSEWHERE:
+        return Confirmation("too few readings about the instant tell", 1.0)
+    usual = np.median(others, axis=0)
+    sd = 1.4826 * np.median(np.abs(others - usual), axis=0)
+    lost = here - usual
+    least = float(np.min(np.abs(lost) / sd))
+    agree = abs(lost[0] - lost[1]) < _AGREE_SD * math.hypot(*sd)
+    said = [
+        f"{1e3 * value:.1f} ± {1e3 * error:.1f} ms" for value, error in zip(lost, sd, strict=True)
+    ]
+    return Confirmation(
+        f"polynomials in time on both sides of it step by {said[0]} in the angle and by"
+        f" {said[1]} in the velocity",
+        float(2.0 * stdtr(len(others) - 1, -least)) if agree else 1.0,
+    )
+
+
+def _lost_time(samples: Samples, about_s: float, period_s: float) -> FloatArray | None:
+    """Return the lost time by the angle, and by the velocity; None where they can't be had."""
+    first, last = np.searchsorted(
+        samples.time_s, [about_s - _WITHIN * period_s, about_s + _WITHIN * period_s]
+    )
+    time, values = samples.time_s[first:last], samples.values[first:last]
+    fewest = 2 * (_DEGREE + 1)
+    sides = [
+        (_side(time[:row] - time[row], values[:row]), _side(time[row:] - time[row], values[row:]))
+        for row in range(fewest, len(time) - fewest + 1)
+        if abs(time[row] - about_s) <= _INSTANTS * period_s
+    ]
+    if not sides:
+        return None
+    (before, _), (after, _) = min(sides, key=lambda pair: pair[0][1] + pair[1][1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = 2.0 * (after - before)[:2] / (after + before)[1:]
+    # Of a swing they are (2/omega) tan(omega tau/2).
+    lost = period_s / math.pi * np.arctan(math.pi / period_s * steps)
+    return np.asarray(lost) if np.all(np.isfinite(lost)) else None
+
+
+def _side(time: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    """Angle, velocity and acceleration at the instant, and the squares left."""
+    scale = float(np.abs(time).max())
+    columns = np.vander(time / scale, _DEGREE + 1, increasing=True)
+    found = np.linalg.lstsq(columns, values, rcond=None)[0]
+    left = values - columns @ found
+    return found[:3] * np.array([1.0, 1.0 / scale, 2.0 / scale**2]), float(left @ left)

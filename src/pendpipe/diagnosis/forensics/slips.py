@@ -18,9 +18,9 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
+from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Confirmation, Location
+from pendpipe.diagnosis.result import Confirmation, Finding, Location, nothing
 from pendpipe.effects.derivatives import jacobian
 from pendpipe.estimate import Estimate
 
@@ -44,18 +44,26 @@ class Slips(NamedTuple):
         The first reading after each, shape (k,).
     sizes
         As they were fitted, in units.
-    p_value
-        Probability that steps of any sizes are so near whole numbers.
     """
 
     rows: IntArray
     sizes: FloatArray
-    p_value: float
 
     @property
     def whole(self) -> FloatArray:
         """The sizes as whole numbers."""
         return np.round(self.sizes)
+
+    @property
+    def scatter(self) -> float:
+        """Of the sizes about whole numbers."""
+        return float(np.sqrt(np.mean((self.sizes - self.whole) ** 2)))
+
+    @property
+    def p_value(self) -> float:
+        """Probability that steps of any sizes are so near whole numbers."""
+        near = float(np.sum(np.cos(2.0 * math.pi * self.sizes)))
+        return upper_tail(near / math.sqrt(0.5 * len(self.sizes)))
 
     def staircase(self, count: int) -> FloatArray:
         """Return the sum of the whole steps at each of `count` readings."""
@@ -89,7 +97,7 @@ def find_slips(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False) 
         if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
         rows.append(row)
-        for column in _columns([row], unit, data, within=within):
+        for column in _columns(row, unit, data, within=within):
             known = basis.shape[1]
             left, basis = _without(left, basis, column)
             alone -= np.sum(_later(unit[:, None] * basis[:, known:]) ** 2, axis=1, keepdims=True)
@@ -123,14 +131,11 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
     return np.asarray(basis[:, lengths > 1e-6 * lengths[0]])
 
 
-def _columns(rows: list[int], unit: FloatArray, data: Data, *, within: bool) -> list[FloatArray]:
-    """Return a step's change of the readings, and the reading within which it may lie."""
-    found = []
-    for row in rows:
-        found.append(np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight)
-        for at in (row - 1, row) if within else ():
-            found += [np.eye(1, len(unit), max(at, 0))[0]]
-    return found
+def _columns(row: int, unit: FloatArray, data: Data, *, within: bool) -> list[FloatArray]:
+    """Return a step's change of the readings, and the readings within which it may lie."""
+    step = np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
+    about = [np.eye(1, len(unit), at)[0] for at in (max(row - 1, 0), row)]
+    return [step, *about] if within else [step]
 
 
 def _without(
@@ -150,25 +155,25 @@ def _without(
 def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray, *, within: bool) -> Slips | None:
     """Fit all sizes together, and test whether they are whole."""
     left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
-    if within:
-        for at in {max(at, 0) for row in rows.tolist() for at in (row - 1, row)}:
-            left, basis = _without(left, basis, np.eye(1, len(unit), at)[0])
+    for row in rows.tolist():
+        for about in _columns(row, unit, data, within=within)[1:]:
+            left, basis = _without(left, basis, about)
     while len(rows) >= _FEWEST:
-        columns = np.column_stack(_columns(rows.tolist(), unit, data, within=False))
+        steps = [_columns(row, unit, data, within=False)[0] for row in rows.tolist()]
+        columns = np.column_stack(steps)
         columns -= basis @ (basis.T @ columns)
         sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
-        steps = np.abs(sizes) > 0.5
-        if steps.all() and within:
+        kept = np.abs(sizes) > 0.5
+        if kept.all() and within:
             # The readings about a step are left out, so two that undo each other there are hardly
             # determined: each must be worth its choice.
             noise = spread(left - columns @ sizes)
             worth = (sizes / noise) ** 2 / np.diag(np.linalg.pinv(columns.T @ columns))
             least = int(np.argmin(worth))
-            steps[least] = worth[least] > 2.0 * math.log(len(left)) + _CHOICE
-        if steps.all():
-            near = float(np.sum(np.cos(2.0 * math.pi * sizes))) / math.sqrt(0.5 * len(rows))
-            return Slips(rows, sizes, 0.5 * math.erfc(near / math.sqrt(2.0)))
-        rows = rows[steps]
+            kept[least] = worth[least] > 2.0 * math.log(len(left)) + _CHOICE
+        if kept.all():
+            return Slips(rows, sizes)
+        rows = rows[kept]
     return None
 
 
@@ -195,8 +200,6 @@ def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Findi
         corrected = replace(data, time_s=data.time_s + stairs, uniform=False)
     else:
         corrected = replace(data, values=data.values - stairs)
-    off = slips.sizes - slips.whole
-    scatter = float(np.sqrt(np.mean(off**2)))
     squares = float(np.sum(slips.whole**2))
     size = float(slips.sizes @ slips.whole) / squares
     words = "the clock slips by whole samples" if clock else "whole counts are lost, or gained,"
@@ -206,13 +209,13 @@ def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Findi
         slips.p_value,
         parameters={
             "dt" if clock else "step": Estimate(
-                unit * size, unit * scatter / math.sqrt(squares), "s" if clock else data.unit
+                unit * size, unit * slips.scatter / math.sqrt(squares), "s" if clock else data.unit
             ),
             "number": Estimate(float(len(when)), 0.0, ""),
         },
         location=Location((float(when[0]), float(when[-1]))),
         summary=f"{words} {len(when)} times between {when[0]:.5g} and {when[-1]:.5g} s: fitted"
-        f" freely, the steps are whole within {scatter:.2f} (by chance 0.29)",
+        f" freely, the steps are whole within {slips.scatter:.2f} (by chance 0.29)",
         confirmed=steps_of_the_level(samples, unit) if not clock else None,
     )
     return corrected, finding
@@ -242,16 +245,15 @@ def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
     # An edge of the scale has a width, which is a step of either sign at each reversal.
     for way in (slice(0, None, 2), slice(1, None, 2)):
         steps[way] -= median_filter(steps[way], _NEIGHBOURS, mode="nearest")
-    large = steps[np.abs(steps) > 0.5]
-    if len(large) < _FEWEST:
+    rows = np.flatnonzero(np.abs(steps) > 0.5)
+    large = Slips(rows, steps[rows])
+    if len(rows) < _FEWEST:
         return None
-    near = float(np.sum(np.cos(2.0 * math.pi * large))) / math.sqrt(0.5 * len(large))
-    off = float(np.sqrt(np.mean((large - np.round(large)) ** 2)))
     return Confirmation(
         f"of {len(steps)} steps of the level between half swings, from four half swings each,"
-        f" {len(large)} are above half a count, and these whole within {off:.2f}"
+        f" {len(rows)} are above half a count, and these whole within {large.scatter:.2f}"
         " (by chance 0.29)",
-        0.5 * math.erfc(near / math.sqrt(2.0)),
+        large.p_value,
     )
 
 

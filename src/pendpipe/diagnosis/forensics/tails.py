@@ -1,30 +1,18 @@
-"""Tails of the noise: Student's distribution, fitted to all but the largest errors."""
+"""Tails: of the noise (Student's distribution), and of weighted sums of squares."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.special import gammaln, stdtr
+from scipy.special import gammaln, ndtr, stdtr
 
 from pendpipe.arrays import FloatArray
 
-_INVERSE_NU: Final = (
-    1e-4,
-    0.01,
-    0.02,
-    0.035,
-    0.055,
-    0.08,
-    0.11,
-    0.15,
-    0.2,
-    0.26,
-    0.33,
-    0.42,
-    0.55,
+_INVERSE_NU: Final = np.array(
+    [1e-4, 0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.42, 0.55]
 )
 """1/nu: from a normal distribution (to 1 % at 5 sigma) to very heavy tails."""
 _BINS: Final = 200
@@ -38,6 +26,12 @@ _NODES: Final = 9
 """Gauss-Legendre nodes for the rounding error."""
 _LEAST_NOISE: Final = 0.05
 """Least part of the variance that the noise before rounding has at the start."""
+_NEWTON_ROUNDS: Final = 60
+
+
+def upper_tail(sd: float) -> float:
+    """Return P(z > sd), z normal."""
+    return 0.5 * math.erfc(sd / math.sqrt(2.0))
 
 
 @dataclass(frozen=True)
@@ -92,7 +86,7 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False, step: flo
     bins = _BINS if len(share) == 1 else _COARSE_BINS
     counts, edges = np.histogram(bulk, bins=bins, range=(0.0, edge))
     middle = 0.5 * (edges[1:] + edges[:-1])
-    freedom = 1.0 / np.array(_INVERSE_NU)[:, None]
+    freedom = 1.0 / _INVERSE_NU[:, None]
     # A reading beyond the edge counts as one at the edge.
     number = np.append(counts, 0 if foreign else largest)[None, :]
     squares = (np.append(middle, edge)[:, None] - rounding) ** 2
@@ -103,12 +97,13 @@ def fit_tail(size: FloatArray, largest: int, *, foreign: bool = False, step: flo
     likelihood = np.sum(counts * density, axis=1)
     tail = Tail(freedom[:, 0], scale[:, 0], np.eye(len(freedom)), step)
     beyond = np.minimum(tail.beyond(np.array(edge)), 1.0 - 1e-12)
-    if foreign:
-        likelihood -= len(bulk) * np.log1p(-beyond)
-    else:
-        likelihood += largest * np.log(beyond)
-    weight = np.exp(likelihood - likelihood.max()) * _prior()
-    return Tail(freedom[:, 0], scale[:, 0], weight / weight.sum(), step)
+    likelihood += -len(bulk) * np.log1p(-beyond) if foreign else largest * np.log(beyond)
+    # Beforehand nine tenths for normal noise, the rest uniform in 1/nu.
+    prior = np.gradient(_INVERSE_NU)
+    prior[1:] *= 0.1 / prior[1:].sum()
+    prior[0] = 0.9
+    weight = np.exp(likelihood - likelihood.max()) * prior
+    return replace(tail, weight=weight / weight.sum())
 
 
 def _scale(
@@ -133,7 +128,9 @@ def _density(freedom: FloatArray, scale: FloatArray, squares: FloatArray) -> Flo
     """Student's density where its argument has these squares, shape (k, bins, nodes)."""
     ratio = squares / (scale**2 * freedom)[..., None]
     exponent = -0.5 * (freedom[..., None] + 1.0) * np.log1p(ratio)
-    return np.asarray(np.exp(_log_density(freedom, scale)[..., None] + exponent))
+    at_zero = gammaln(0.5 * (freedom + 1.0)) - gammaln(0.5 * freedom)
+    at_zero = at_zero - 0.5 * np.log(math.pi * freedom) - np.log(scale)
+    return np.asarray(np.exp(at_zero[..., None] + exponent))
 
 
 def _rounding(step: float) -> tuple[FloatArray, FloatArray]:
@@ -144,19 +141,65 @@ def _rounding(step: float) -> tuple[FloatArray, FloatArray]:
     return 0.5 * step * node, 0.5 * share
 
 
-def _log_density(freedom: FloatArray, scale: FloatArray) -> FloatArray:
-    """Logarithm of Student's density at zero."""
-    return np.asarray(
-        gammaln(0.5 * (freedom + 1.0))
-        - gammaln(0.5 * freedom)
-        - 0.5 * np.log(math.pi * freedom)
-        - np.log(scale)
-    )
+def tail_of_squares(total: float, weight: FloatArray) -> float:
+    """Return P(sum of w_i z_i^2 > total), z_i independent and normal; scipy has no function.
+
+    The saddlepoint approximation of Lugannani and Rice (Kuonen, Biometrika 86 (1999) 929),
+    accurate to a few per cent of the probability, however small.
+
+    Parameters
+    ----------
+    total
+        The observed sum.
+    weight
+        w_i, of either sign, shape (n,).
+    """
+    weight = weight[weight != 0.0]
+    if len(weight) == 0:
+        return 1.0
+    mean = float(weight.sum())
+    spread = math.sqrt(2.0 * float(np.sum(weight**2)))
+    if abs(total - mean) < 1e-3 * spread:
+        # At the mean itself the formula is 0/0; its limit contains the skewness.
+        skew = 8.0 * float(np.sum(weight**3)) / spread**3
+        return 0.5 - skew / (6.0 * math.sqrt(2.0 * math.pi))
+    if float(weight.min()) > 0.0 and total <= 0.0:
+        return 1.0
+    if float(weight.max()) < 0.0 and total >= 0.0:
+        return 0.0
+    tilt = _saddlepoint(total, weight)
+    left = 1.0 - 2.0 * tilt * weight
+    cumulant = -0.5 * float(np.sum(np.log(left)))
+    curvature = 2.0 * float(np.sum((weight / left) ** 2))
+    w = math.copysign(math.sqrt(max(2.0 * (tilt * total - cumulant), 0.0)), tilt)
+    v = tilt * math.sqrt(curvature)
+    if abs(w) < 1e-6 or v / w <= 0.0:
+        return 0.5
+    return float(ndtr(-w - math.log(v / w) / w))
 
 
-def _prior() -> FloatArray:
-    """Return the prior: nine tenths for normal noise, the rest uniform in 1/nu."""
-    inverse = np.array(_INVERSE_NU)
-    width = np.gradient(inverse)
-    width[0] = 0.0
-    return np.asarray(np.append(0.9, 0.1 * width[1:] / width[1:].sum()))
+def _saddlepoint(total: float, weight: FloatArray) -> float:
+    """Find the saddlepoint: there the cumulant generating function has the derivative `total`."""
+    high_weight, low_weight = float(weight.max()), float(weight.min())
+    high = 0.5 / high_weight if high_weight > 0.0 else math.inf
+    low = 0.5 / low_weight if low_weight < 0.0 else -math.inf
+    tilt = 0.0
+    for _ in range(_NEWTON_ROUNDS):
+        left = 1.0 - 2.0 * tilt * weight
+        excess = float(np.sum(weight / left)) - total
+        if excess > 0.0:
+            high = tilt
+        else:
+            low = tilt
+        step = excess / (2.0 * float(np.sum((weight / left) ** 2)))
+        trial = tilt - step
+        if not low < trial < high:
+            # Newton's step leaves the possible range: bisect it.
+            if math.isinf(low) or math.isinf(high):
+                trial = 2.0 * tilt - math.copysign(1.0 / (abs(weight).max()), excess)
+            else:
+                trial = 0.5 * (low + high)
+        if abs(trial - tilt) < 1e-12 * max(abs(trial), 1e-3 / abs(weight).max()):
+            return trial
+        tilt = trial
+    return tilt

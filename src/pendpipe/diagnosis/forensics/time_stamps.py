@@ -8,13 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of
+from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
 
 _LARGEST_DEVIATION: Final = 0.25
@@ -45,26 +45,21 @@ def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | No
     counts
         Whether each row marks a count of an encoder, which is silent at rest.
     """
-    found = np.flatnonzero(_gaps(time_s, half_period_s, counts))
+    intervals = np.diff(time_s)
+    few, usual = np.percentile(intervals, [10, 90]).tolist()
+    least = _GAP_LENGTH * (half_period_s if counts else usual)
+    if usual > 1.2 * few and not counts:
+        # An irregular clock.
+        least = max(4.0 * usual, 0.5 * half_period_s)
+    found = np.flatnonzero(intervals > least)
     if not len(found):
         return None
-    lasts = np.diff(time_s)[found]
+    lasts = intervals[found]
     longest = int(np.argmax(lasts))
     first = float(time_s[found[longest]])
     many = "a gap" if len(found) == 1 else f"{len(found)} gaps, the longest"
     note = f"the time stamps have {many} of {lasts[longest]:.4g} s after {first:.5g} s"
     return f"{note} (an encoder that writes its counts is silent at rest)" if counts else note
-
-
-def _gaps(time: FloatArray, half_period_s: float, counts: bool) -> BoolArray:
-    intervals = np.diff(time)
-    if counts:
-        return np.asarray(intervals > _GAP_LENGTH * half_period_s)
-    usual = float(np.percentile(intervals, 90))
-    if usual > 1.2 * float(np.percentile(intervals, 10)):
-        # An irregular clock.
-        return np.asarray(intervals > max(4.0 * usual, 0.5 * half_period_s))
-    return np.asarray(intervals > _GAP_LENGTH * usual)
 
 
 def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
@@ -89,23 +84,17 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     if size <= 1e-6 * local.rms**2:
         return nothing(identifier)
     share, sd = float(wave @ local.left) / size, local.rms / math.sqrt(size)
-    p_value = 0.5 * math.erfc(share / sd / math.sqrt(2.0))
     rms = float(np.std(stamps.off_s))
-    amplitude = sampled.amplitude
     return Finding(
         identifier,
-        p_value,
+        upper_tail(share / sd),
         max(share / sd, 0.0) ** 2,
         {
             "share": Estimate(share, sd, ""),
             "unevenness": Estimate(rms, rms / math.sqrt(2.0 * len(data)), "s"),
             "interval": Estimate(stamps.interval_s, rms / len(data), "s"),
         },
-        Location(
-            (float(data.time_s[0]), float(data.time_s[-1])),
-            (float(amplitude.min()), float(amplitude.max())),
-            (0.25 * math.pi, 0.75 * math.pi),
-        ),
+        Location.over(data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi)),
         time_s=stamps.even_s if share > 3.0 * sd and share > 0.5 else None,
         summary=f"the time stamps are irregular by {rms:.2g} s and the readings are not: they were"
         f" taken every {stamps.interval_s:.6g} s",

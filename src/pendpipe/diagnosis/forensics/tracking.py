@@ -11,9 +11,8 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.finding import Finding, nothing
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Confirmation, Location
+from pendpipe.diagnosis.result import Confirmation, Finding, Location, nothing
 from pendpipe.estimate import Estimate
 
 TRACKING_NOISE: Final = "tracking-noise"

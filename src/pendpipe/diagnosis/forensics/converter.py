@@ -1,0 +1,335 @@
+"""Faults of the converter's steps: missing codes, stuck bits, and steps coarser than the noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.special import gammainc, gammaincc, ndtr, xlogy
+
+from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.codes import Coded, read_codes
+from pendpipe.diagnosis.forensics.tails import upper_tail
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Finding, Location, nothing
+from pendpipe.estimate import Estimate
+
+_FEWEST_EXPECTED: Final = 6.0
+"""Expected readings of a code (or a residue) from which it is tested."""
+_MOST_BITS: Final = 7
+_COMMON_ERROR: Final = 0.05
+"""Common error of the angles in steps, beside their individual error."""
+_SIGNIFICANT: Final = 1e-3
+_MOST_LISTED: Final = 32
+_HARMLESS_NOISE: Final = 0.25
+"""Noise before rounding, in steps, above which rounding is harmless."""
+_WHOLE_WITHIN: Final = 1e-9
+"""Tolerance of a spacing of whole bits, over the converter's step."""
+_RANDOM_AMPLITUDE: Final = 20.0
+"""Amplitude in steps above which rounding errors are effectively random."""
+
+
+class Counts(NamedTuple):
+    """Numbers of readings of some codes, or of codes that are equal modulo a number; shape (k,).
+
+    Parameters
+    ----------
+    code
+        Each code, or residue.
+    found, expected
+        Observed and expected numbers.
+    chance
+        Two-sided p-value of each number; 1 where too few are expected to tell.
+    """
+
+    code: IntArray
+    found: FloatArray
+    expected: FloatArray
+    chance: FloatArray
+
+    @classmethod
+    def of(cls, code: IntArray, readings: IntArray, expected: FloatArray) -> Counts:
+        """Count the readings of each code, and compare with the expectations.
+
+        `readings` are places in `code`; `expected` has the shape (errors, k), its middle row
+        without error. The p-values are those of Poisson distributions: P(N <= found) at the
+        smallest expectation, P(N >= found) at the largest.
+        """
+        found = np.bincount(readings, minlength=len(code)).astype(np.float64)
+        low, high = expected.min(axis=0), expected.max(axis=0)
+        fewer, more = gammaincc(found + 1.0, low), gammainc(found, high)
+        told = np.minimum(2.0 * np.minimum(fewer, more), 1.0)
+        chance = np.where(low > _FEWEST_EXPECTED, told, 1.0)
+        return cls(code, found, expected[len(expected) // 2], chance)
+
+    def chosen(self, which: BoolArray | slice) -> Counts:
+        """Return some of them."""
+        chosen = self.found[which], self.expected[which], self.chance[which]
+        return Counts(self.code[which], *chosen)
+
+    @property
+    def gain(self) -> float:
+        """Twice the gain in log-likelihood (Poisson)."""
+        likely = xlogy(self.found, self.found / self.expected)
+        return 2.0 * float(np.sum(likely - self.found + self.expected))
+
+
+def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Compare how often each code occurs with what motion and noise predict.
+
+    Each number is tested against a Poisson distribution (readings scatter less, so the p-value is
+    never underestimated) whose mean may lie anywhere within a small common error of the angles.
+    Single codes, whole bits, and codes that are equal modulo a power of two are tested; the
+    p-value counts all of them.
+    """
+    coded = None if data.time_noise else read_codes(data, fit, samples)
+    if coded is None or len(coded.code) < 100:
+        return nothing("missing-codes")
+    expected = _expectations(coded)
+    comb, (bit, part, by_bit) = worst_comb(coded.code, expected), _stuck_bits(coded, expected)
+    counts = _single_codes(coded.code, expected)
+    chance = np.minimum(counts.chance * len(counts.code), 1.0)
+    by_code = float(chance.min(initial=1.0))
+    p_value = min(1.0, 3.0 * min(by_code, by_bit, comb.p_value))
+    if p_value > 0.01:
+        return Finding("missing-codes", p_value, summary="codes occur as often as expected")
+    if comb.p_value < min(by_code, by_bit):
+        codes = np.arange(int(coded.code.min()), int(coded.code.max()) + 1)
+        codes = codes[codes % comb.period == comb.residue.code]
+        lead = f"every {comb.period}th code (from {codes[0]}"
+        found = _rare(data, coded, codes, comb.residue, lead)
+        more = {"period": Estimate(float(comb.period), 0.0, "")}
+        gain, summary = comb.residue.gain, found.summary
+    else:
+        bad = counts.chosen(chance < _SIGNIFICANT)
+        seldom = bad.chosen(bad.found < bad.expected)
+        named = ", ".join(map(str, seldom.code[:5])) + (", ..." if len(seldom.code) > 5 else "")
+        found = _rare(data, coded, seldom.code, seldom, f"{len(seldom.code)} code(s) ({named}")
+        more, gain, summary = {}, bad.gain, found.summary
+        if by_bit <= by_code:
+            half = Estimate(0.5, 0.5 / math.sqrt(len(coded.code)), "")
+            more = {"bit": Estimate(float(bit), 0.0, ""), "share": half}
+            gain = max(gain, -2.0 * math.log(max(p_value, 1e-300)))
+            summary = f"bit {bit} of the converter is stuck or unreliable: {100 * part:.0f} % of"
+            summary += " the readings lie in one half of its codes"
+    parameters = {**found.parameters, **more}
+    return replace(found, p_value=p_value, delta_chi2=gain, parameters=parameters, summary=summary)
+
+
+def _rare(data: Data, coded: Coded, codes: IntArray, counts: Counts, lead: str) -> Finding:
+    """Describe codes that occur too seldom; `lead` says which."""
+    found, expected = float(counts.found.sum()), float(counts.expected.sum())
+    readings = len(coded.code)
+    missing, sd = expected - found, math.sqrt(max(expected, 1.0))
+    return Finding(
+        "missing-codes",
+        1.0,
+        parameters={
+            "share": Estimate(missing / readings, sd / readings, ""),
+            "number": Estimate(float(len(codes)), 0.0, ""),
+            "found": Estimate(found, math.sqrt(max(found, 1.0)), ""),
+            "expected": Estimate(expected, 0.0, ""),
+        },
+        location=Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
+        summary=f"{lead}, in steps of {coded.lattice.step:.4g} {data.unit}) occurred {found:.0f}"
+        f" times where {expected:.0f} were expected",
+    )
+
+
+def _expectations(coded: Coded) -> FloatArray:
+    """Return expected numbers of each code for shifted and unshifted angles, (3, codes)."""
+    first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
+    spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
+    shift = _COMMON_ERROR + 2.0 * coded.blur
+    size = last - first + 1
+    return np.stack(
+        [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
+    )
+
+
+def _single_codes(code: IntArray, expected: FloatArray) -> Counts:
+    """Return the numbers of each code but those at the ends."""
+    first = int(code.min()) - 1
+    codes = first + np.arange(expected.shape[1])
+    return Counts.of(codes, code - first, expected).chosen(slice(2, -2))
+
+
+def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
+    """Sum P(code) over readings, by a fine histogram of the angles."""
+    fine = 10 if spread < 1.0 else 4
+    cells = np.bincount(
+        np.clip(((position - first + 0.5) * fine).astype(np.int64), 0, size * fine - 1),
+        minlength=size * fine,
+    ).astype(np.float64)
+    reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
+    # Expectation of a code: its probability about its middle, summed over the cells.
+    offset = (np.arange(-reach, reach) + 0.5) / fine
+    kernel = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
+    length = 2 ** math.ceil(math.log2(len(cells) + 2 * reach))
+    smooth = np.fft.irfft(np.fft.rfft(cells, length) * np.fft.rfft(kernel, length), length)
+    start = reach + fine // 2 - 1
+    return np.asarray(np.maximum(smooth[start : start + size * fine : fine], 0.0))
+
+
+def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[int, float, float]:
+    """Return the bit that is set too often or too seldom, how often, and its p-value.
+
+    The converter's code 0 is unknown: a bit of weight 2^b divides the codes into runs of 2^b, and
+    every origin of the runs is tried. Expectations include the noise: near a turning point many
+    readings lie about one code.
+    """
+    best, tried = (1.0, 0, 0.5), 0
+    span = int(np.ptp(coded.code))
+    codes = np.arange(expected.shape[1]) + int(coded.code.min()) - 1
+    for bit in range(_MOST_BITS):
+        run = 2**bit
+        if 4 * run > span:
+            break
+        found = _halves(coded.code, np.ones(len(coded.code)), run)
+        predicted = np.stack([_halves(codes, row, run) for row in expected])
+        should = np.clip(found, predicted.min(axis=0), predicted.max(axis=0)).clip(0.05, 0.95)
+        tried += 2 * run
+        # Neighbouring readings are in the same half, so that fewer are independent.
+        effective = max(int(np.count_nonzero(np.diff(np.floor(coded.position / run)))), 1)
+        excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
+        worst = int(np.argmax(excess))
+        best = min(best, (float(2.0 * ndtr(-excess[worst])), bit, float(found[worst])))
+    chance, bit, part = best
+    return bit, part, min(1.0, tried * chance)
+
+
+def _halves(codes: IntArray, number: FloatArray, run: int) -> FloatArray:
+    """Return the share of readings in half of the residues, for each origin of the half."""
+    residue = np.bincount(codes % (2 * run), number, 2 * run)
+    ring = np.concatenate([[0.0], np.cumsum(np.tile(residue, 2))])
+    return np.asarray((ring[run : 3 * run] - ring[: 2 * run]) / residue.sum())
+
+
+class Comb(NamedTuple):
+    """Codes that are equal modulo `period`.
+
+    Parameters
+    ----------
+    period
+        A power of two.
+    residue
+        The least probable residue, shape (1,).
+    p_value
+        With all periods and residues that were tested.
+    """
+
+    period: int
+    residue: Counts
+    p_value: float
+
+
+def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
+    """Sum the codes by residue, and return the least probable residue.
+
+    A converter with a faulty bit loses every code of one residue modulo a power of two. Each code
+    alone may be expected too seldom to be missed; together they are not.
+
+    Parameters
+    ----------
+    code
+        Of each reading.
+    expected
+        Expected number of each code from ``code.min() - 1`` on, a row for each common error of
+        the angles; shape (errors, codes), the middle row without error.
+    """
+    first, size = int(code.min()) - 1, expected.shape[1]
+    codes = np.arange(first, first + size)
+    combs, tried = [Comb(1, Counts.of(codes[:1], codes[:0], np.ones((1, 1))), 1.0)], 0
+    for bit in range(1, _MOST_BITS + 1):
+        period = 2**bit
+        if 2 * period > size - 2:
+            break
+        predicted = np.array([np.bincount(codes % period, row, period) for row in expected])
+        counts = Counts.of(np.arange(period), code % period, predicted)
+        tried += int(np.count_nonzero(predicted.min(axis=0) > _FEWEST_EXPECTED))
+        worst = int(np.argmin(counts.chance))
+        combs.append(
+            Comb(period, counts.chosen(slice(worst, worst + 1)), float(counts.chance[worst]))
+        )
+    best = min(combs, key=lambda comb: comb.p_value)
+    return best._replace(p_value=min(1.0, tried * best.p_value))
+
+
+def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+    """Test whether the errors depend on the angle's position between two codes.
+
+    Rounding an angle x with noise s to steps q shifts the mean reading by
+
+        (q/pi) sum over m of (-1)^m exp(-2 (pi m s/q)^2) sin(2 pi m x/q)/m,
+
+    which vanishes from s = q/2 on. The size of its first term is the errors' inner product with
+    it; the null is any noise above a quarter step. If the amplitude stays above twenty steps, the
+    errors are pseudo-random and do no harm: a property of the record.
+
+    If the observed codes are several of the converter's steps apart, its lowest bits are dead or
+    an earlier stage has a coarser step, and no estimate is needed.
+    """
+    if samples.promised_step is not None:
+        return _dead_bits(data, fit, samples)
+    coded = None if data.time_noise else read_codes(data, fit, samples)
+    if coded is None or len(coded.code) < 60:
+        return nothing("coarse-quantisation")
+    wave = -np.sin(2.0 * math.pi * coded.position)
+    wave = wave - wave.mean()
+    error = coded.error - coded.error.mean()
+    size = float(wave @ error) / float(wave @ wave)
+    sd = math.sqrt(float(np.mean(error**2)) / float(wave @ wave))
+    allowed = math.exp(-2.0 * (math.pi * _HARMLESS_NOISE) ** 2) / math.pi
+    step, end = coded.lattice.step, float(fit.at.sampled.amplitude[-1])
+    return Finding(
+        "coarse-quantisation",
+        upper_tail((size - allowed) / sd),
+        max(size / sd, 0.0) ** 2,
+        {
+            "step": Estimate(step, 0.0, data.unit),
+            "noise_over_step": Estimate(coded.ratio, 0.2 * coded.ratio, ""),
+            "bias_over_step": Estimate(size, sd, ""),
+        },
+        Location.over(data.time_s, fit.at.sampled.amplitude),
+        summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
+        f" that errors depend on the codes; the final amplitude is {end / step:.2g} steps",
+        kind="fault" if end < _RANDOM_AMPLITUDE * step else "property",
+    )
+
+
+def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
+    """Report codes that all lie on a coarser lattice; by chance each would with 1/times.
+
+    With noise above half the converter's step every code is as probable as its neighbours, so
+    that each reading contributes ln(times) to the log-likelihood. The lattice's origin is
+    estimated from the codes, and so is its spacing if that is not a whole number.
+    """
+    assert samples.step is not None
+    assert samples.promised_step is not None
+    times = samples.step / samples.promised_step
+    whole = abs(times - round(times)) < _WHOLE_WITHIN
+    free = len(np.unique(samples.values)) - (1 if whole else 2)
+    steps = f"the step is {samples.step:.3g} {data.unit}, but the converter's bits give"
+    steps += f" {samples.promised_step:.3g}"
+    parameters = {
+        "step": Estimate(samples.step, 0.0, data.unit),
+        "promised": Estimate(samples.promised_step, 0.0, data.unit),
+    }
+    if whole:
+        parameters["dead_bits"] = Estimate(math.log2(times), 0.0, "")
+    return Finding(
+        "coarse-quantisation",
+        times**-free,
+        2.0 * data.used * math.log(times),
+        parameters,
+        Location.over(data.time_s, fit.at.sampled.amplitude),
+        summary=f"only one code in {times:.0f} occurs: {steps}"
+        if whole
+        else f"the codes that occur are {times:.4g} apart, rounded to whole ones: {steps}",
+        also=("missing-codes",) if whole and round(times) == 2 else (),
+    )
