@@ -11,7 +11,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.values import curve_values
-from pendpipe.effects.curves import DampingCurve, DriveCurve
+from pendpipe.effects.curves import Curve, damping_curve, drive_curve
 from pendpipe.effects.model import Model
 
 TIME_S = np.arange(3000) / 20.0
@@ -19,7 +19,7 @@ NOISE_RAD = 1e-5
 LINEAR, QUADRATIC = 0.01, 0.08
 
 
-def fitted(kind: type[DampingCurve] | type[DriveCurve], quadratic: float) -> tuple[Fit, object]:
+def fitted(kind: type[Curve], quadratic: float) -> tuple[Fit, Curve]:
     """Readings with a quadratic loss, fitted by b and a curve, a and c held at zero."""
     omega = 2.0 * math.pi * 0.9
     truth = np.array([quadratic, LINEAR, 0.0, 0.0, omega, 0.15, -0.3, 0.0])
@@ -28,7 +28,7 @@ def fitted(kind: type[DampingCurve] | type[DriveCurve], quadratic: float) -> tup
     values = noise_free.reading + NOISE_RAD * np.random.default_rng(2).standard_normal(len(TIME_S))
     data = Data(TIME_S, values, 0.05, True, np.ones(len(TIME_S)))
     effect = kind(noise_free.span)
-    if kind is DriveCurve:
+    if kind is drive_curve:
         effect = kind(noise_free.span, np.eye(effect.basis_size)[:, :3])
     start = np.concatenate([truth, np.zeros(effect.sizes)])
     start[0] = 0.0
@@ -38,8 +38,8 @@ def fitted(kind: type[DampingCurve] | type[DriveCurve], quadratic: float) -> tup
 
 def test_a_loss_curve_is_the_missing_loss() -> None:
     """Quadratic drag takes -dy/dt = a y^2: a loss rate of a y (Eq. 13)."""
-    fit, effect = fitted(DampingCurve, QUADRATIC)
-    found = curve_values(fit, effect)  # type: ignore[arg-type]
+    fit, effect = fitted(damping_curve, QUADRATIC)
+    found = curve_values(fit, effect)
     expected = QUADRATIC * found["at"]
     inside = slice(5, -5)
     assert found["value"][inside] == pytest.approx(expected[inside], rel=0.06)
@@ -52,8 +52,8 @@ def test_a_loss_curve_is_the_missing_loss() -> None:
 
 
 def test_a_drive_has_two_curves() -> None:
-    fit, effect = fitted(DriveCurve, 0.0)
-    found = curve_values(fit, effect, "m")  # type: ignore[arg-type]
+    fit, effect = fitted(drive_curve, 0.0)
+    found = curve_values(fit, effect, "m")
     assert len(found["value"]) == len(found["quadrature"]) == len(found["at"])
     # Nothing was driven: nothing is seen.
     assert np.all(np.abs(found["value"]) <= 4.0 * found["sd"] + 1e-12)

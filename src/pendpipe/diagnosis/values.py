@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +16,7 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
-from pendpipe.effects.curves import Curve, DampingCurve, DriveCurve
+from pendpipe.effects.curves import Curve, damping_curve
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.estimate import Estimate
 
@@ -22,6 +24,7 @@ _FIRST_CYCLES: Final = 4.0
 _FEWEST_READINGS: Final = 16
 _DERIVATIVE_STEP: Final = 1e-3
 """Step of numerical derivatives, in standard deviations."""
+_CONSTANTS: Final = {"a": A, "b": B, "c": C, "offset": OFFSET}
 
 
 def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
@@ -30,34 +33,36 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     The amplitude is the model's at the first turning point in the readings, the phase that at the
     first reading.
     """
-    covariance = fit.covariance()
-    numbers = _numbers(fit.model, fit.at)
-    early = _early(fit)
-    jacobian = np.zeros((2, len(fit.value)))
-    for index in fit.free:
-        sd = math.sqrt(max(float(covariance[index, index]), 0.0))
-        if sd == 0.0 or index in (A, B, C, OFFSET):
-            continue
-        jacobian[:, index] = _slope(fit, early, index, _DERIVATIVE_STEP * sd / fit.error_scale)
-    errors = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
-    dress, found = units(unit), constants_of(fit, unit)
-    found["amplitude"] = Estimate(float(numbers[0]), float(errors[0]), dress["amplitude"])
-    phase = math.remainder(float(numbers[1]), 2.0 * math.pi)
-    found["phase"] = Estimate(phase, float(errors[1]), dress["phase"])
+    early, dress, found = _early(fit), units(unit), constants_of(fit, unit)
+
+    def numbers(value: FloatArray) -> FloatArray:
+        return _numbers(early, early.evaluate(early.settled(value)))
+
+    amplitude, phase = _numbers(fit.model, fit.at).tolist()
+    _, (sd, phase_sd) = _with_errors(fit, numbers, constant=tuple(_CONSTANTS.values()))
+    found["amplitude"] = Estimate(amplitude, float(sd), dress["amplitude"])
+    phase = math.remainder(phase, 2.0 * math.pi)
+    found["phase"] = Estimate(phase, float(phase_sd), dress["phase"])
     return {name: found[name] for name in PARAMETERS}
 
 
 def constants_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     """Return a, b, c, offset and frequency."""
-    covariance, intervals, dress = fit.covariance(), _intervals(fit), units(unit)
+    intervals, dress, sds = _intervals(fit), units(unit), _sds(fit)
+    lowest, hertz = fit.model.bounds()[0], 0.5 / math.pi
     found = {}
-    for name, index in (("a", A), ("b", B), ("c", C), ("offset", OFFSET)):
-        found[name] = _estimate(fit, covariance, index, dress[name], intervals.get(index))
-    hertz = 0.5 / math.pi
-    frequency = float(fit.value[OMEGA]) * hertz
-    sd = math.sqrt(max(float(covariance[OMEGA, OMEGA]), 0.0)) * hertz
+    for name, index in _CONSTANTS.items():
+        value, sd = float(fit.value[index]), float(sds[index])
+        at_bound = index in fit.free and value <= lowest[index]
+        found[name] = Estimate(value, sd, dress[name], intervals.get(index), bool(at_bound))
+    frequency, sd = float(fit.value[OMEGA]) * hertz, float(sds[OMEGA]) * hertz
     found["frequency"] = Estimate(frequency, sd, dress["frequency"])
     return found
+
+
+def _sds(fit: Fit) -> FloatArray:
+    """Return the standard deviations of all values; zero for those held."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance()), 0.0)))
 
 
 def _early(fit: Fit) -> Model:
@@ -76,18 +81,33 @@ def _numbers(model: Model, at: Evaluated) -> FloatArray:
     return np.array([motion.amplitude[first, 0], sampled.phase[0] + turned])
 
 
-def _slope(fit: Fit, early: Model, index: int, step: float) -> FloatArray:
-    """Return derivatives by one value; backwards if increasing it stops the pendulum too early."""
-    numbers = _numbers(early, early.evaluate(fit.value))
-    for signed in (step, -step):
-        moved = fit.value.copy()
-        moved[index] += signed
-        try:
-            there = _numbers(early, early.evaluate(early.settled(moved)))
-        except NoMotionError:
+def _with_errors(
+    fit: Fit, of: Callable[[FloatArray], FloatArray], constant: Sequence[int] = ()
+) -> tuple[FloatArray, FloatArray]:
+    """Return numbers that follow from a fit's values, and their errors by those of the values.
+
+    They hardly depend on the values at the indices `constant`.
+    """
+    sds, centre = _sds(fit) / fit.error_scale, of(fit.value)
+    jacobian = np.zeros((len(centre), len(fit.value)))
+    for index in fit.free:
+        step = _DERIVATIVE_STEP * float(sds[index])
+        if step == 0.0 or index in constant:
             continue
-        return np.asarray((there - numbers) / signed)
-    return np.zeros(2)
+        # Backwards if increasing it stops the pendulum too early.
+        for signed in (step, -step):
+            moved = fit.value.copy()
+            moved[index] += signed
+            with suppress(NoMotionError):
+                jacobian[:, index] = (of(moved) - centre) / signed
+                break
+    return centre, _errors(jacobian, fit.covariance())
+
+
+def _errors(columns: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the standard deviations of linear combinations, one a row."""
+    variance = np.einsum("ij,jk,ik->i", columns, covariance, columns)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
@@ -110,30 +130,16 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     return wider
 
 
-def _estimate(
-    fit: Fit, covariance: FloatArray, index: int, unit: str, interval: tuple[float, float] | None
-) -> Estimate:
-    value = float(fit.value[index])
-    sd = math.sqrt(max(float(covariance[index, index]), 0.0))
-    lowest = float(fit.model.bounds()[0][index])
-    at_bound = index in fit.free and index in (A, B, C) and value <= lowest
-    return Estimate(value, sd, unit, interval, at_bound)
-
-
 def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, Estimate]:
     """Return an effect's own parameters, by name; displacements are in `unit`."""
     position = next((here for other, here in fit.model.places() if other is effect), None)
     if position is None:
         return {}
-    covariance = fit.covariance()
-    found = {}
-    first = position.start + effect.parameter_free
-    for offset, parameter in enumerate(effect.parameters):
-        index = first + offset
-        sd = math.sqrt(max(float(covariance[index, index]), 0.0))
-        value = float(fit.value[index])
-        half = 1.959963984540054 * sd
-        interval = (max(value - half, parameter.low), min(value + half, parameter.high))
+    found, sds = {}, _sds(fit)
+    for index, parameter in enumerate(effect.parameters, position.start + effect.parameter_free):
+        value, sd = float(fit.value[index]), float(sds[index])
+        low, high = Estimate(value, sd, "").bounds95
+        interval = max(low, parameter.low), min(high, parameter.high)
         found[parameter.name] = Estimate(value, sd, parameter.unit_in(unit), interval)
     return found
 
@@ -161,73 +167,39 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
         loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
     """
     position = next(position for other, position in fit.model.places() if other is effect)
-    covariance = fit.covariance()
-    knots = effect.knots
-    spaced = np.geomspace if isinstance(effect, DampingCurve) else np.linspace
-    at = np.asarray(spaced(knots[0], knots[-1], _CURVE_POINTS))
+    covariance, by_amplitude = (
+        fit.covariance()[position, position],
+        isinstance(effect, damping_curve),
+    )
+    spaced = np.geomspace if by_amplitude else np.linspace
+    at = np.asarray(spaced(effect.knots[0], effect.knots[-1], _CURVE_POINTS))
     scale = effect.scale(fit.model.pendulum(fit.value))
+    in_unit = effect.argument.replace("rad", unit)
     found: dict[str, Any] = {
-        "argument": effect.argument.replace("rad", unit)
-        if "phase" not in effect.argument
-        else effect.argument,
+        "argument": effect.argument if "phase" in effect.argument else in_unit,
         "ordinate": effect.ordinate.replace(", rad", f", {unit}"),
         "at": at,
     }
-    for name, drawn in _parts(effect).items():
-        columns = np.stack([drawn(one, at) for one in np.eye(effect.sizes)], axis=1)
-        prefix = f"{name}_" if name != "value" else ""
+    each = np.stack([effect.curves(one, at) for one in np.eye(effect.sizes)], axis=2)
+    for name, columns in zip(effect.drawn, each, strict=True):
         found[name] = scale * columns @ fit.value[position]
-        own = covariance[position, position]
-        variance = np.einsum("ij,jk,ik->i", columns, own, columns)
-        found[f"{prefix}sd"] = abs(scale) * np.sqrt(np.maximum(variance, 0.0))
-    if isinstance(effect, DampingCurve):
-        found |= _local_exponent(fit, effect, position, at, covariance)
+        prefix = f"{name}_" if name != "value" else ""
+        found[f"{prefix}sd"] = abs(scale) * _errors(columns, covariance)
+    if by_amplitude:
+        exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, at))
+        found["local_exponent"], found["local_exponent_sd"] = exponent
     return found
 
 
-def _parts(effect: Curve) -> dict[str, Any]:
-    """Return the curves of an effect, each a function of values and arguments."""
-    if not isinstance(effect, DriveCurve):
-        return {"value": effect.curve}
-    count = len(effect.knots)
-
-    def part(first: int) -> Any:
-        def drawn(values: FloatArray, at: FloatArray) -> FloatArray:
-            both = effect.coefficients @ values
-            return np.asarray(np.interp(at, effect.knots, both[first : first + count]))
-
-        return drawn
-
-    return {"value": part(0), "quadrature": part(count)}
-
-
-def _local_exponent(
-    fit: Fit, effect: DampingCurve, position: slice, at: FloatArray, covariance: FloatArray
-) -> dict[str, FloatArray]:
+def _local_exponent(fit: Fit, effect: Curve, value: FloatArray, at: FloatArray) -> FloatArray:
     """Return the exponent n of the total loss: n = 1 + d ln(loss rate)/d ln y.
 
     A loss |v|^n gives -dy/dt proportional to y^n, that is, a rate y^(n - 1) (Eq. 13: a, b, c
-    are n = 2, 1, 0). The error is propagated from all fitted values.
+    are n = 2, 1, 0).
     """
-
-    def exponent(value: FloatArray) -> FloatArray:
-        pendulum = fit.model.pendulum(value)
-        rate = pendulum.quadratic * at + pendulum.linear + pendulum.coulomb / at
-        rate = rate + effect.scale(pendulum) * effect.curve(value[position], at)
-        safe = np.maximum(rate, 1e-6 * float(np.max(np.abs(rate))))
-        return 1.0 + np.gradient(np.log(safe), np.log(at))
-
-    centre = exponent(fit.value)
-    jacobian = np.zeros((len(at), len(fit.value)))
-    for index in fit.free:
-        sd = float(np.sqrt(max(covariance[index, index], 0.0)))
-        if sd == 0.0:
-            continue
-        moved = fit.value.copy()
-        moved[index] += 1e-3 * sd
-        jacobian[:, index] = (exponent(moved) - centre) / (1e-3 * sd)
-    variance = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
-    return {
-        "local_exponent": centre,
-        "local_exponent_sd": np.sqrt(np.maximum(variance, 0.0)),
-    }
+    position = next(position for other, position in fit.model.places() if other is effect)
+    pendulum = fit.model.pendulum(value)
+    rate = pendulum.quadratic * at + pendulum.linear + pendulum.coulomb / at
+    rate = rate + effect.scale(pendulum) * effect.curves(value[position], at)[0]
+    safe = np.maximum(rate, 1e-6 * float(np.max(np.abs(rate))))
+    return np.asarray(1.0 + np.gradient(np.log(safe), np.log(at)))

@@ -43,6 +43,10 @@ class Curve(Effect):
     ordinate: ClassVar[str]
     """What is drawn."""
     flavour: ClassVar[str] = ""
+    drawn: ClassVar[tuple[str, ...]] = ("value",)
+    """The curves that are drawn over the same argument."""
+    over_logarithm: ClassVar[bool] = False
+    """Whether it is straight between the knots over the argument's logarithm."""
     of_anything: ClassVar[bool] = False
     """Whether it follows whatever may happen, at whatever time."""
     make_knots: ClassVar[Callable[[Span], FloatArray]]
@@ -53,7 +57,7 @@ class Curve(Effect):
     def __init__(self, span: Span, coefficients: FloatArray | None = None) -> None:
         self.span = span
         self.knots = type(self).make_knots(span)
-        self.basis_size = self.count_basis_functions()
+        self.basis_size = len(self.drawn) * len(self.knots)
         self.coefficients = np.eye(self.basis_size) if coefficients is None else coefficients
         self.sizes = self.coefficients.shape[1]  # type: ignore[misc]
 
@@ -71,17 +75,17 @@ class Curve(Effect):
         """Any."""
         return [(-np.inf, np.inf)] * self.sizes
 
-    def count_basis_functions(self) -> int:
-        """Return how many basis functions there are."""
-        return len(self.knots)
-
     def reduced(self, coefficients: FloatArray) -> Curve:
         """Return the same with fewer combinations."""
         return type(self)(self.span, coefficients)
 
-    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
-        """Return the curve's value, in its reasonable units."""
-        return np.asarray(np.interp(at, self.knots, self.coefficients @ values))
+    def curves(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return the values of all curves `drawn`, in their reasonable units, a row each."""
+        knots = self.knots
+        if self.over_logarithm:
+            at, knots = np.log(at), np.log(knots)
+        heights = np.split(self.coefficients @ values, len(self.drawn))
+        return np.array([np.interp(at, knots, height) for height in heights])
 
     def scale(self, pendulum: Pendulum) -> float:
         """Return the reasonable unit in that of `ordinate`."""
@@ -92,26 +96,17 @@ class Curve(Effect):
         return 1e-3
 
 
-class AmplitudeCurve(Curve):
-    """A curve over the amplitude, straight between knots that stand in equal ratios."""
-
-    def curve(self, values: FloatArray, at: FloatArray) -> FloatArray:
-        """Return the curve's value: straight between the knots over ln y."""
-        return np.asarray(np.interp(np.log(at), np.log(self.knots), self.coefficients @ values))
-
-
 def follows(
     how: How,
     along: Callable[[Any], FloatArray],
     make_knots: Callable[[Span], FloatArray],
     unit: Callable[[Pendulum, Span], float],
-    base: type[Curve] = Curve,
     **attributes: Any,
 ) -> Callable[[Callable[..., FloatArray]], type[Curve]]:
     """Declare a curve by the function through which it enters.
 
-    The function takes what that method of `Effect` takes, with the curve's value at each node
-    or reading in the place of the fitted values.
+    The function takes what that method of `Effect` takes, with the value of each curve at each
+    node or reading in the place of the fitted values.
 
     Parameters
     ----------
@@ -121,19 +116,19 @@ def follows(
         The curve's argument, from a motion or a sampled motion.
     make_knots, unit
         As in `Curve`.
-    base, attributes
-        The kind of curve, and its class variables.
+    attributes
+        Class variables of `Curve`.
     """
 
     def declare(function: Callable[..., FloatArray]) -> type[Curve]:
         def method(
             curve: Curve, moving: Motion | Sampled, pendulum: Pendulum, values: FloatArray
         ) -> FloatArray:
-            value = curve.scale(pendulum) * curve.curve(values, along(moving))
-            return np.asarray(function(moving, pendulum, value))
+            drawn = curve.scale(pendulum) * curve.curves(values, along(moving))
+            return np.asarray(function(moving, pendulum, *drawn))
 
         own = {how: method, "make_knots": make_knots, "unit": unit}
-        return subclass(base, function.__name__, function.__doc__, own | attributes)
+        return subclass(Curve, function.__name__, function.__doc__, own | attributes)
 
     return declare
 
@@ -218,24 +213,25 @@ def restoring_curve(motion: Motion, pendulum: Pendulum, torque: FloatArray) -> F
     return -(pendulum.angular_frequency**2) * torque
 
 
-class DampingCurve(AmplitudeCurve):
-    """A loss that is any function of the amplitude."""
-
-    identifier = "unnamed-damping"
-    name = "a loss that depends on the amplitude in an unknown way"
-    equation = r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x"
-    argument, ordinate = "amplitude, rad", "extra loss rate, 1/s"
-    flavour = "amplitude"
-    discriminating_test = (
+@follows(
+    "acceleration",
+    attrgetter("amplitude"),
+    partial(amplitudes, 15),
+    usual_loss_rate,
+    over_logarithm=True,
+    identifier="unnamed-damping",
+    name="a loss that depends on the amplitude in an unknown way",
+    equation=r"2 b \dot x \to 2 [b + \beta(y)]\,\dot x",
+    argument="amplitude, rad",
+    ordinate="extra loss rate, 1/s",
+    flavour="amplitude",
+    discriminating_test=(
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
-    )
-    make_knots = partial(amplitudes, 15)
-    unit = usual_loss_rate
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return -2 beta(r) v."""
-        beta = self.scale(pendulum) * self.curve(values, motion.amplitude)
-        return np.asarray(-2.0 * beta * motion.velocity)
+    ),
+)
+def damping_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) -> FloatArray:
+    """A loss that is any function of the amplitude."""
+    return -2.0 * rate * motion.velocity
 
 
 @follows(
@@ -276,31 +272,28 @@ def profile_curve(motion: Motion, pendulum: Pendulum, profile: FloatArray) -> Fl
     return -motion.direction * motion.amplitude * profile
 
 
-class DriveCurve(Curve):
+@follows(
+    "acceleration",
+    attrgetter("time_s"),
+    partial(instants, 10),
+    hundredth,
+    drawn=("value", "quadrature"),
+    in_time=True,
+    of_anything=True,
+    prior=-6.0,
+    identifier="unnamed-drive",
+    name="a torque that depends on the time in an unknown way",
+    equation=r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x",
+    argument="time, s",
+    ordinate="extra torque over omega^2 y",
+    discriminating_test="repeat the run: what depends on the time of day does not come again",
+)
+def drive_curve(
+    motion: Motion, pendulum: Pendulum, in_phase: FloatArray, quadrature: FloatArray
+) -> FloatArray:
     """A torque that comes and goes with the time, in step with the motion."""
-
-    in_time = of_anything = True
-    prior = -6.0
-    identifier = "unnamed-drive"
-    name = "a torque that depends on the time in an unknown way"
-    equation = r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x"
-    argument, ordinate = "time, s", "extra torque over omega^2 y"
-    discriminating_test = "repeat the run: what depends on the time of day does not come again"
-    make_knots = partial(instants, 10)
-    unit = hundredth
-
-    def count_basis_functions(self) -> int:
-        """In phase and in quadrature."""
-        return 2 * len(self.knots)
-
-    def acceleration(self, motion: Motion, pendulum: Pendulum, values: FloatArray) -> FloatArray:
-        """Return p(t) omega^2 x + q(t) omega v."""
-        both = self.coefficients @ values
-        count, omega = len(self.knots), pendulum.angular_frequency
-        in_phase = np.interp(motion.time_s, self.knots, both[:count])
-        quadrature = np.interp(motion.time_s, self.knots, both[count:])
-        force = in_phase * omega * motion.angle + quadrature * motion.velocity
-        return np.asarray(self.scale(pendulum) * omega * force)
+    omega = pendulum.angular_frequency
+    return omega * (in_phase * omega * motion.angle + quadrature * motion.velocity)
 
 
 @follows(
@@ -343,10 +336,10 @@ def offset_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> Flo
 
 CURVES: Sequence[type[Curve]] = (
     restoring_curve,
-    DampingCurve,
+    damping_curve,
     friction_curve,
     profile_curve,
-    DriveCurve,
+    drive_curve,
     reading_curve,
     offset_curve,
 )
@@ -414,7 +407,7 @@ def damping_in_time_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) 
     attrgetter("amplitude"),
     partial(amplitudes, 13),
     hundredth,
-    AmplitudeCurve,
+    over_logarithm=True,
     identifier="unnamed-measurement",
     name="a gain that depends on the swing in an unknown way",
     equation=r"y = x\,[1 + g(y)]",
@@ -433,7 +426,7 @@ def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatA
     attrgetter("amplitude"),
     partial(amplitudes, 13),
     hundredth_of_a_radian,
-    AmplitudeCurve,
+    over_logarithm=True,
     identifier="unnamed-measurement",
     name="a delay that depends on the swing in an unknown way",
     equation=r"y = x(t - \tau(y))",
