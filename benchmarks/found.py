@@ -31,7 +31,7 @@ from benchmarks.known_physics import RECORDINGS
 from benchmarks.null_families import wilson
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points.samples import prepare
-from pendpipe.diagnosis.forensics import lost_samples, slips, tracking
+from pendpipe.diagnosis.forensics import slips, tracking
 from pendpipe.diagnosis.result import Confirmation
 from pendpipe.recording import Recording
 
@@ -185,7 +185,7 @@ def drifting(swing: Swing, _: float) -> Recording:
 
 def time_test(recording: Recording, at_s: float, period_s: float) -> Confirmation:
     """Whether angle and velocity step by one and the same time."""
-    return lost_samples.confirmed(prepare(recording, "found"), at_s, period_s)
+    return slips.confirmed(prepare(recording, "found"), at_s, period_s)
 
 
 TIME: Final = Kind(

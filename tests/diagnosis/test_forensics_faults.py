@@ -15,8 +15,8 @@ from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.forensics import TESTS, Finding, find_lost_samples
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
-from pendpipe.diagnosis.forensics.lost_samples import LostSamples
-from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.forensics.slips import LostSamples
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.state import State

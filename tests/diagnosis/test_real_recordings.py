@@ -17,11 +17,11 @@ from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.begin import Beginning, begin
-from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.cycles import small_swings
+from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.progressive_window import fit_in_growing_window
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.small_swings import small_swings
 from pendpipe.diagnosis.state import first_noise
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from pendpipe.analysis.fit.by_waveform import best_noise
-from pendpipe.diagnosis.data import Data, fast_length, gather, rounding_bias, with_lattice
+from pendpipe.diagnosis.data import Data, gather, rounding_bias, with_lattice
 from pendpipe.diagnosis.forensics.codes import noise_before_rounding
 from pendpipe.diagnosis.forensics.local import Local
 
@@ -70,9 +70,11 @@ def test_noise_of_a_step_or_no_step_leaves_nothing_to_find(share: float, step: f
     assert with_lattice(data, plain).lattice is None
 
 
-@given(st.integers(1, 200_000))
+@given(st.integers(24, 4000))
 def test_a_quick_length_has_small_factors_and_loses_little(count: int) -> None:
-    found = fast_length(count)
+    time = np.arange(count) * INTERVAL_S
+    told = {"step": None, "unit": "rad", "counts": False, "period_s": 1.0, "noise_rms": 1.0}
+    found = len(gather(time, np.zeros(count), **told))  # type: ignore[arg-type]
     left = found
     for prime in (2, 3, 5, 7, 11):
         while left % prime == 0:

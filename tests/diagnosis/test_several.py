@@ -18,8 +18,7 @@ from pendpipe.effects.baseline import A as QUADRATIC
 from pendpipe.effects.baseline import B as LINEAR
 from pendpipe.effects.baseline import C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.derivatives import jacobian
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import Differs, Stack
 from pendpipe.recording import Recording
 

@@ -13,10 +13,9 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
-from pendpipe.effects.derivatives import jacobian, response
 from pendpipe.effects.effect import enters
 from pendpipe.effects.manual import page
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Model, jacobian, responses
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
@@ -233,7 +232,7 @@ def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
     rng = np.random.default_rng(4)
     values, change = rng.standard_normal((2, curve.count))
     found = jacobian(model.adding(curve), np.append(BASE, values), at)[:, len(BASE) :]
-    moved = response(curve, values, values + change, at, model.pendulum(BASE))
+    moved = responses(curve, [(values, values + change)], at, model.pendulum(BASE))[0]
     assert found @ change == pytest.approx(moved, abs=1e-6 * np.max(np.abs(moved)))
 
 
@@ -245,7 +244,7 @@ def projected(effect: Effect, shape: tuple[float, ...], model: Model, basis: Flo
         low = np.concatenate([np.zeros(effect.sizes), shape])
         high = low.copy()
         high[index] = 1e-6
-        columns.append(response(effect, low, high, at, model.pendulum(BASE)) / 1e-6)
+        columns.append(responses(effect, [(low, high)], at, model.pendulum(BASE))[0] / 1e-6)
     tall = np.stack(columns, axis=1)
     tall -= basis @ (basis.T @ tall)
     tall -= basis @ (basis.T @ tall)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.fft import prev_fast_len
 
 from pendpipe.arrays import BoolArray, FloatArray
 
@@ -139,24 +140,12 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
     return replace(data, lattice=None if best is None else (origin, best * data.step))
 
 
-def fast_length(count: int) -> int:
-    """Return the largest length up to `count` that has no prime factor above 11."""
-    while True:
-        left = count
-        for prime in (2, 3, 5, 7, 11):
-            while left > 1 and left % prime == 0:
-                left //= prime
-        if left <= 1:
-            return count
-        count -= 1
-
-
 def at_even_times(data: Data, time_s: FloatArray) -> Data:
     """Return the readings with the times of a regular clock; evenly spaced if none is missing."""
     interval = float(np.median(np.diff(time_s)))
     even = bool(np.all(np.abs(np.diff(time_s) - interval) < 1e-3 * interval))
     moved = replace(data, time_s=time_s, interval_s=interval, uniform=even)
-    return moved.first(fast_length(len(data))) if even else moved
+    return moved.first(prev_fast_len(len(data))) if even else moved
 
 
 def gather(
@@ -188,7 +177,8 @@ def gather(
         interval *= fold
     if uniform:
         # Fourier transforms are ten times slower if the length has a large prime factor.
-        time_s, values = time_s[: fast_length(len(time_s))], values[: fast_length(len(values))]
+        fast = prev_fast_len(len(time_s))
+        time_s, values = time_s[:fast], values[:fast]
     elif len(time_s) > _MOST_UNEVEN * most:
         # Means of unevenly spaced readings would mix phases: take every k-th reading.
         keep = slice(None, None, len(time_s) // (_MOST_UNEVEN * most) + 1)

@@ -124,7 +124,7 @@ class Forensics:
             return False
         if known is not None and known.mask is not None:
             more = replace(known, mask=known.mask[: len(state.data)] | finding.mask)
-            state.faults[_index(known, state.faults)] = more
+            state.faults[state.faults.index(known)] = more
         _refit(state, (state.data.weight == 0.0) | finding.mask)
         return True
 
@@ -142,7 +142,8 @@ class Forensics:
         return bool(np.any(state.data.weight > before))
 
     def _test_again(self, fault: Fault, state: State, progress: Progress) -> None:
-        name, number, masked = fault.finding.identifier, _index(fault, state.faults), state.data
+        name, masked = fault.finding.identifier, state.data
+        number = state.faults.index(fault)
         assert fault.mask is not None
         others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
         whole = replace(masked, weight=np.where(others, 0.0, 1.0))
@@ -186,30 +187,21 @@ class Forensics:
         time = data.time_s.copy()
         for each in lost:
             time[data.time_s >= each.time_s - 1e-9] += each.number * interval
-        corrected = replace(data, time_s=time, uniform=False)
-        model = state.fit.model.at_times(time)
-        try:
-            fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
-        except NoMotionError:
-            return  # the model comes to rest before the corrected times
-        if state.fit.chi2 - fit.chi2 < 0.1 * state.fit.chi2:
-            return
-        progress(f"{sum(each.number for each in lost)} samples were lost without a gap")
         number = sum(each.number for each in lost)
         found = Finding(
             "dropped-samples",
             0.0,
-            state.fit.chi2 - fit.chi2,
-            {
+            parameters={
                 "d": Estimate(number * interval, 0.0, "s"),
                 "samples": Estimate(float(number), 0.0, ""),
             },
-            Location(time_s=(lost[0].time_s, lost[-1].time_s)),
+            location=Location(time_s=(lost[0].time_s, lost[-1].time_s)),
             summary="samples were lost at "
             + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
-        state.faults.append(Fault(found, 0.0, len(state.steps)))
-        state.settle(fit, corrected)
+        corrected = replace(data, time_s=time, uniform=False)
+        if self._correct(state, corrected, found, 0.0, least=0.1 * state.fit.chi2):
+            progress(f"{number} samples were lost without a gap")
 
     def _correct_tracking(self, state: State, progress: Progress) -> None:
         """Take the wander of a tracked mark from the readings: more with each better model."""
@@ -222,16 +214,10 @@ class Forensics:
         kappa = finding.parameters.get("kappa")
         if p_value > self.level or kappa is None or abs(kappa.value - taken) < kappa.sd:
             return
-        fit = refine(state.fit.model, corrected, state.noise, state.fit.value, held=state.held)
-        gain = state.fit.chi2 - fit.chi2
-        if gain <= 0.0:
-            return
-        progress(finding.summary)
-        whole = replace(finding, delta_chi2=gain + sum(f.finding.delta_chi2 for f in known))
-        state.faults = [each for each in state.faults if not any(each is one for one in known)]
-        state.faults.append(Fault(whole, p_value, len(state.steps)))
-        self._correct_samples(state.data, corrected)
-        state.settle(fit, corrected)
+        gained = sum(fault.finding.delta_chi2 for fault in known)
+        if self._correct(state, corrected, replace(finding, delta_chi2=gained), p_value):
+            progress(finding.summary)
+            state.faults = [fault for fault in state.faults if fault not in known]
 
     def _correct_slips(self, state: State, progress: Progress) -> None:
         """Correct the values of an encoder that loses counts, or the times of a slipping clock."""
@@ -246,27 +232,31 @@ class Forensics:
                 continue
             corrected, finding = slips.find(name, state.data, state.fit, self.samples)
             p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
-            if p_value > self.level:
-                continue
-            model, before = state.fit.model, state.fit.chi2
-            if corrected.time_s is not state.data.time_s:
-                model = model.at_times(corrected.time_s)
-            try:
-                fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
-                if fit.chi2 < before:
-                    self._correct_samples(state.data, corrected)
-                    state.settle(fit, corrected)
-                    progress(finding.summary)
-                    found = replace(finding, delta_chi2=before - fit.chi2)
-                    state.faults.append(Fault(found, p_value, len(state.steps)))
-            except NoMotionError:
-                continue  # the model comes to rest before the corrected times
+            if p_value <= self.level and self._correct(state, corrected, finding, p_value):
+                progress(finding.summary)
 
-    def _correct_samples(self, data: Data, corrected: Data) -> None:
-        """Correct the values as recorded, too: the later tests look at these."""
-        row = np.searchsorted(data.time_s, self.samples.time_s, side="right") - 1
-        lost = (data.values - corrected.values)[np.maximum(row, 0)]
+    def _correct(
+        self, state: State, corrected: Data, finding: Finding, p_value: float, least: float = 0.0
+    ) -> bool:
+        """Keep a finding and its correction if chi^2 falls by more than `least`."""
+        model = state.fit.model
+        if corrected.time_s is not state.data.time_s:
+            model = model.at_times(corrected.time_s)
+        try:
+            fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
+        except NoMotionError:
+            return False  # the model comes to rest before the corrected times
+        gain = state.fit.chi2 - fit.chi2
+        if gain <= least:
+            return False
+        found = replace(finding, delta_chi2=finding.delta_chi2 + gain)
+        state.faults.append(Fault(found, p_value, len(state.steps)))
+        # The later tests look at the values as they were recorded.
+        row = np.searchsorted(state.data.time_s, self.samples.time_s, side="right") - 1
+        lost = (state.data.values - corrected.values)[np.maximum(row, 0)]
         self.samples = replace(self.samples, values=self.samples.values - lost)
+        state.settle(fit, corrected)
+        return True
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:
         """Test whether random kicks explain more than an effect that leaves more than noise."""
@@ -281,11 +271,6 @@ class Forensics:
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))
         return True
-
-
-def _index(fault: Fault, faults: Sequence[Fault]) -> int:
-    """Return the index by identity (faults hold arrays, and can't be compared)."""
-    return next(number for number, each in enumerate(faults) if each is fault)
 
 
 def _refit(state: State, out: BoolArray) -> None:

@@ -17,8 +17,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
-from pendpipe.effects.derivatives import jacobian
-from pendpipe.effects.model import Evaluated, Model
+from pendpipe.effects.model import Evaluated, Model, jacobian
 
 SETTLED: Final = 0.02
 """Expected fall of chi^2 below which a step is the last."""

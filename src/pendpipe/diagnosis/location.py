@@ -13,9 +13,11 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.statement import listed
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
+from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 
 _INTERVAL_SHARE: Final = 0.9
@@ -46,7 +48,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     difference = _difference(before, after) * data.weight
     power = difference**2
     sampled = after.at.sampled
-    time = _interval(data.time_s, power)
+    time = instant_of(after, effect) or _interval(data.time_s, power)
     amplitude = _interval(sampled.amplitude, power)
     turned = math.pi if sampled.motion.upwards < 0.0 else 0.0
     of_cycle = powers_of_cycle(sampled.phase + turned, power)
@@ -54,9 +56,6 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     harmonics = _harmonics(sampled.phase, difference)
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
-    instant = instant_of(after, effect)
-    if instant is not None:
-        time = instant
     tone = tone_of(after, effect)
     if tone is not None:
         lines, harmonics = (tone,), ()
@@ -125,13 +124,14 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
 def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
     """Return the 95 % interval of the instant at which a sudden effect happens; else None."""
     sudden = any(parameter.name == "time" for parameter in effect.parameters)
-    return _interval_of(fit, effect, "s") if sudden else None
+    found = _last_in(fit, effect, "s") if sudden else None
+    return None if found is None else (found.value - 1.96 * found.sd, found.value + 1.96 * found.sd)
 
 
 def tone_of(fit: Fit, effect: Effect) -> float | None:
     """Return the frequency of a tone, Hz."""
-    interval = _interval_of(fit, effect, "Hz") if effect.spectral else None
-    return None if interval is None else 0.5 * (interval[0] + interval[1])
+    found = _last_in(fit, effect, "Hz") if effect.spectral else None
+    return None if found is None else found.value
 
 
 def off_harmonics(fit: Fit, effect: Effect) -> bool:
@@ -151,26 +151,20 @@ def beat_of(fit: Fit, effect: Effect) -> float | None:
     """
     phase, time = fit.at.sampled.phase, fit.at.sampled.time_s
     own = float(phase[-1] - phase[0]) / float(time[-1] - time[0]) / (2.0 * math.pi)
-    tone = tone_of(fit, effect)
-    if tone is not None:
-        off = abs(tone - own)
-    elif isinstance(effect, PlaneCoupling):
-        detuning = _interval_of(fit, effect, "Hz")
-        off = 0.0 if detuning is None else 0.5 * abs(detuning[0] + detuning[1])
-    else:
+    beside = isinstance(effect, PlaneCoupling)
+    found = _last_in(fit, effect, "Hz") if beside or effect.spectral else None
+    if found is None:
         return None
+    off = abs(found.value if beside else found.value - own)
     return 1.0 / off if 0.0 < off < 0.5 * own else None
 
 
-def _interval_of(fit: Fit, effect: Effect, unit: str) -> tuple[float, float] | None:
-    """Return the 95 % interval of an effect's parameter of that unit."""
+def _last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
+    """Return an effect's last parameter in that unit: instant and frequency follow the sizes."""
     from pendpipe.diagnosis.values import effect_parameters
 
-    # The instant and the frequency follow the sizes.
-    for found in reversed(effect_parameters(fit, effect).values()):
-        if found.unit == unit:
-            return found.value - 1.96 * found.sd, found.value + 1.96 * found.sd
-    return None
+    found = [each for each in effect_parameters(fit, effect).values() if each.unit == unit]
+    return found[-1] if found else None
 
 
 def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) -> str:
@@ -185,10 +179,9 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
             clauses.append(f"between {found.time_s[0]:.4g} and {found.time_s[1]:.4g} s")
         else:
             clauses.append("throughout the record")
-    if found.amplitude_rad is not None:
-        low, high = found.amplitude_rad
-        if high - low < 0.8 * float(np.ptp(amplitude)):
-            clauses.append(f"at amplitudes from {low:.3g} to {high:.3g} {data.unit}")
+    low, high = found.amplitude_rad or (-math.inf, math.inf)
+    if high - low < 0.8 * float(np.ptp(amplitude)):
+        clauses.append(f"at amplitudes from {low:.3g} to {high:.3g} {data.unit}")
     if found.phase_rad is not None:
         low, high = found.phase_rad
         clauses.append(f"at phases from {low:.2f} to {high:.2f} rad of the cycle")
@@ -197,7 +190,7 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
     if found.harmonics:
         names = {0: "the offset", 1: "the fundamental"}
         parts = [names.get(h, f"harmonic {h}") for h in found.harmonics]
-        clauses.append("in " + " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1]))))
+        clauses.append(f"in {listed(parts)}")
     elif found.frequency_hz:
         clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
     return f"it shows {', '.join(clauses)}" if clauses else ""

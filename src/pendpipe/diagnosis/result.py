@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from pendpipe.arrays import BoolArray, FloatArray
+    from pendpipe.diagnosis.cycles import SmallSwings
     from pendpipe.diagnosis.held_out import HeldOut
     from pendpipe.diagnosis.remainder import Remainder
-    from pendpipe.diagnosis.small_swings import SmallSwings
     from pendpipe.estimate import Estimate
 
 FILE_NAME: Final = "diagnosis.json"
@@ -110,9 +110,9 @@ class Confirmation(NamedTuple):
     p_value: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Finding:
-    """The result of one test, whether it found anything or not.
+    """The result of one test, whether it found anything or not; it equals no other.
 
     Parameters
     ----------

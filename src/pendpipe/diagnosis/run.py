@@ -16,17 +16,17 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
-from pendpipe.diagnosis.forensics import lost_samples
+from pendpipe.diagnosis.cycles import SmallSwings, small_swings
+from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.coloured_noise import level_note
-from pendpipe.diagnosis.forensics.time_stamps import gap_note
+from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import released_parameters
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnosis.search import Search, search
-from pendpipe.diagnosis.small_swings import SmallSwings, small_swings
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
@@ -340,7 +340,7 @@ def _checked(effect: FoundEffect, found: Search, samples: Samples) -> FoundEffec
         return effect
     when, period_s = effect.location.time_s, found.improved.at.span.period_s
     at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
-    return replace(effect, confirmed=lost_samples.confirmed(samples, at, period_s))
+    return replace(effect, confirmed=slips.confirmed(samples, at, period_s))
 
 
 def _small_swings(law: Fit, found: Search) -> SmallSwings | None:

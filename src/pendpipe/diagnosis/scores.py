@@ -22,8 +22,8 @@ from pendpipe.diagnosis.refine import Fit, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
-from pendpipe.effects.derivatives import responses
 from pendpipe.effects.effect import Span
+from pendpipe.effects.model import responses
 
 _VISIBLE = 1e-4
 """Part of a derivative that must remain after the projection for the effect to be visible."""

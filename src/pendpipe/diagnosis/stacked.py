@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -78,15 +78,16 @@ class StackedNoise(Noise):
         pairs = zip(self.alone, split(self.weight, self.alone), strict=True)
         return [replace(noise, weight=weight) for noise, weight in pairs]
 
+    def _with(self, columns: FloatArray) -> Iterator[tuple[Noise, FloatArray]]:
+        return zip(self._each(), split(columns, self.alone), strict=True)
+
     def whiten(self, columns: FloatArray) -> FloatArray:
         """Turn readings (or columns of them) into numbers of unit variance, shape kept."""
-        pairs = zip(self._each(), split(columns, self.alone), strict=True)
-        return np.concatenate([noise.whiten(part) for noise, part in pairs])
+        return np.concatenate([noise.whiten(part) for noise, part in self._with(columns)])
 
     def adjoint(self, columns: FloatArray) -> FloatArray:
         """Apply the transpose of `whiten`."""
-        pairs = zip(self._each(), split(columns, self.alone), strict=True)
-        return np.concatenate([noise.adjoint(part) for noise, part in pairs])
+        return np.concatenate([noise.adjoint(part) for noise, part in self._with(columns)])
 
     @property
     def scale(self) -> FloatArray:

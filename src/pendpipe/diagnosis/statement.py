@@ -12,10 +12,10 @@ from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
 
 if TYPE_CHECKING:
+    from pendpipe.diagnosis.cycles import SmallSwings
     from pendpipe.diagnosis.held_out import HeldOut
     from pendpipe.diagnosis.remainder import Remainder
     from pendpipe.diagnosis.result import FittedModel, FoundEffect
-    from pendpipe.diagnosis.small_swings import SmallSwings
 
 _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""
@@ -157,7 +157,7 @@ def _effect(effect: FoundEffect) -> str:
             f"{name} ({_percent(p)})" for p, name in sorted(all_, reverse=True) if p > _IMPROBABLE
         ]
         missing = "Missing" if sum(p for p, _ in all_) > _PROBABLE else "Possibly missing"
-        text = f"{missing} from the model: {_listed(of, 'or')}"
+        text = f"{missing} from the model: {listed(of, 'or')}"
         lead = f"{text}, which this recording alone cannot distinguish"
         facts, rivals = [], ()
     else:
@@ -184,13 +184,13 @@ def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
     first = effects[0]
     described = [each.name for each in effects]
     what = "The rest of the misfit" if rest else "The misfit"
-    text = f"{what} has no certain cause; it is described best by {_listed(described, 'and')}"
+    text = f"{what} has no certain cause; it is described best by {listed(described)}"
     if len(effects) == 1 and first.indistinguishable:
         others = [_rival(name) for name, _ in first.indistinguishable]
-        text += f", and almost as well by {_listed(others, 'or')}"
+        text += f", and almost as well by {listed(others, 'or')}"
         if max(p for _, p in first.indistinguishable) > first.probability:
             text = f"{what} has no certain cause; any of these describes it: "
-            text += _listed([*others, *described], "or")
+            text += listed([*others, *described], "or")
     return f"{text}. " + _ended(f"What to measure next: {effects[0].discriminating_test}")
 
 
@@ -210,10 +210,10 @@ def _rivals(rivals: Sequence[tuple[str, float]]) -> list[str]:
     others = [_rival(name) for name, p in rivals if p <= _IMPROBABLE]
     said = []
     if probable:
-        said.append(f"This recording alone cannot distinguish it from {_listed(probable, 'or')}.")
+        said.append(f"This recording alone cannot distinguish it from {listed(probable, 'or')}.")
     if others:
         less = "is less probable than 1 %" if len(others) == 1 else "each is less probable than 1 %"
-        fits = f"{_capital(_listed(others, 'or'))} would fit almost as well"
+        fits = f"{_capital(listed(others, 'or'))} would fit almost as well"
         said.append(f"{fits}, but {less}.")
     return said
 
@@ -253,14 +253,14 @@ def _changes(
             changed.append(f"the {name} from {_like(old, new)} to {new}")
         else:
             kept.append(f"the {name} at {new}, within its error")
-    parts = [f"changes {_listed(changed, 'and')}"] if changed else []
-    parts += [f"leaves {_listed(kept, 'and')}"] if kept else []
+    parts = [f"changes {listed(changed)}"] if changed else []
+    parts += [f"leaves {listed(kept)}"] if kept else []
     moved = [
         f"{_PARAMETERS[name]} {_like(before[name], new)} instead of {new}"
         for name, new in after.items()
         if name in _PARAMETERS and _biased(before[name], new)
     ]
-    text = f"This {_listed(parts, 'and')}." if parts else ""
+    text = f"This {listed(parts)}." if parts else ""
     if moved:
         without = "it" if number == 1 else "them"
         text += f" Without {without} the fit is biased: {'; '.join(moved)}."
@@ -335,7 +335,7 @@ def _rival(identifier: str) -> str:
     return by_identifier(identifier).name
 
 
-def _listed(items: Sequence[str], last: str) -> str:
+def listed(items: Sequence[str], last: str = "and") -> str:
     """Join items to "x, y and z"."""
     if len(items) < 2:
         return "".join(items)

@@ -1,9 +1,9 @@
-"""The baseline and any effects of the catalogue, as one model of the readings."""
+"""The baseline and any effects as one model of the readings, and what its values do to them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Self
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow, rates
 from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects.baseline import (
     BASELINE,
@@ -19,14 +19,18 @@ from pendpipe.effects.baseline import (
     LOW,
     OFFSET,
     OMEGA,
+    SHARE,
     START,
     TIME,
+    A,
     B,
+    C,
     closed_form,
     held_indices,
     pendulum_of,
     with_parts,
 )
+from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
 
 if TYPE_CHECKING:
@@ -59,22 +63,20 @@ class Evaluated:
     def after_kicks(self, kicks: Sequence[Kick | None]) -> FloatArray:
         """Change of the readings by each of several small kicks, shape (kicks, n)."""
         change = np.zeros((len(kicks), len(self.reading)))
-        rows = [row for row, kick in enumerate(kicks) if kick is not None and kick.acts]
-        acting = [kick for kick in kicks if kick is not None and kick.acts]
+        acting = {row: kick for row, kick in enumerate(kicks) if kick is not None and kick.acts}
         if not acting:
             return change
-        instants = np.array([kick.time_s for kick in acting])
+        instants = np.array([kick.time_s for kick in acting.values()])
         there = sample_motion(self.tangent.motion, instants)
-        log, late = kick_sizes(there, acting, there)
+        log, late = kick_sizes(there, list(acting.values()), there)
         node_log, node_time, by_log, by_time = self._start
         then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
         scale = log / then_log
-        sampled = self.sampled
-        first = np.searchsorted(sampled.time_s, instants, side="right")
-        angle, velocity = sampled.angle, sampled.velocity
+        first = np.searchsorted(self.sampled.time_s, instants, side="right")
+        angle, velocity = self.sampled.angle, self.sampled.velocity
         grown, slowed = angle * by_log, velocity * by_time
         for row, start, size, moved, rest in zip(
-            rows, first, scale, late, then_time * scale, strict=True
+            acting, first, scale, late, then_time * scale, strict=True
         ):
             # Nothing before the instant.
             change[row, start:] = size * (grown[start:] - slowed[start:])
@@ -188,14 +190,13 @@ class Model:
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest values."""
-        low, high = list(LOW), list(HIGH)
-        low[B] = sum(self.held_parts().values())
         duration = float(self.time_s[-1] - self.time_s[0])
+        limits = [*zip(LOW, HIGH, strict=True)]
         for effect in self.effects:
-            for lowest, highest in effect.bounds(duration):
-                low.append(lowest)
-                high.append(highest)
-        return np.array(low), np.array(high)
+            limits += effect.bounds(duration)
+        low, high = np.array(limits).T.copy()
+        low[B] = sum(self.held_parts().values())
+        return low, high
 
     def held(self) -> list[int]:
         """Indices that are never fitted: sizes of switches, and what held parts of b settle."""
@@ -231,9 +232,21 @@ class Model:
     def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
         """Return x'' + omega^2 x of the baseline and of all effects."""
         pendulum = self.pendulum(value)
-        total = pendulum.acceleration(motion)
+        return self._added(
+            pendulum.acceleration(motion),
+            value,
+            lambda effect, own: effect.acceleration(motion, pendulum, own),
+        )
+
+    def _added(
+        self,
+        total: FloatArray,
+        value: FloatArray,
+        of: Callable[[Effect, FloatArray], FloatArray | None],
+    ) -> FloatArray:
+        """Return a total with what each effect adds to it by its own values."""
         for effect, place in self.places():
-            extra = effect.acceleration(motion, pendulum, value[place])
+            extra = of(effect, value[place])
             if extra is not None:
                 total = total + extra
         return total
@@ -328,12 +341,7 @@ class Model:
 
     def taken_at(self, value: FloatArray) -> FloatArray:
         """When the readings are really taken, shape (n,)."""
-        times = self.time_s
-        for effect, place in self.places():
-            delay = effect.delay(self.time_s, value[place])
-            if delay is not None:
-                times = times + delay
-        return times
+        return self._added(self.time_s, value, lambda effect, own: effect.delay(self.time_s, own))
 
     def read(self, sampled: Sampled, value: FloatArray) -> FloatArray:
         """What the sensor makes of the sampled motion, shape (n,)."""
@@ -344,11 +352,9 @@ class Model:
             # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
             bent = sampled.at_nodes(self.acceleration(sampled.motion, value))
             reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * bent
-        for effect, place in self.places():
-            extra = effect.reading(sampled, pendulum, value[place])
-            if extra is not None:
-                reading = reading + extra
-        return reading
+        return self._added(
+            reading, value, lambda effect, own: effect.reading(sampled, pendulum, own)
+        )
 
     def _averaging(self, value: FloatArray) -> float:
         """What a mean over `fold` neighbouring readings leaves of the fundamental."""
@@ -360,3 +366,134 @@ class Model:
     def reading(self, value: FloatArray) -> FloatArray:
         """Return the readings alone, shape (n,)."""
         return self.evaluate(value).reading
+
+
+_AT_ONCE: Final = 4
+
+
+def responses(
+    effect: Effect,
+    changes: Sequence[tuple[FloatArray, FloatArray]],
+    at: Evaluated,
+    pendulum: Pendulum,
+) -> FloatArray:
+    """Change of the readings when an effect's values go from the first of each pair to the second.
+
+    Returns
+    -------
+    FloatArray
+        Shape (changes, n).
+    """
+    if at.parts:
+        return np.concatenate([part.responses(effect, changes) for part in at.parts], axis=1)
+    sampled, tangent = at.sampled, at.tangent
+    total = np.zeros((len(changes), len(sampled.time_s)))
+    found = [
+        _change(effect, *pair, lambda values: effect.acceleration(tangent.motion, pendulum, values))
+        for pair in changes
+    ]
+    forces = [force for force in found if force is not None]
+    # A few at a time stay in the processor's cache.
+    for first in range(0, len(forces), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        total[part] += sampled.change(*tangent.of_force(np.stack(forces[part])))
+    if effect.kick(changes[0][1]) is not None:
+        total += at.after_kicks([effect.kick(high) for _, high in changes])
+        total -= at.after_kicks([effect.kick(low) for low, _ in changes])
+    for change, pair in zip(total, changes, strict=True):
+        added = _change(effect, *pair, lambda values: effect.reading(sampled, pendulum, values))
+        late = _change(effect, *pair, lambda values: effect.delay(sampled.time_s, values))
+        change += 0.0 if added is None else added
+        change += 0.0 if late is None else sampled.velocity * late
+    return total
+
+
+def _change(
+    effect: Effect,
+    low: FloatArray,
+    high: FloatArray,
+    what: Callable[[FloatArray], FloatArray | None],
+) -> FloatArray | None:
+    """By how much something changes with the values; None where the effect leaves it alone.
+
+    What is absent at `low`, with all its sizes zero, need not be asked there.
+    """
+    after = what(high)
+    if after is None or not np.any(low[: effect.sizes]):
+        return after
+    before = what(low)
+    return after if before is None else np.asarray(after - before)
+
+
+def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
+    """Derivatives of the readings by all values, shape (n, size)."""
+    if at.parts:
+        return np.concatenate([part.own @ part.mixing for part in at.parts])
+    sampled, tangent = at.sampled, at.tangent
+    pendulum = model.pendulum(value)
+    columns = np.empty((len(model.time_s), model.size))
+    losses = [A, B, C, SHARE]
+    columns[:, losses] = sampled.change(
+        *tangent.of_force(np.stack([_by_loss(model, value, at, index) for index in losses]))
+    ).T
+    columns[:, OMEGA] = _by_omega(model, value, at)
+    columns[:, START] = at.by_start() / value[START]
+    columns[:, TIME] = -sampled.velocity
+    columns[:, OFFSET] = 1.0
+    for effect, place in model.places():
+        if isinstance(effect, Curve):
+            columns[:, place] = _by_coefficients(effect, at, pendulum).T
+            continue
+        for index in range(effect.count):
+            columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
+    return columns
+
+
+def _by_coefficients(curve: Curve, at: Evaluated, pendulum: Pendulum) -> FloatArray:
+    """Derivatives by a curve's values, shape (values, n): it is linear in them."""
+    small = curve.small(at.span)
+    none = np.zeros(curve.count)
+    one_each = [(none, row) for row in small * np.eye(curve.count)]
+    return responses(curve, one_each, at, pendulum) / small
+
+
+def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> FloatArray:
+    """Derivative of the acceleration by one of the baseline's losses; it is linear in them."""
+    moved = value.copy()
+    moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
+    motion = at.tangent.motion
+    change = model.acceleration(motion, moved) - model.acceleration(motion, value)
+    return np.asarray(change / (moved[index] - value[index]))
+
+
+def _by_omega(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
+    motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
+    moved = value.copy()
+    moved[OMEGA] += step
+    other = Motion(
+        motion.clock, float(moved[OMEGA]), motion.log_amplitude, motion.time_s, motion.upwards
+    )
+    new = rates(lambda m: model.acceleration(m, moved), other)
+    old = at.tangent.rates
+    loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
+    return at.sampled.change(*at.tangent.of_rates(loss, pace))
+
+
+def _derivative(
+    effect: Effect, values: FloatArray, index: int, at: Evaluated, pendulum: Pendulum
+) -> FloatArray:
+    """Derivative of the readings by one value of one effect, along the motion."""
+    low, high = values.copy(), values.copy()
+    step = _step(effect, values, index, at.span)
+    low[index] -= step
+    high[index] += step
+    return np.asarray(responses(effect, [(low, high)], at, pendulum)[0] / (2.0 * step))
+
+
+def _step(effect: Effect, values: FloatArray, index: int, span: Span) -> float:
+    if index < effect.sizes:
+        return max(effect.small(span), 1e-4 * abs(float(values[index])))
+    if effect.parameters[index - effect.parameter_free].name == "time":
+        # Over several readings, or the one that is crossed decides.
+        return min(2.0 * span.interval_s, 0.0625 * span.period_s)
+    return max(1e-4 * abs(float(values[index])), 1e-9)

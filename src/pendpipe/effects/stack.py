@@ -19,9 +19,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
-from pendpipe.effects.derivatives import jacobian, responses
 from pendpipe.effects.effect import Effect, Parameter, Span
-from pendpipe.effects.model import Evaluated, Model
+from pendpipe.effects.model import Evaluated, Model, jacobian, responses
 
 MAY_DIFFER: Final = {"a": A, "b": B, "c": C, "frequency": OMEGA}
 """What the recordings of one pendulum share, unless it was changed between them."""

@@ -16,10 +16,9 @@ from pendpipe.diagnosis.forensics import (
     coloured_noise,
     converter,
     glitches,
-    jitter,
-    time_stamps,
+    sampling_times,
 )
-from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples
+from pendpipe.diagnosis.forensics.slips import LostSamples, find_lost_samples
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding
@@ -27,12 +26,12 @@ from pendpipe.diagnosis.result import Finding
 Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
 TESTS: Final[dict[str, Test]] = {
-    "time-stamps": time_stamps.find_irregular,
+    "time-stamps": sampling_times.find_irregular,
     "clipping": clipping.find,
     "glitches": glitches.find,
     "missing-codes": converter.find_missing_codes,
     "coarse-quantisation": converter.find_coarse_steps,
-    "jitter": jitter.find,
+    "jitter": sampling_times.find_jitter,
     "coloured-noise": coloured_noise.find,
     "broadband-drive": broadband_drive.find,
 }

@@ -145,18 +145,15 @@ def local_residual(
         Readings that may not take part in the fits, shape (n,).
     """
     part = used if leave_out is None else used & ~leave_out
-    window = _windows(phase)
-    columns = _columns(phase, window, harmonics=1)
-    local = _fitted(columns, window, values, part, used)
-    far = np.abs(local.scaled) > _OUTLIER_SD
-    if far.any():
-        local = _fitted(columns, window, values, part & ~far, used)
-    if _has_harmonics(phase, window, local, part & ~far):
-        columns = _columns(phase, window, harmonics=3)
+    window, far = _windows(phase), np.zeros(len(phase), dtype=bool)
+    for harmonics in (1, 3):
+        columns = _columns(phase, window, harmonics)
         local = _fitted(columns, window, values, part & ~far, used)
         again = np.abs(local.scaled) > _OUTLIER_SD
         if np.any(again != far):
-            local = _fitted(columns, window, values, part & ~again, used)
+            far, local = again, _fitted(columns, window, values, part & ~again, used)
+        if not _has_harmonics(phase, window, local, part & ~far):
+            break
     return local
 
 

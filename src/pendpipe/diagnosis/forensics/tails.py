@@ -26,7 +26,6 @@ _NODES: Final = 9
 """Gauss-Legendre nodes for the rounding error."""
 _LEAST_NOISE: Final = 0.05
 """Least part of the variance that the noise before rounding has at the start."""
-_NEWTON_ROUNDS: Final = 60
 
 
 def upper_tail(sd: float) -> float:
@@ -180,26 +179,19 @@ def tail_of_squares(total: float, weight: FloatArray) -> float:
 
 def _saddlepoint(total: float, weight: FloatArray) -> float:
     """Find the saddlepoint: there the cumulant generating function has the derivative `total`."""
-    high_weight, low_weight = float(weight.max()), float(weight.min())
-    high = 0.5 / high_weight if high_weight > 0.0 else math.inf
-    low = 0.5 / low_weight if low_weight < 0.0 else -math.inf
-    tilt = 0.0
-    for _ in range(_NEWTON_ROUNDS):
-        left = 1.0 - 2.0 * tilt * weight
-        excess = float(np.sum(weight / left)) - total
-        if excess > 0.0:
-            high = tilt
-        else:
-            low = tilt
-        step = excess / (2.0 * float(np.sum((weight / left) ** 2)))
-        trial = tilt - step
-        if not low < trial < high:
-            # Newton's step leaves the possible range: bisect it.
-            if math.isinf(low) or math.isinf(high):
-                trial = 2.0 * tilt - math.copysign(1.0 / (abs(weight).max()), excess)
-            else:
-                trial = 0.5 * (low + high)
-        if abs(trial - tilt) < 1e-12 * max(abs(trial), 1e-3 / abs(weight).max()):
-            return trial
-        tilt = trial
-    return tilt
+    from scipy.optimize import brentq
+
+    # The derivative, which rises, is infinite at both ends where there are weights of that sign;
+    # else it falls to zero at least as 1/tilt.
+    size = abs(total) + float(np.abs(weight).sum())
+    most, least = float(weight.max()), float(weight.min())
+    high = 0.5 / most - 0.25 / size if most > 0.0 else -0.5 * len(weight) / total
+    low = 0.5 / least + 0.25 / size if least < 0.0 else -0.5 * len(weight) / total
+    return float(
+        brentq(
+            lambda tilt: float(np.sum(weight / (1.0 - 2.0 * tilt * weight))) - total,
+            low,
+            high,
+            xtol=1e-13 * (high - low),
+        )
+    )
