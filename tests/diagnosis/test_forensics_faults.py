@@ -340,7 +340,7 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
 ) -> None:
     """After a loss longer than the motion there is nothing to compare: the record stays."""
     fit, data, noise = null_fit()
-    late = LostSamples(float(data.time_s[-20]), 10**9, 1e9, 1.0)
+    late = LostSamples(float(data.time_s[-20]), 10**9, 1e9)
     monkeypatch.setattr("pendpipe.diagnosis.faults.find_lost_samples", lambda *_: [late])
     state = State(fit, data, noise, [], fit.value, fit.value)
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")

@@ -17,8 +17,8 @@ from pendpipe.dynamics.any_law import NoMotionError
 
 _BLOCK_CYCLES: Final = 10
 _FOLDS: Final = 2
-_PRECISE: Final = 1e-8
-"""Square of the relative error to which missing readings are filled in."""
+_PRECISE: Final = 1e-4
+"""Relative error to which missing readings are filled in."""
 _MOST_STEPS: Final = 400
 
 
@@ -159,17 +159,12 @@ def _squared_error(
 
 def completed(residual: FloatArray, noise: Noise, missing: BoolArray) -> FloatArray:
     """Replace missing numbers by their mean, given the others (by conjugate gradients)."""
-    found = np.where(missing, 0.0, residual)
-    left = np.where(missing, -noise.adjoint(noise.whiten(found)), 0.0)
-    way, size = left.copy(), float(left @ left)
-    enough = _PRECISE * size
-    for _ in range(_MOST_STEPS):
-        if size <= enough:
-            break
-        curvature = np.where(missing, noise.adjoint(noise.whiten(way)), 0.0)
-        step = size / float(way @ curvature)
-        found += step * way
-        left -= step * curvature
-        last, size = size, float(left @ left)
-        way = left + size / last * way
-    return found
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    def weighted(column: FloatArray) -> FloatArray:
+        return np.where(missing, noise.adjoint(noise.whiten(column)), 0.0)
+
+    known, shape = np.where(missing, 0.0, residual), (len(residual), len(residual))
+    operator = LinearOperator(shape, matvec=weighted, dtype=np.float64)
+    filled, _ = cg(operator, -weighted(known), rtol=_PRECISE, maxiter=_MOST_STEPS)
+    return np.asarray(known + filled)

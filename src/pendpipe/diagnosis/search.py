@@ -10,11 +10,11 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnosis import Progress, silent
+from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_noise
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Detection, more_leads
-from pendpipe.diagnosis.drift_or_red_noise import reconsider_red_noise
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
@@ -35,7 +35,6 @@ from pendpipe.diagnosis.remainder import Remainder, remainder_of
 from pendpipe.diagnosis.result import BASELINES
 from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross, loses_phase
 from pendpipe.diagnosis.task import Task, undrawn
-from pendpipe.diagnosis.wrong_parameters import prefer_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C

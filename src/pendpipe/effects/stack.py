@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
@@ -149,14 +149,14 @@ class Stack(Model):
     members
         Each recording's model, the effects of all in it.
     base
-        Each recording's values (the baseline's, and of what happened in it alone) by the first
-        values of all; a one in each row.
+        Where each recording's values (the baseline's, and of what happened in it alone) stand among
+        the first values of all.
     same_sensor
         Whether errors of the sensor have the same sizes in all.
     """
 
     members: tuple[Model, ...] = ()
-    base: tuple[FloatArray, ...] = ()
+    base: tuple[IntArray, ...] = ()
     same_sensor: bool = False
 
     @classmethod
@@ -171,15 +171,19 @@ class Stack(Model):
             here[fresh] = count + np.arange(len(fresh))
             places.append(here)
             count += len(fresh)
-        base = tuple(np.eye(count)[here] for here in places)
         time_s = np.concatenate([member.time_s for member in members])
-        interval_s = members[0].interval_s
-        return cls(time_s, interval_s, members=tuple(members), base=base, same_sensor=same_sensor)
+        return cls(
+            time_s,
+            members[0].interval_s,
+            members=tuple(members),
+            base=tuple(places),
+            same_sensor=same_sensor,
+        )
 
     @property
     def first(self) -> int:
         """Where the values of effects begin."""
-        return int(self.base[0].shape[1])
+        return 1 + max(int(base.max()) for base in self.base)
 
     def admitted(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return what may be common: no instant, no tone, nothing drawn against the time.
@@ -234,7 +238,7 @@ class Stack(Model):
         found = []
         for number, (member, base) in enumerate(zip(self.members, self.base, strict=True)):
             matrix = np.zeros((member.size, self.size))
-            matrix[: len(base), : self.first] = base
+            matrix[np.arange(len(base)), base] = 1.0
             places = {id(effect): place for effect, place in member.places()}
             for effect, place in self.places():
                 rows = slice(None) if isinstance(effect, Differs) else places[id(_single(effect))]
@@ -247,7 +251,7 @@ class Stack(Model):
         ends = [np.zeros(self.size), np.zeros(self.size)]
         for member, base in zip(self.members, self.base, strict=True):
             for end, own in zip(ends, member.bounds(), strict=True):
-                end[np.argmax(base, axis=1)] = own[: len(base)]
+                end[base] = own[: len(base)]
         duration = max(float(np.ptp(member.time_s)) for member in self.members)
         for effect, place in self.places():
             ends[0][place], ends[1][place] = np.array(effect.bounds(duration)).T
@@ -260,7 +264,7 @@ class Stack(Model):
     def held_of(self, own: Sequence[Sequence[int]]) -> list[int]:
         """Return where values stand that each recording holds, of those before the effects'."""
         pairs = zip(self.base, own, strict=True)
-        return [base[k].tolist().index(1.0) for base, held in pairs for k in held if k < len(base)]
+        return [int(base[k]) for base, held in pairs for k in held if k < len(base)]
 
     def evaluate(self, value: FloatArray) -> Evaluated:
         """Return the readings of all, one recording after the other."""

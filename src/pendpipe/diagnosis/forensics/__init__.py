@@ -12,7 +12,6 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import (
     broadband_drive,
-    clipping,
     coloured_noise,
     converter,
     glitches,
@@ -27,7 +26,7 @@ Test = Callable[[Data, Fit, Noise, Samples], Finding]
 
 TESTS: Final[dict[str, Test]] = {
     "time-stamps": sampling_times.find_irregular,
-    "clipping": clipping.find,
+    "clipping": converter.find_clipping,
     "glitches": glitches.find,
     "missing-codes": converter.find_missing_codes,
     "coarse-quantisation": converter.find_coarse_steps,

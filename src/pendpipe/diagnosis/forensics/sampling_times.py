@@ -39,14 +39,6 @@ _LARGEST_BLUR: Final = 0.15
 """Error of the angles in steps above which the rounding errors are unknown."""
 
 
-class Stamps(NamedTuple):
-    """Time stamps and a regular clock; shape (n,)."""
-
-    even_s: FloatArray
-    off_s: FloatArray
-    interval_s: float
-
-
 def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
     """Describe the gaps of the time stamps in one line; None if there are none.
 
@@ -88,17 +80,19 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     are better.
     """
     identifier = "time-stamps"
-    stamps = None if data.time_noise else regular_clock(data.time_s)
-    if stamps is None or data.used < 60:
+    clock = None if data.time_noise else regular_clock(data.time_s)
+    if clock is None or data.used < 60:
         return nothing(identifier)
+    even_s, interval_s = clock
+    off_s = data.time_s - even_s
     sampled, used = fit.at.sampled, data.weight > 0.0
     local = local_residual(sampled.phase, residual_of(data, fit), used)
-    wave = local_residual(sampled.phase, -sampled.velocity * stamps.off_s, used).left
+    wave = local_residual(sampled.phase, -sampled.velocity * off_s, used).left
     size = float(wave @ wave)
     if size <= 1e-6 * local.rms**2:
         return nothing(identifier)
     share, sd = float(wave @ local.left) / size, local.rms / math.sqrt(size)
-    rms = float(np.std(stamps.off_s))
+    rms = float(np.std(off_s))
     return Finding(
         identifier,
         upper_tail(share / sd),
@@ -106,17 +100,23 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
         {
             "share": Estimate(share, sd, ""),
             "unevenness": Estimate(rms, rms / math.sqrt(2.0 * len(data)), "s"),
-            "interval": Estimate(stamps.interval_s, rms / len(data), "s"),
+            "interval": Estimate(interval_s, rms / len(data), "s"),
         },
         Location.over(data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi)),
-        time_s=stamps.even_s if share > 3.0 * sd and share > 0.5 else None,
+        time_s=even_s if share > 3.0 * sd and share > 0.5 else None,
         summary=f"the time stamps are irregular by {rms:.2g} s and the readings are not: they were"
-        f" taken every {stamps.interval_s:.6g} s",
+        f" taken every {interval_s:.6g} s",
     )
 
 
-def regular_clock(time_s: FloatArray) -> Stamps | None:
-    """Fit a regular clock to time stamps; None if there is none, or no difference."""
+def regular_clock(time_s: FloatArray) -> tuple[FloatArray, float] | None:
+    """Fit a regular clock to time stamps; None if there is none, or no difference.
+
+    Returns
+    -------
+    even_s, interval_s
+        Its time at each stamp, and the interval of its ticks.
+    """
     intervals = np.diff(time_s)
     usual = float(np.median(intervals))
     if usual <= 0.0:
@@ -127,13 +127,10 @@ def regular_clock(time_s: FloatArray) -> Stamps | None:
         number = np.round((time_s - start) / slope)
     if np.any(np.diff(number) < 1.0):
         return None
-    off = time_s - (start + slope * number)
-    if (
-        float(np.mean(np.abs(off) > _LARGEST_DEVIATION * slope)) > 0.05
-        or float(np.std(off)) < _IRREGULAR * slope
-    ):
-        return None
-    return Stamps(np.asarray(start + slope * number), np.asarray(off), float(slope))
+    even_s = np.asarray(start + slope * number)
+    off = time_s - even_s
+    far = float(np.mean(np.abs(off) > _LARGEST_DEVIATION * slope)) > 0.05
+    return None if far or float(np.std(off)) < _IRREGULAR * slope else (even_s, float(slope))
 
 
 class Squares(NamedTuple):

@@ -68,14 +68,13 @@ class LostSamples(NamedTuple):
         The time stamp of the first reading after the loss.
     number
         How many; negative where samples were doubled.
-    measured, sd
-        The step of the phase in intervals, and its standard deviation.
+    measured
+        The step of the phase, in intervals.
     """
 
     time_s: float
     number: int
     measured: float
-    sd: float
 
 
 def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
@@ -119,8 +118,7 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
             break
         at = int(np.argmax(np.where(significant, np.abs(step) / error, 0.0)))
         when = _instant(data, fit, phase, centre, at + 1)
-        measured, sd = float(step[at] / interval), float(error[at] / interval)
-        found.append(LostSamples(when, int(number[at]), measured, sd))
+        found.append(LostSamples(when, int(number[at]), float(step[at] / interval)))
         rest[at + 2 :] -= number[at] * interval
         # The cycle in which it happened has an intermediate phase.
         rest[at + 1] = 0.5 * (rest[at] + rest[at + 2])

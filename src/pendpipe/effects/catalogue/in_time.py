@@ -35,13 +35,9 @@ from pendpipe.effects.scan import (
 
 def tone_at(cosine: float, sine: float, phase: FloatArray) -> FloatArray:
     """Return q_c cos(phase) + q_s sin(phase)."""
-    total = np.zeros_like(phase)
     # A scan asks for one quadrature at a time.
-    if cosine != 0.0:
-        total += cosine * np.cos(phase)
-    if sine != 0.0:
-        total += sine * np.sin(phase)
-    return total
+    asked = ((cosine, np.cos), (sine, np.sin))
+    return sum((size * wave(phase) for size, wave in asked if size), np.zeros_like(phase))
 
 
 def tried_frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
