@@ -43,18 +43,12 @@ def find_step(values: FloatArray) -> float | None:
     gaps = gaps[gaps > 1e-7 * (levels[-1] - levels[0])]
     if gaps.size < 2:
         return None
-    step = _middle(np.sort(gaps[gaps < 1.5 * gaps.min()]))
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
     ratio = gaps / step
     ratio = ratio[ratio < 50.0]
     if np.abs(ratio - np.round(ratio)).max() > 0.1:
         return None
     return step
-
-
-def _middle(ascending: FloatArray) -> float:
-    """The median of sorted numbers."""
-    half = len(ascending) // 2
-    return 0.5 * float(ascending[half] + ascending[-1 - half])
 
 
 def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float = 0.5) -> float:

@@ -14,24 +14,21 @@ from pendpipe.dynamics.layout import DEGREE
 
 def lobatto_nodes(degree: int) -> FloatArray:
     """Return the nodes from -1 to 1, shape (degree + 1,)."""
-    return np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
+    return np.asarray(chebyshev.chebpts2(degree + 1))
 
 
-def lobatto_analysis(degree: int) -> FloatArray:
-    """Return the matrix that turns values at the nodes into Chebyshev coefficients."""
-    index = np.arange(degree + 1)
-    ends = np.where((index == 0) | (index == degree), 0.5, 1.0)
-    # The nodes ascend, z_j = -cos(pi j/n), hence the sign (-1)^k.
-    cosines = np.cos(np.pi * np.outer(index, index) / degree) * (-1.0) ** index[:, None]
-    return np.asarray(2.0 / degree * ends[:, None] * cosines * ends[None, :])
+def analysis(nodes: FloatArray) -> FloatArray:
+    """Return the matrix that turns values at Chebyshev's points into Chebyshev coefficients."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes, len(nodes) - 1)))
 
 
 def lobatto_integration(degree: int) -> FloatArray:
     """Return the matrix that integrates from -1 to each node."""
     integral = chebyshev.chebint(np.eye(degree + 1), lbnd=-1.0, axis=0)
-    matrix = chebyshev.chebvander(lobatto_nodes(degree), degree + 1) @ integral
+    nodes = lobatto_nodes(degree)
+    matrix = chebyshev.chebvander(nodes, degree + 1) @ integral
     matrix[0] = 0.0
-    return np.asarray(matrix @ lobatto_analysis(degree))
+    return np.asarray(matrix @ analysis(nodes))
 
 
 def powers_of_chebyshev(count: int) -> FloatArray:
@@ -42,22 +39,9 @@ def powers_of_chebyshev(count: int) -> FloatArray:
     return rows
 
 
-def gauss_nodes(count: int) -> FloatArray:
-    """Return the `count` Chebyshev points inside -1 to 1, at which a table is made."""
-    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
-
-
-def gauss_analysis(count: int) -> FloatArray:
-    """Return the matrix that turns values at `gauss_nodes` into Chebyshev coefficients."""
-    angles = np.pi * np.outer(np.arange(count), np.arange(count) + 0.5) / count
-    matrix = 2.0 / count * np.cos(angles)
-    matrix[0] *= 0.5
-    return np.ascontiguousarray(matrix)
-
-
 NODES: FloatArray = lobatto_nodes(DEGREE)
 # Transposed, so that a product runs along contiguous columns.
-ANALYSIS_T: FloatArray = np.ascontiguousarray(lobatto_analysis(DEGREE).T)
+ANALYSIS_T: FloatArray = np.ascontiguousarray(analysis(NODES).T)
 INTEGRATION_T: FloatArray = np.ascontiguousarray(lobatto_integration(DEGREE).T)
 POWERS_T: FloatArray = np.ascontiguousarray(ANALYSIS_T @ powers_of_chebyshev(DEGREE + 1))
 """Values at the nodes to the coefficients of 1, z, ..., z^16 (transposed)."""

@@ -9,7 +9,7 @@ from numpy.polynomial import chebyshev
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
-from pendpipe.dynamics.chebyshev import lobatto_analysis, lobatto_nodes
+from pendpipe.dynamics.chebyshev import analysis, lobatto_nodes
 
 _POINTS: Final = 24
 """Of each Gauss quadrature over a half cycle; all integrands are smooth."""
@@ -88,16 +88,17 @@ def _gauss() -> tuple[FloatArray, FloatArray]:
 def _between(order: int, where: str) -> tuple[FloatArray, FloatArray]:
     """Matrices that turn values at the nodes into values and slopes by u at the quadrature's."""
     u, _ = _gauss()
-    nodes = 0.5 + 0.5 * lobatto_nodes(order)
+    ends = lobatto_nodes(order)
+    nodes = 0.5 + 0.5 * ends
     at = {
         "within": (nodes[1:, None] * (1.0 - u * u)).ravel(),
         "before": 1.0 - u * u,
         "even": u,
     }[where]
-    analysis = lobatto_analysis(order)
-    slopes = chebyshev.chebder(analysis, axis=0)
+    coefficients = analysis(ends)
+    slopes = chebyshev.chebder(coefficients, axis=0)
     z = 2.0 * at - 1.0
     return (
-        np.asarray(chebyshev.chebvander(z, order) @ analysis).T,
+        np.asarray(chebyshev.chebvander(z, order) @ coefficients).T,
         2.0 * np.asarray(chebyshev.chebvander(z, order - 1) @ slopes).T,
     )

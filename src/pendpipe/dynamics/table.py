@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+from numpy.polynomial.chebyshev import chebpts1
+
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.chebyshev import gauss_analysis, gauss_nodes, powers_of_chebyshev
+from pendpipe.dynamics.chebyshev import analysis, powers_of_chebyshev
 from pendpipe.dynamics.half_cycle import even_half_cycle
 from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.dynamics.layout import FEW_POINTS, MOST_POINTS, TABLE, Work
@@ -35,8 +37,8 @@ _EXCESS_TOLERANCE = 1e-11
 _LOW_POWERS = 4
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
-_FEW_NODES, _MANY_NODES = gauss_nodes(FEW_POINTS), gauss_nodes(MOST_POINTS)
-_FEW_ANALYSIS, _MANY_ANALYSIS = gauss_analysis(FEW_POINTS), gauss_analysis(MOST_POINTS)
+_FEW_NODES, _MANY_NODES = chebpts1(FEW_POINTS), chebpts1(MOST_POINTS)
+_FEW_ANALYSIS, _MANY_ANALYSIS = analysis(_FEW_NODES), analysis(_MANY_NODES)
 
 # Entries of a segment's description.
 LOW, HIGH, MIDDLE, INVERSE, POINTS, PANELS = range(6)
@@ -132,12 +134,12 @@ def _interpolate(
         least = min(least, rows[i, 0])
     resolved = True
     scratch = rows[MOST_POINTS]
-    analysis = _MANY_ANALYSIS if points == MOST_POINTS else _FEW_ANALYSIS
+    own = _MANY_ANALYSIS if points == MOST_POINTS else _FEW_ANALYSIS
     for k in range(points):
         for j in range(width):
             scratch[j] = 0.0
         for i in range(points):
-            weight = analysis[k, i]
+            weight = own[k, i]
             for j in range(width):
                 scratch[j] += weight * rows[i, j]
         if k >= points - 2:
