@@ -24,7 +24,7 @@ from pendpipe.analysis.fit.least_squares import (
 from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.shape import loss_rates
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude_and_gradient
@@ -550,7 +550,6 @@ class Coefficient(NamedTuple):
 class LawStart(NamedTuple):
     """Eq. 8 with one torque, from half periods and energies; the motion itself is not fitted."""
 
-    restoring: Restoring
     rates: FloatArray
     """a, b, c of Eq. 13, shape (3,)."""
     angular_frequency: float
@@ -647,7 +646,6 @@ def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:
     rates = found.value[:3]
     period = fit_period(part, found.amplitude, *rates.tolist(), share=0.5, restoring=restoring)
     return LawStart(
-        restoring,
         rates,
         period.angular_frequency,
         float(part.angle_rad[0]),
@@ -681,43 +679,23 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     columns *= weight[:, None]
     right = (part.time_s - part.time_s[0]) * weight
 
-    def eta(design: FloatArray) -> float:
-        values = np.linalg.lstsq(design, right, rcond=1e-13)[0]
-        return float(values[1] / values[0])
+    def fitted(design: FloatArray, kept: IntArray | slice = slice(None)) -> tuple[float, float]:
+        """The coefficient, and the sum of squares."""
+        values = np.linalg.lstsq(design[kept], right[kept], rcond=1e-13)[0]
+        square = float(np.sum((right[kept] - design[kept] @ values) ** 2))
+        return float(values[1] / values[0]), square
 
-    def square(design: FloatArray) -> float:
-        values = np.linalg.lstsq(design, right, rcond=1e-13)[0]
-        return float(np.sum((right - design @ values) ** 2))
-
-    value, count = eta(columns), len(part)
+    value, count = fitted(columns)[0], len(part)
     blocks = min(_BLOCKS, count // 3)
-    edges = np.linspace(0, count, blocks + 1).astype(int).tolist()
-    rows = np.column_stack([columns, weight, right])
-    without = _without_each([rows[low:high] for low, high in pairwise(edges)])
+    place, without = np.arange(count), []
+    for low, high in pairwise(np.linspace(0, count, blocks + 1).astype(int).tolist()):
+        beyond = np.column_stack([columns, weight * (place >= high)])
+        without.append(fitted(beyond, np.flatnonzero((place < low) | (place >= high)))[0])
     scatter = math.sqrt((blocks - 1) * float(np.var(without)))
     slower = np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
-    drift = eta(np.column_stack([columns, weight * slower])) - value
-    linear, bent = square(columns[:, [0, 2, 3]]), columns[:, [0, 2, 3]]
+    drift = fitted(np.column_stack([columns, weight * slower]))[0] - value
+    linear, bent = columns[:, [0, 2, 3]], columns[:, [0, 2, 3]]
     bent[:, 0] += columns[:, 1]
-    removed = 1.0 - square(bent) / linear if linear > 0.0 else 0.0
+    least = fitted(linear)[1]
+    removed = 1.0 - fitted(bent)[1] / least if least > 0.0 else 0.0
     return Coefficient(value, math.hypot(scatter, drift), scatter, removed)
-
-
-def _without_each(blocks: list[FloatArray]) -> FloatArray:
-    """The coefficient without each block of the decay in turn, the phase beyond it free.
-
-    Rows of a block are the four columns of the design, the weight (of a step of the phase) and the
-    right side.
-    """
-    scale = 1.0 / np.linalg.norm(np.concatenate(blocks), axis=0)
-    products = np.stack([(rows * scale).T @ (rows * scale) for rows in blocks])
-    system = products.sum(axis=0) - products
-    beyond = products.sum(axis=0) - np.cumsum(products, axis=0)
-    # Before the first and behind the last block there is nothing for a step to part.
-    beyond[[0, -1]] = 0.0
-    beyond[[0, -1], 4, 4] = 1.0
-    system[:, 4, :], system[:, :, 4] = beyond[:, 4, :], beyond[:, :, 4]
-    # A hair, for blocks without which there are fewer turning points than columns.
-    system[:, range(5), range(5)] += 1e-14
-    values = np.linalg.solve(system[:, :5, :5], system[:, :5, 5:])[..., 0]
-    return np.asarray(values[:, 1] / values[:, 0] * scale[1] / scale[0])

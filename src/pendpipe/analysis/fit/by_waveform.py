@@ -166,19 +166,16 @@ class Waveform:
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
-        hysteretic, viscous = self.parts(value)
-        a, _, c, _, omega, angle, time, offset = value.tolist()
+        a, b, c, share, omega, angle, time, offset = value.tolist()
+        hysteretic, viscous = share * b, (1.0 - share) * b
+        if "hysteretic" in self.split:
+            hysteretic = min(self.split["hysteretic"], b)
+            viscous = b - hysteretic
+        elif "viscous" in self.split:
+            viscous = min(self.split["viscous"], b)
+            hysteretic = b - viscous
         law = Eq8(omega, a, hysteretic, viscous, c, self.restoring)
         return law, Release(time, angle, offset)
-
-    def parts(self, value: FloatArray) -> tuple[float, float]:
-        """The hysteretic and the viscous part of b."""
-        b = float(value[B])
-        if "hysteretic" in self.split:
-            return min(self.split["hysteretic"], b), max(b - self.split["hysteretic"], 0.0)
-        if "viscous" in self.split:
-            return max(b - self.split["viscous"], 0.0), min(self.split["viscous"], b)
-        return float(value[SHARE]) * b, (1.0 - float(value[SHARE])) * b
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,); the last is kept, for it is asked for again."""
@@ -218,9 +215,11 @@ class Waveform:
         except ValueError:
             # Overdamped: far from anything that turns.
             return refused
-        change = self.change(value)
+        change, off = self.change(value), float(value[SHARE]) - PRIOR_SHARE
         gradient, normal = change.T @ summed.gradient, change.T @ summed.normal @ change
-        return self._with_prior(value, Quadratic(summed.chi2, gradient, normal))
+        gradient[SHARE] -= PRIOR_INVERSE * off
+        normal[SHARE, SHARE] += PRIOR_INVERSE
+        return Quadratic(summed.chi2 + PRIOR_INVERSE * off**2, gradient, normal)
 
     def _summed(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix by the engine's parameters."""
@@ -246,25 +245,15 @@ class Waveform:
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""
-        share = float(value[SHARE])
-        if "hysteretic" in self.split:
-            by_b, by_share = (0.0, 1.0), 0.0
-        elif "viscous" in self.split:
-            by_b, by_share = (1.0, 0.0), 0.0
-        else:
-            by_b, by_share = (share, 1.0 - share), float(value[B])
+        # What is told of one part of b leaves its changes to the other.
+        told = [part in self.split for part in ("hysteretic", "viscous")]
+        share = float(told[1]) if any(told) else float(value[SHARE])
+        by_share = 0.0 if any(told) else float(value[B])
         change = np.zeros((8, 8))
-        change[0, A] = change[3, C] = change[4, OMEGA] = 1.0
-        change[5, START] = change[6, TIME] = change[7, OFFSET] = 1.0
-        change[1:3, B] = by_b
+        change[[0, 3, 4, 5, 6, 7], [A, C, OMEGA, START, TIME, OFFSET]] = 1.0
+        change[1:3, B] = share, 1.0 - share
         change[1:3, SHARE] = by_share, -by_share
         return change
-
-    def _with_prior(self, value: FloatArray, likelihood: Quadratic) -> Quadratic:
-        off = float(value[SHARE]) - PRIOR_SHARE
-        likelihood.gradient[SHARE] -= PRIOR_INVERSE * off
-        likelihood.normal[SHARE, SHARE] += PRIOR_INVERSE
-        return likelihood._replace(chi2=likelihood.chi2 + PRIOR_INVERSE * off**2)
 
 
 _SURE: Final = 0.7
@@ -454,18 +443,15 @@ def fit_waveform(
     held = _held(held_rates, fixed, parts, baseline)
     start = start_values(points, held_rates, fixed, baseline, restoring)
     fitted = _fit(samples, points, start, held, parts, restoring)
-    if restoring == "sine" and not _explained(fitted):
+    # Whether the search came to its end, and noise explains most of what is left.
+    readings, found = len(fitted.problem.values), fitted.minimum
+    explained = found.converged and found.quadratic.chi2 < _LOUD * readings
+    if restoring == "sine" and not explained:
         # From another window: all at once, or grown from a few swings.
         few = len(points) if start.reliable < len(points) else _FEW
         other = _fit(samples, points, start._replace(reliable=few), held, parts, restoring)
         fitted = min(fitted, other, key=lambda each: each.minimum.quadratic.chi2)
     return _result(_refined(fitted, samples), samples, points, baseline, fixed)
-
-
-def _explained(fitted: _Fitted) -> bool:
-    """Whether the search came to its end, and noise explains most of what is left."""
-    readings = len(fitted.problem.values)
-    return fitted.minimum.converged and fitted.minimum.quadratic.chi2 < _LOUD * readings
 
 
 def _result(
