@@ -16,8 +16,13 @@ from pendpipe.analysis.turning_points.loops import (
     find_extremes,
     smooth_times,
 )
-from pendpipe.analysis.turning_points.measure import BLOCK, ROWS, _solved, half_cycle_sums
-from pendpipe.analysis.turning_points.shape import HARMONICS
+from pendpipe.analysis.turning_points.measure import (
+    BLOCK,
+    HARMONICS,
+    ROWS,
+    _solved,
+    half_cycle_sums,
+)
 
 FIT = """
 import sys

@@ -23,7 +23,7 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.analysis.turning_points.shape import loss_rates
+from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate

@@ -14,9 +14,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import white_rms
-from pendpipe.analysis.turning_points.measure import Measured, Places, edges, measure
+from pendpipe.analysis.turning_points.measure import HARMONICS, Measured, Places, edges, measure
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import HARMONICS
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 
@@ -48,7 +47,7 @@ def odd_harmonics(
     samples, places, level, shape, measured
         The readings, and what was made of them so far.
     open_error
-        What the shape of the losses leaves open in each amplitude (`shape.shape_error`).
+        What the shape of the losses leaves open in each amplitude (`measure.shape_error`).
 
     Returns
     -------

@@ -18,8 +18,8 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.turning_points.shape import loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import Matrix, kernel
@@ -143,7 +143,7 @@ def track(values: FloatArray, start: FloatArray, columns: Matrix) -> tuple[int, 
     start
         Time of the first reading, interval; time of turning, half period, side (+1 above the
         level) and level of the first half cycle; rms of one reading; a, b, c of Eq. 13, so
-        small that they shift times only (see `shape.py`).
+        small that they shift times only (see `measure.py`).
     columns
         To be filled: time, its sd, signed angle, its sd, level; shape (5, n). The level is
         estimated anew every `LEVEL_BLOCK` half cycles.
