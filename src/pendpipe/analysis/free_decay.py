@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,14 +35,16 @@ _PERIOD: Final = 0.3
 _WAVER: Final = 0.12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """Half cycles `first` to `last` (inclusive) that belong together.
 
     Parameters
     ----------
-    path
-        How far the pendulum has gone in them.
+    piece
+        The readings of the record, between gaps, that they are in.
+    cycles
+        All half cycles of that piece.
     bridged
         Disturbed half cycles inside.
     fades
@@ -51,12 +53,33 @@ class Run:
         Whether the amplitude was held up before.
     """
 
+    piece: slice
+    cycles: HalfCycles
     first: int
     last: int
-    path: float
     bridged: int = 0
     fades: bool = False
     driven: bool = False
+
+    @property
+    def swing(self) -> FloatArray:
+        """Distances between neighbouring turning points, shape (legs,)."""
+        return self.cycles.swing[self.first : self.last + 1]
+
+    @property
+    def middle_s(self) -> FloatArray:
+        """When the middle between the two turning points is passed, shape (legs,)."""
+        return self.cycles.middle_s[self.first : self.last + 1]
+
+    @property
+    def half_period_s(self) -> float:
+        """The usual half period."""
+        return float(np.median(np.diff(self.middle_s)))
+
+    @property
+    def path(self) -> float:
+        """How far the pendulum has gone."""
+        return float(self.swing.sum())
 
     @property
     def worth(self) -> float:
@@ -69,24 +92,24 @@ class Run:
         return self.last - self.first + 1
 
 
-def best_runs(cycles: HalfCycles) -> list[Run]:
-    """Find the runs, the most telling first."""
+def best_runs(cycles: HalfCycles, piece: slice) -> list[Run]:
+    """Find the runs among the half cycles of a piece of the record, the most telling first."""
     count = len(cycles)
     if count < 3:
         return []
     follows, swings = _follows(cycles).tolist(), cycles.swing.tolist()
-    runs: list[tuple[int, int]] = []
+    runs: list[Run] = []
     first, floor = 0, swings[0]
     for leg in range(1, count):
         allowed = _RISE * floor + _TAIL * swings[first] + cycles.step
         if not follows[leg - 1] or swings[leg] > allowed:
-            runs.append((first, leg - 1))
+            runs.append(Run(piece, cycles, first, leg - 1))
             first, floor = leg, swings[leg]
         floor = min(floor, swings[leg])
-    runs.append((first, count - 1))
-    trimmed = [_trimmed(cycles, *run) for run in runs]
-    kept = [run for run in _joined(cycles, trimmed) if run.legs >= 3 and _regular(cycles, run)]
-    return sorted((_undriven(cycles, run) for run in kept), key=lambda run: -run.worth)
+    runs.append(Run(piece, cycles, first, count - 1))
+    joined = _joined([_trimmed(run) for run in runs])
+    kept = [run for run in joined if run.legs >= 3 and _regular(run)]
+    return sorted((_undriven(run) for run in kept), key=lambda run: -run.worth)
 
 
 def _follows(cycles: HalfCycles) -> BoolArray:
@@ -109,74 +132,70 @@ def _running_median(values: FloatArray) -> FloatArray:
     return np.asarray(np.nanmedian(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
-def _trimmed(cycles: HalfCycles, first: int, last: int) -> Run:
+def _trimmed(run: Run) -> Run:
     """Drop half cycles at the front that are smaller than what follows: a pull."""
-    while last - first >= 2 and cycles.swing[first] < (
-        0.93 * cycles.swing[first + 1] - 0.5 * cycles.step
+    first, swing = run.first, run.cycles.swing
+    while run.last - first >= 2 and swing[first] < (
+        0.93 * swing[first + 1] - 0.5 * run.cycles.step
     ):
         first += 1
-    return Run(first, last, float(cycles.swing[first : last + 1].sum()))
+    return replace(run, first=first)
 
 
-def _joined(cycles: HalfCycles, runs: list[Run]) -> list[Run]:
+def _joined(runs: list[Run]) -> list[Run]:
     """Join runs that a few disturbed half cycles part (a tracking error, lost samples)."""
     out: list[Run] = []
     for run in (run for run in runs if run.legs >= 2):
-        if out and _continues(cycles, out[-1], run):
+        if out and _continues(out[-1], run):
             before = out.pop()
             lost = run.first - before.last - 1
-            path = float(cycles.swing[before.first : run.last + 1].sum())
-            run = Run(before.first, run.last, path, before.bridged + run.bridged + lost)
+            run = replace(run, first=before.first, bridged=before.bridged + run.bridged + lost)
         out.append(run)
-    return [_fading(cycles, run) for run in out]
+    return [_fading(run) for run in out]
 
 
-def _regular(cycles: HalfCycles, run: Run) -> bool:
+def _regular(run: Run) -> bool:
     """Say whether periods and amplitudes go on as smoothly as a pendulum's do."""
-    swing = cycles.swing[run.first : run.last + 1]
-    half = np.diff(cycles.middle_s[run.first : run.last + 1])
-    blur = cycles.step / float(np.median(swing))
+    half, usual = np.diff(run.middle_s), float(np.median(run.swing))
+    blur = run.cycles.step / usual
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > 6 else 1
     waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
-    kinks = float(np.median(np.abs(np.diff(swing, 2)))) / float(np.median(swing))
+    kinks = float(np.median(np.abs(np.diff(run.swing, 2)))) / usual
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
 
 
-def _continues(cycles: HalfCycles, before: Run, after: Run) -> bool:
+def _continues(before: Run, after: Run) -> bool:
     """Say whether `after` goes on where `before` was broken off."""
-    half = float(np.median(np.diff(cycles.middle_s[before.first : before.last + 1])))
-    pause = float(cycles.middle_s[after.first] - cycles.middle_s[before.last])
+    half = before.half_period_s
+    pause = float(after.middle_s[0] - before.middle_s[-1])
     # Where a turning point is lost in a gap, the swings beside it are too small.
-    last = float(np.max(cycles.swing[max(before.first, before.last - 2) : before.last + 1]))
-    ratio = float(cycles.swing[after.first]) / last
-    strong = float(cycles.swing[after.first]) > 3.0 * cycles.step
+    begun = float(after.swing[0])
+    ratio, strong = begun / float(np.max(before.swing[-3:])), begun > 3.0 * after.cycles.step
     if not (strong and before.legs >= 3 and pause < 4.5 * half and 0.5 < ratio < 1.15):
         return False
-    other = np.diff(cycles.middle_s[after.first : after.last + 1])
-    return bool(len(other)) and abs(float(np.median(other)) / half - 1.0) < _PERIOD
+    return after.legs > 1 and abs(after.half_period_s / half - 1.0) < _PERIOD
 
 
-def _fading(cycles: HalfCycles, run: Run) -> Run:
+def _fading(run: Run) -> Run:
     """Note whether the run's own last swing follows it, and then rest or the record's end."""
     if run.legs < 3:
         return run
-    half = float(np.median(np.diff(cycles.middle_s[run.first : run.last + 1])))
-    swing = float(cycles.swing[run.last])
+    cycles = run.cycles
     if run.last + 1 == len(cycles):
-        return replace(run, fades=cycles.ending < _RISE * swing + cycles.step)
-    pause = float(cycles.middle_s[run.last + 1] - cycles.middle_s[run.last])
-    return replace(run, fades=pause > 1.5 * half)
+        return replace(run, fades=cycles.ending < _RISE * float(run.swing[-1]) + cycles.step)
+    pause = float(cycles.middle_s[run.last + 1] - run.middle_s[-1])
+    return replace(run, fades=pause > 1.5 * run.half_period_s)
 
 
-def _undriven(cycles: HalfCycles, run: Run) -> Run:
+def _undriven(run: Run) -> Run:
     """Cut a front part whose amplitude is held while the part after it falls.
 
     The loss of a free half cycle grows with its amplitude; so the first k half cycles lose
     at least k times what those after them lose. A tenth of that is no free decay. (The top
     of a beat is flat too, but loses 0.3 of it.)
     """
-    swing = cycles.swing[run.first : run.last + 1]
+    swing, step = run.swing, run.cycles.step
     count = len(swing)
     if count < 9:
         return run
@@ -188,22 +207,16 @@ def _undriven(cycles: HalfCycles, run: Run) -> Run:
     falls = smooth[k] - smooth[k + ahead]
     expected = k * falls / ahead
     lost = smooth[0] - smooth[k]
-    held = (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * cycles.step))
+    held = (lost < 0.1 * expected) & (expected > np.maximum(0.1 * swing[0], 3.0 * step))
     # Near the end a small scatter of few half cycles would stand for the loss of hundreds, and
     # the last fall of an amplitude that wavers all along for the end of its drive.
     waver = np.maximum.accumulate(np.maximum.accumulate(smooth) - smooth)[k]
-    held &= falls > np.maximum(2.0 * waver, 3.0 * cycles.step)
+    held &= falls > np.maximum(2.0 * waver, 3.0 * step)
     gain = np.where(held, expected - lost, 0.0)
     best = int(np.argmax(gain))
     if gain[best] <= 0:
         return run
-    first = run.first + int(k[best])
-    return replace(
-        run,
-        first=first,
-        path=float(cycles.swing[first : run.last + 1].sum()),
-        driven=True,
-    )
+    return replace(run, first=run.first + int(k[best]), driven=True)
 
 
 _SHORT: Final = 8.0
@@ -347,20 +360,18 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             else "no oscillation: the reading does not swing to and fro"
         )
         raise NotAnalysableError(place, why, "give a recording of a free decay")
-    pieces = _pieces(time, 2.0 * half_period)
     found = [
-        (first, last, cycles, run)
-        for first, last in pieces
-        if last - first >= 8
-        for cycles in [half_cycles(time[first:last], values[first:last], least, half_period)]
-        for run in best_runs(cycles)
+        run
+        for piece in _pieces(time, 2.0 * half_period)
+        if piece.stop - piece.start >= 8
+        for run in best_runs(half_cycles(time[piece], values[piece], least, half_period), piece)
+        if run.legs >= _LEAST_HALF_CYCLES
     ]
-    found = [entry for entry in found if entry[3].legs >= _LEAST_HALF_CYCLES]
-    told = max(found, key=lambda entry: entry[3].worth, default=None)
-    rivals = sum(entry[3].path > 0.2 * told[3].path for entry in found) - 1 if told else 0
-    used = [] if told is None else _chained(found, told)
-    beside = sum(entry[3].path for entry in found) - sum(entry[3].path for entry in used)
-    alone = told and beside <= 0.3 * told[3].path and _falls(told[2], told[3], least)
+    told = max(found, key=lambda run: run.worth, default=None)
+    rivals = sum(run.path > 0.2 * told.path for run in found) - 1 if told else 0
+    used = _chained(found, told) if told else []
+    beside = sum(run.path for run in found) - sum(run.path for run in used)
+    alone = told and beside <= 0.3 * told.path and _falls(told, least)
     beat = _beating(time, values, least, half_period, place, driven=not alone)
     if beat is not None:
         return beat
@@ -370,79 +381,71 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             "no free decay: no three half cycles follow each other with falling amplitude",
             "handling, a clamp or a drive can't be analysed",
         )
-    if told[3].legs < _MANY and rivals >= max(2, told[3].legs // 3):
+    if told.legs < _MANY and rivals >= max(2, told.legs // 3):
         # Many half cycles that follow one another are no accident, however small they are.
-        longer = [entry for entry in found if entry[3].legs >= _MANY]
+        longer = [run for run in found if run.legs >= _MANY]
         if not longer:
             raise NotAnalysableError(
                 place,
-                f"no free decay: {rivals + 1} short oscillations of {told[3].legs} half cycles or"
-                " so",
+                f"no free decay: {rivals + 1} short oscillations of {told.legs} half cycles or so",
                 "irregular motion can't be analysed",
             )
-        told = max(longer, key=lambda entry: entry[3].worth)
+        told = max(longer, key=lambda run: run.worth)
         used = _chained(found, told)
-    first, last, cycles, run = told
-    _refuse_without_fall(place, time[first:last], values[first:last], cycles, run, least)
-    start = _ends(time[slice(*used[0][:2])], values[slice(*used[0][:2])], *used[0][2:])[0]
-    stop = _ends(time[slice(*used[-1][:2])], values[slice(*used[-1][:2])], *used[-1][2:])[1]
+    _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
+    run = used[0]
+    start, stop = _start(time[run.piece], values[run.piece], run), _stop(time, used[-1])
     notes = [
         f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
-        for _, end, _, _ in used[:-1]
+        for end in (part.piece.stop for part in used[:-1])
     ]
-    cycles, run = used[0][2:]
-    others = [(c, r) for _, _, c, r in found if r.path > 0.05 * told[3].path]
-    half = float(np.median(np.diff(cycles.middle_s[run.first : run.last + 1])))
-    quiet = max(2.0 * least, 0.02 * float(cycles.swing[run.first]))
+    half, swing = run.half_period_s, float(run.swing[0])
+    quiet = max(2.0 * least, 0.02 * swing)
     before = "driven: the amplitude is held up" if run.driven else "moved by hand before release"
-    centre, swing = float(np.mean(cycles.turn[run.first : run.first + 2])), cycles.swing[run.first]
+    centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
     wide = np.abs(values[time < start] - centre).max(initial=0.0)
     if recording.quantity == "angle_rad" and wide > np.pi > 0.5 * swing:
         before = "it went over the top before it settled"
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half, before=before)
     notes += [
-        f"another decay of {r.legs} half cycles from {c.middle_s[r.first]:.6g} s is not used"
-        for c, r in others
-        if not any(r is entry[3] for entry in used)
+        f"another decay of {other.legs} half cycles from {other.middle_s[0]:.6g} s is not used"
+        for other in found
+        if other.path > 0.05 * told.path and other not in used
     ]
-    bridged = sum(entry[3].bridged for entry in used)
+    bridged = sum(part.bridged for part in used)
     if bridged:
         notes.append(f"{bridged} disturbed half cycle(s) inside the decay are kept")
-    return FreeDecay(start, stop, cuts, half, sum(entry[3].legs for entry in used), notes)
+    return FreeDecay(start, stop, cuts, half, sum(part.legs for part in used), notes)
 
 
-def _pieces(time: FloatArray, longest_s: float) -> list[tuple[int, int]]:
+def _pieces(time: FloatArray, longest_s: float) -> list[slice]:
     """Part the record at gaps in which the motion could have done anything."""
     edges = (np.flatnonzero(np.diff(time) > longest_s) + 1).tolist()
-    return list(zip([0, *edges], [*edges, len(time)], strict=True))
+    return [slice(*ends) for ends in pairwise([0, *edges, len(time)])]
 
 
-_Found: TypeAlias = tuple[int, int, HalfCycles, Run]
-"""First and last reading of a piece of the record, its half cycles, and a run of them."""
-
-
-def _chained(found: list[_Found], told: _Found) -> list[_Found]:
+def _chained(found: list[Run], told: Run) -> list[Run]:
     """The runs that one decay makes where gaps part the record, in the order of time."""
     chain = [told]
-    for entry in sorted(found, key=lambda entry: entry[0]):
-        if entry[0] == chain[-1][1] and _goes_on(*chain[-1][2:], *entry[2:]):
-            chain.append(entry)
-    for entry in sorted(found, key=lambda entry: -entry[0]):
-        if entry[1] == chain[0][0] and _goes_on(*entry[2:], *chain[0][2:]):
-            chain.insert(0, entry)
+    for run in sorted(found, key=lambda run: run.piece.start):
+        if run.piece.start == chain[-1].piece.stop and _goes_on(chain[-1], run):
+            chain.append(run)
+    for run in sorted(found, key=lambda run: -run.piece.start):
+        if run.piece.stop == chain[0].piece.start and _goes_on(run, chain[0]):
+            chain.insert(0, run)
     return chain
 
 
-def _goes_on(cycles: HalfCycles, run: Run, later: HalfCycles, follower: Run) -> bool:
+def _goes_on(run: Run, follower: Run) -> bool:
     """Whether a run behind a gap is the same decay: amplitude, half period and phase go on.
 
     The half cycles in the gap must be countable: half periods before and behind it say the same
     whole number, and the side on which the follower begins is that number's. So must their loss.
     """
+    cycles, later = run.cycles, follower.cycles
     if run.last + 1 < len(cycles) or follower.first > 1 or follower.legs < _LEAST_HALF_CYCLES:
         return False
-    before = cycles.middle_s[run.first : run.last + 1][-_BLOCKS:]
-    behind = later.middle_s[follower.first : follower.last + 1][:_BLOCKS]
+    before, behind = run.middle_s[-_BLOCKS:], follower.middle_s[:_BLOCKS]
     halves = [float(np.mean(np.diff(part))) for part in (before, behind)]
     counts = [float(behind[0] - before[-1]) / half for half in halves]
     number = round(0.5 * sum(counts))
@@ -452,12 +455,9 @@ def _goes_on(cycles: HalfCycles, run: Run, later: HalfCycles, follower: Run) -> 
         return False
     losses = [
         float(part[0] - part[-1]) / (len(part) - 1)
-        for part in (
-            cycles.swing[run.first : run.last + 1][-_BLOCKS:],
-            later.swing[follower.first : follower.last + 1][:_BLOCKS],
-        )
+        for part in (run.swing[-_BLOCKS:], follower.swing[:_BLOCKS])
     ]
-    lost = float(cycles.swing[run.last] - later.swing[follower.first])
+    lost = float(run.swing[-1] - follower.swing[0])
     few, many = 0.5 * number * min(losses), 2.0 * number * max(losses)
     agree = max(abs(count - number) for count in counts) < _COUNTED
     return agree and few - cycles.step < lost < many + cycles.step
@@ -536,9 +536,9 @@ def _beating(
     return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
 
 
-def _falls(cycles: HalfCycles, run: Run, least: float) -> bool:
+def _falls(run: Run, least: float) -> bool:
     """Whether the turning points alone show the amplitude fall."""
-    swing = cycles.swing[run.first : run.last + 1]
+    swing = run.swing
     third = max(1, len(swing) // 3)
     fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
     scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
@@ -550,12 +550,11 @@ def _refuse_without_fall(
     place: str | Path,
     time: FloatArray,
     values: FloatArray,
-    cycles: HalfCycles,
     run: Run,
     least: float,
 ) -> None:
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
-    swing = cycles.swing[run.first : run.last + 1]
+    swing = run.swing
     if float(swing[:3].max()) < 3.0 * least:
         raise NotAnalysableError(
             place,
@@ -563,9 +562,9 @@ def _refuse_without_fall(
             f" ({least:.2g})",
             "record with a larger amplitude",
         )
-    if _falls(cycles, run, least):
+    if _falls(run, least):
         return
-    fall, sd, wavers = _fall_of_all(time, values, cycles.middle_s[run.first : run.last + 1])
+    fall, sd, wavers = _fall_of_all(time, values, run.middle_s)
     if wavers:
         raise NotAnalysableError(
             place,
@@ -613,40 +612,31 @@ def _fall_of_all(
     return -slope / begun, float(np.linalg.norm(inverse[1])) / begun, wavers
 
 
-def _ends(
-    time: FloatArray, values: FloatArray, cycles: HalfCycles, run: Run
-) -> tuple[float, float]:
-    """Find start and stop of a run of half cycles within its piece of the record."""
-    middle = cycles.middle_s[run.first : run.last + 1]
-    half_first = float(middle[1] - middle[0])
-    half_last = float(np.median(np.diff(middle[-4:])))
-    begin, end = float(time[0]), float(time[-1])
-    start = float(middle[0])
-    if _free_from_the_first_sample(begin, float(values[0]), cycles, run, half_first):
-        start = begin
+def _stop(time: FloatArray, run: Run) -> float:
+    """When a run of half cycles ends, within its piece of the record."""
+    end, half = float(time[run.piece.stop - 1]), float(np.median(np.diff(run.middle_s[-4:])))
     # Half a period after its last middle the pendulum has turned and swung back once more.
-    stop = float(middle[-1]) + (1.5 if run.fades else 0.5) * half_last
-    return start, end if end - stop < 0.3 * half_last else stop
+    stop = float(run.middle_s[-1]) + (1.5 if run.fades else 0.5) * half
+    return end if end - stop < 0.3 * half else stop
 
 
-def _free_from_the_first_sample(
-    begin: float, reading: float, cycles: HalfCycles, run: Run, half_period: float
-) -> bool:
-    """Say whether the recording begins in the free motion, rather than in a hold or a pull.
+def _start(time: FloatArray, values: FloatArray, run: Run) -> float:
+    """When a run begins: with its piece if that begins in the free motion, not in a hold or a pull.
 
-    The first sample must lie on the cosine that the first half cycles continue.
+    The first sample must then lie on the cosine that the first half cycles continue.
     """
-    if run.driven or run.first > 1:
-        return False
-    turn = float(cycles.middle_s[run.first]) - 0.5 * half_period
-    if turn - begin > 1.1 * half_period or begin - turn > 0.6 * half_period:
-        return False
+    begin, start = float(time[0]), float(run.middle_s[0])
+    half_period = float(run.middle_s[1]) - start
+    turn = start - 0.5 * half_period
+    late = turn - begin > 1.1 * half_period or begin - turn > 0.6 * half_period
+    if run.driven or run.first > 1 or late:
+        return start
     if run.first == 0:
-        return begin > turn - 0.2 * half_period
-    top, bottom = cycles.turn[run.first], cycles.turn[run.first + 1]
-    centre, amplitude = 0.5 * float(top + bottom), 0.5 * float(top - bottom)
-    expected = centre + amplitude * np.cos(np.pi * (begin - turn) / half_period)
-    return bool(abs(reading - expected) < 0.15 * abs(amplitude))
+        return begin if begin > turn - 0.2 * half_period else start
+    top, bottom = run.cycles.turn[run.first : run.first + 2].tolist()
+    centre, amplitude = 0.5 * (top + bottom), 0.5 * (top - bottom)
+    expected = centre + amplitude * math.cos(math.pi * (begin - turn) / half_period)
+    return begin if abs(float(values[0]) - expected) < 0.15 * abs(amplitude) else start
 
 
 def measure_recording(
