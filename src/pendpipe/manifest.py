@@ -73,6 +73,8 @@ class Manifest:
         Files of the user, by name alone.
     repaired
         Marks of the damages that made the stage run again.
+    own_damage
+        Where the manifest's own file can't be believed; it then lists nothing.
     """
 
     home: Path
@@ -82,6 +84,7 @@ class Manifest:
     inputs: dict[str, str] = field(default_factory=dict)
     sources: dict[str, Sum] = field(default_factory=dict)
     repaired: tuple[str, ...] = ()
+    own_damage: Damage | None = None
 
     @property
     def path(self) -> Path:
@@ -103,8 +106,8 @@ class Manifest:
         A missing output is none: Snakemake sees it by itself. Only files whose length or
         time of change differs are hashed, unless `hash_all`.
         """
-        if not self.path.is_file():
-            return []
+        if self.own_damage or not self.path.is_file():
+            return [self.own_damage] if self.own_damage else []
         since = None if hash_all else self.path.stat().st_mtime_ns
         outputs = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
         extras = [_compare(self.home / name, made, since) for name, made in self.extras.items()]
@@ -113,13 +116,7 @@ class Manifest:
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:
-    """Read a stage's manifest; an empty one where there is none.
-
-    Raises
-    ------
-    DamagedError
-        If the file is no manifest, or was altered.
-    """
+    """Read a stage's manifest; an empty one where there is none, or it was altered."""
     manifest = Manifest(home, stage)
     if not manifest.path.is_file():
         return manifest
@@ -131,20 +128,10 @@ def read_manifest(home: Path, stage: str) -> Manifest:
             setattr(manifest, name, {key: Sum(**entry) for key, entry in content[name].items()})
         manifest.inputs, manifest.repaired = dict(content["inputs"]), tuple(content["repaired"])
     except (InputError, AttributeError, KeyError, TypeError, ValueError):
-        raise DamagedError(
-            manifest.path,
-            "this manifest is torn or altered",
-            "run snakemake again: its stage makes it anew",
-        ) from None
+        found = sha256(manifest.path)[:8]
+        damage = Damage(manifest.path, "this manifest is torn or altered", found)
+        return Manifest(home, stage, own_damage=damage)
     return manifest
-
-
-def _readable(home: Path, stage: str) -> Manifest:
-    """Read a stage's manifest; an empty one where it can't be read, too."""
-    try:
-        return read_manifest(home, stage)
-    except DamagedError:
-        return Manifest(home, stage)
 
 
 def _digest(content: dict[str, Any]) -> str:
@@ -153,17 +140,13 @@ def _digest(content: dict[str, Any]) -> str:
 
 
 def manifests(home: Path) -> Iterator[Manifest]:
-    """Read all manifests of a folder; one that can't be read holds nothing."""
-    yield from (_readable(home, path.stem) for path in sorted((home / FOLDER).glob("*.json")))
+    """Read all manifests of a folder."""
+    yield from (read_manifest(home, path.stem) for path in sorted((home / FOLDER).glob("*.json")))
 
 
 def damages_of(home: Path, stage: str, *, hash_all: bool = False) -> tuple[Manifest, list[Damage]]:
     """Look for damage among a stage's results, its manifest included."""
-    try:
-        manifest = read_manifest(home, stage)
-    except DamagedError as fault:
-        manifest = Manifest(home, stage)
-        return manifest, [Damage(manifest.path, fault.problem, sha256(manifest.path)[:8])]
+    manifest = read_manifest(home, stage)
     return manifest, manifest.damages(hash_all=hash_all)
 
 
@@ -178,9 +161,9 @@ def histories(home: Path) -> tuple[dict[str, str], list[str]]:
         A line for each damaged file.
     """
     found, lines = {}, []
-    for path in sorted((home / FOLDER).glob("*.json")):
-        manifest, damages = damages_of(home, path.stem)
-        found[path.stem] = " ".join((*manifest.repaired, *(damage.mark for damage in damages)))
+    for manifest in manifests(home):
+        damages = manifest.damages()
+        found[manifest.stage] = " ".join((*manifest.repaired, *(one.mark for one in damages)))
         lines += [
             f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
             for damage in damages
@@ -197,8 +180,8 @@ def set_aside_damaged(home: Path) -> list[str]:
         A line for each damaged file.
     """
     lines = []
-    for path in sorted((home / FOLDER).glob("*.json")):
-        manifest, found = damages_of(home, path.stem)
+    for manifest in manifests(home):
+        found = manifest.damages()
         lines += [f"{damage.path}: {damage.problem}; {set_aside(damage)}" for damage in found]
         if found:
             damaged = {damage.path for damage in found}
@@ -208,10 +191,10 @@ def set_aside_damaged(home: Path) -> list[str]:
             manifest.extras = {}
             manifest.repaired += tuple(damage.mark for damage in found)
             manifest.write()
-        elif path.is_file():
+        else:
             # All is sound: files whose time of change is younger need no second hash.
             with suppress(OSError):
-                os.utime(path)
+                os.utime(manifest.path)
     return lines
 
 
@@ -272,7 +255,7 @@ def job(
     if outputs and not outputs[0].absolute().is_relative_to(home.absolute()):
         yield Job()
         return
-    repaired = _readable(home, stage).repaired
+    repaired = read_manifest(home, stage).repaired
     # Until the stage has ended its old results are nobody's.
     Manifest(home, stage, repaired=repaired).write()
     running = Job(list(outputs))
@@ -352,7 +335,7 @@ def source_sha256(home: Path, stage: str, source: Path) -> str | None:
     """Hash a file of the user; from the manifest if it has not changed since."""
     if not source.is_file():
         return None
-    manifest = _readable(home, stage)
+    manifest = read_manifest(home, stage)
     made = manifest.sources.get(source.name)
     kept = made is not None and _unchanged(source, made, manifest.path.stat().st_mtime_ns)
     return made.sha256 if made is not None and kept else sha256(source)

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from pendpipe.acquisition.decode import decode_recording
-from pendpipe.acquisition.drivers.base import Setup
-from pendpipe.acquisition.drivers.text import DI2108
+from pendpipe.acquisition.drivers.decoders import Scans
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
 from pendpipe.acquisition.recorder import NoiseWatch, ProgressLine
 from pendpipe.acquisition.simulated import acquire_simulated
@@ -185,10 +184,10 @@ class Terminal(io.StringIO):
 
 def test_the_progress_line_tells_amplitude_losses_and_breaks() -> None:
     line = ProgressLine(Terminal(), 60.0)
-    line.begin(DI2108, Setup((1,), 100.0, 10.0))
-    line.update(1.0, np.array([16384, -16384], dtype="<i2").tobytes())
-    line.begin(DI2108, Setup((1,), 100.0, 10.0))
-    line.update(1.5, np.array([3277, -3277], dtype="<i2").tobytes())
+    line.begin(step_volts=10.0 / 32768)
+    line.update(1.0, Scans(np.array([[16384], [-16384]], dtype="<i2")))
+    line.begin(step_volts=10.0 / 32768)
+    line.update(1.5, Scans(np.array([[3277], [-3277]], dtype="<i2")))
     text = line.text(2.0)
     assert "2.0 of 60 s, 4 scans, 2.0 Hz" in text
     assert "amplitude 1.000 V" in text

@@ -40,10 +40,11 @@ _LONGEST_FRAME: Final = 1 << 22
 _LARGEST_HOLE: Final = 1 << 40
 """No recording misses more bytes than that: a frame that claims so is not believed."""
 _MARK: Final = b"\xf5\x0aPp"
-_FRAME: Final = struct.Struct("<4scIHQdI")
-_CHECKED: Final = struct.Struct("<cIHQd")
-_FRAME_1: Final = struct.Struct("<cIdI")
-_CHECKED_1: Final = struct.Struct("<cId")
+_HEAD: Final = struct.Struct("<4scIHQd")
+_HEAD_1: Final = struct.Struct("<0scId")
+"""What stands before the check sum of a frame, in version 2 and in version 1."""
+_CHECK: Final = struct.Struct("<I")
+_SYNC_S: Final = 1.0
 COMPLETE: Final = ("scans", "time", "noise")
 """Reasons for which a recording ends when it has what was asked for."""
 
@@ -63,9 +64,10 @@ class Frame(NamedTuple):
 
     def packed(self) -> bytes:
         """The frame with its mark and check sum."""
-        fields = (self.kind, len(self.content), self.stream, self.at_byte, self.time_s)
-        check = zlib.crc32(self.content, zlib.crc32(_CHECKED.pack(*fields)))
-        return _FRAME.pack(_MARK, *fields, check) + self.content
+        place = self.stream, self.at_byte
+        head = _HEAD.pack(_MARK, self.kind, len(self.content), *place, self.time_s)
+        check = zlib.crc32(self.content, zlib.crc32(head[len(_MARK) :]))
+        return head + _CHECK.pack(check) + self.content
 
 
 def description_line(header: Mapping[str, Any]) -> bytes:
@@ -85,24 +87,18 @@ class RawWriter:
         The description: JSON's types only.
     bytes_per_s
         Of the data; a frame holds no more.
-    sync_s
-        The bytes are handed to the system at every frame, so that a killed process loses
-        nothing, and to the disk at least every `sync_s` seconds, so that a lost supply
-        loses no more than that.
+
+    Notes
+    -----
+    The bytes are handed to the system at every frame, so that a killed process loses nothing,
+    and to the disk at least every second, so that a lost supply loses no more than that.
     """
 
     def __init__(
-        self,
-        stream: IO[bytes],
-        header: Mapping[str, Any],
-        *,
-        bytes_per_s: float = 1 << 16,
-        sync_s: float = 1.0,
+        self, stream: IO[bytes], header: Mapping[str, Any], *, bytes_per_s: float = 1 << 16
     ) -> None:
         self._stream = stream
         self._most_bytes = min(max(1, int(bytes_per_s)), _LONGEST_FRAME)
-        self._sync_s = sync_s
-        self._synced = time.monotonic()
         self._on_disk = hasattr(stream, "fileno") and not hasattr(stream, "getbuffer")
         self._starts = self._bytes = 0
         line = description_line(header)
@@ -133,7 +129,7 @@ class RawWriter:
 
     def _frame(self, kind: bytes, time_s: float, content: bytes) -> None:
         self._write(Frame(kind, time_s, content, self._starts, self._bytes).packed())
-        if time.monotonic() - self._synced > self._sync_s:
+        if time.monotonic() - self._synced > _SYNC_S:
             self.sync()
 
     def _write(self, content: bytes) -> None:
@@ -242,14 +238,13 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
     except OSError as fault:
         raise InputError(place, f"can't be read ({fault.strerror})", "check the path") from None
     header, begin = _header(place, content)
-    frames = _frames_1(content, begin) if header["version"] == 1 else _frames(content, begin)
     pieces: list[bytes] = []
     stamps: list[tuple[float, int]] = []
     events: list[Mapping[str, Any]] = []
     holes: list[Hole] = []
     arrival: tuple[int, float] | None = None
     total = missing = starts = sound = 0
-    for size, frame in frames:
+    for size, frame in _frames(content, begin, _HEAD if header["version"] > 1 else _HEAD_1):
         hole = frame.at_byte - total - missing
         if hole > _LARGEST_HOLE:
             continue
@@ -330,35 +325,21 @@ def _json(body: bytes) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
-def _frames(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
-    """Find the sound frames and how many bytes they take, whatever stands between them."""
-    while begin + _FRAME.size <= len(content):
-        mark, kind, length, stream, at_byte, time_s, check = _FRAME.unpack_from(content, begin)
-        start = begin + _FRAME.size
+def _frames(content: bytes, begin: int, form: struct.Struct = _HEAD) -> Iterator[tuple[int, Frame]]:
+    """Find the sound frames and how many bytes they take, whatever stands between them.
+
+    Those of version 1 have no mark by which the next one could be found behind a damaged one.
+    """
+    while 0 <= begin <= len(content) - form.size - _CHECK.size:
+        mark, kind, length, *place, time_s = form.unpack_from(content, begin)
+        start = begin + form.size + _CHECK.size
         body = content[start : start + min(length, _LONGEST_FRAME)]
-        known = zlib.crc32(_CHECKED.pack(kind, length, stream, at_byte, time_s))
-        if len(body) == length and zlib.crc32(body, known) == check:
+        known = zlib.crc32(content[begin + len(mark) : begin + form.size])
+        check = _CHECK.pack(zlib.crc32(body, known))
+        if len(body) == length and content.startswith(check, begin + form.size):
             # A damaged mark does no harm, but is noticed.
-            size = _FRAME.size + length
-            yield (
-                size - (0 if mark == _MARK else len(mark)),
-                Frame(kind, time_s, body, stream, at_byte),
-            )
-            begin += size
+            unmarked = 0 if mark == _MARK else len(mark)
+            yield start + length - begin - unmarked, Frame(kind, time_s, body, *place)
+            begin = start + length
         else:
-            begin = content.find(_MARK, begin + 1)
-            if begin < 0:
-                return
-
-
-def _frames_1(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
-    """Find the frames of version 1 up to the first damaged one."""
-    while begin + _FRAME_1.size <= len(content):
-        kind, length, time_s, check = _FRAME_1.unpack_from(content, begin)
-        start = begin + _FRAME_1.size
-        body = content[start : start + length]
-        known = zlib.crc32(_CHECKED_1.pack(kind, length, time_s))
-        if len(body) < length or zlib.crc32(body, known) != check:
-            return
-        yield _FRAME_1.size + length, Frame(kind, time_s, body)
-        begin = start + length
+            begin = content.find(_MARK, begin + 1) if mark else -1

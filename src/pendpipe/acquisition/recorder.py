@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,7 +19,7 @@ from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers import find_driver, identify
 from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
-from pendpipe.acquisition.drivers.decoders import Decoder
+from pendpipe.acquisition.drivers.decoders import Scans
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
 from pendpipe.arrays import AnyArray
@@ -106,15 +106,16 @@ class Session:
         self._received = 0
         self._by_clock = False  # the clock ends it, not the count of scans
         self._watch: NoiseWatch | None = None
-        self._decoder: Decoder | None = None
         self.identity, self.setup = self._introduce()
 
     def close(self) -> None:
         """Close the line."""
         self._line.close()
 
-    def run(self, writer: RawWriter) -> None:
+    def run(self, stream: IO[bytes], header: Mapping[str, object]) -> None:
         """Keep everything from start to end, with its time; a break ends or resumes it."""
+        bytes_per_s = self.setup.rate_hz * self._decoder.bytes_per_scan
+        writer = RawWriter(stream, header, bytes_per_s=bytes_per_s)
         # Taken before the start, so that a device can only seem late, never early.
         self._origin_s = self._clock.now()
         reason = ""
@@ -161,15 +162,15 @@ class Session:
         setup = self._instrument.configure(request.channels, request.rate_hz, request.range_volts)
         if request.until_noise:
             self._watch = self._watch or NoiseWatch(setup.rate_hz)
-            self._decoder = self._driver.decoder(len(setup.channels))
+        self._decoder = self._driver.decoder(len(setup.channels))
         if self._progress:
-            self._progress.begin(self._driver, setup)
+            self._progress.begin(setup.range_volts / 2 ** (self._driver.bits - 1))
         return identity, setup
 
     def _listen(self, writer: RawWriter) -> str:
         """Keep what comes until it is enough or breaks off; return which."""
         scans, request, scale = self._scans, self._request, self._clock.scale
-        wanted = scans * self._driver.decoder(len(self.setup.channels)).bytes_per_scan
+        wanted = scans * self._decoder.bytes_per_scan
         poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, request.duration_s / scale / _POLLS))
         latest_s = 1.1 * request.duration_s + _PATIENCE_S * scale
         # A packet may gather many scans before it is sent.
@@ -183,8 +184,9 @@ class Session:
             if data:
                 writer.data(elapsed_s, data)
                 self._received += len(data)
+            decoded = self._decoder.feed(data)
             if self._progress:
-                self._progress.update(elapsed_s, data)
+                self._progress.update(elapsed_s, decoded)
             enough = self._received >= wanted
             if enough and elapsed_s < 0.9 * (scans - 1) / self.setup.rate_hz:
                 self._by_clock = True
@@ -196,8 +198,7 @@ class Session:
                 return f"the device ended its stream with '{message}'"
             if enough and not self._by_clock:
                 return "scans"
-            watch, decoder = self._watch, self._decoder
-            if watch and decoder and watch.feed(decoder.feed(data).counts[:, 0]):
+            if self._watch and self._watch.feed(decoded.counts[:, 0]):
                 return "noise"
             if len(data) < _BACKLOG:
                 time.sleep(poll_s)
@@ -308,8 +309,7 @@ def record(
         told = header | {"volts_per_radian": volts_per_radian, "source": source}
         kept = {key: value for key, value in told.items() if value is not None}
         try:
-            size = kind.decoder(len(session.setup.channels)).bytes_per_scan
-            session.run(RawWriter(stream, kept, bytes_per_s=session.setup.rate_hz * size))
+            session.run(stream, kept)
         except OSError as fault:
             raise _cannot_write(raw_path or "memory", fault) from None
         content = stream.getvalue() if isinstance(stream, BytesIO) else None
@@ -397,21 +397,18 @@ class ProgressLine:
         self._shown = 0.0
         self._scans = self._lost = self._breaks = 0
         self._recent: deque[tuple[float, AnyArray]] = deque()
-        self._decoder: Decoder | None = None
         self._step = 0.0
 
-    def begin(self, driver: type[Driver], setup: Setup) -> None:
-        """Show what is recorded; again after a break."""
-        self._breaks += self._decoder is not None
+    def begin(self, step_volts: float) -> None:
+        """Show a stream of counts of so many volts each; another one after a break."""
+        self._breaks += self._step > 0.0
         self._recent.clear()
-        self._decoder = driver.decoder(len(setup.channels))
-        self._step = setup.range_volts / 2 ** (driver.bits - 1)
+        self._step = step_volts
 
-    def update(self, elapsed_s: float, data: bytes) -> None:
-        """Show further bytes, by `elapsed_s` of the recorder's clock."""
-        if self._decoder is None or not self._stream.isatty():
+    def update(self, elapsed_s: float, scans: Scans) -> None:
+        """Show further scans, by `elapsed_s` of the recorder's clock."""
+        if not self._stream.isatty():
             return
-        scans = self._decoder.feed(data)
         self._scans += len(scans)
         self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
         if len(scans):

@@ -23,24 +23,11 @@ _SLOWEST_COUNT: Final = 32767
 class LetterDriver(Driver):
     """Commands of NUL, letter and argument."""
 
-    def _send_letters(self, letter: bytes, argument: bytes) -> tuple[bool, bytes]:
-        """Send NUL, a letter and its argument, each after the echo of the last.
-
-        Returns
-        -------
-        bool, bytes
-            Whether both were echoed, and the last echo.
-        """
-        self.line.write(b"\0" + letter)
-        echo = self._echo()
-        if echo != letter:
-            return False, echo
-        self.line.write(argument)
-        echo = self.line.read(1, self.patience_s)
-        return echo == argument, echo
+    def _start_stream(self) -> None:
+        self._command(b"S", b"1", undo=True)
 
     def _command(self, letter: bytes, argument: bytes, reply: int = 0, undo: bool = False) -> bytes:
-        """Send a command; return the reply.
+        """Send NUL, a letter and its argument, each after the echo of the last; return the reply.
 
         A wrong or missing echo is tried again after half a second; with `undo` the device
         is stopped first, since it may have started although its echo was lost.
@@ -53,11 +40,15 @@ class LetterDriver(Driver):
                 if undo:
                     super().stop()
                 self.line.discard(self.quiet_s)
-            echoed, echo = self._send_letters(letter, argument)
-            if echoed:
-                answer = self.line.read(reply, self.patience_s) if reply else b""
-                if len(answer) == reply:
-                    return answer
+            self.line.write(b"\0" + letter)
+            echo = self._echo()
+            if echo == letter:
+                self.line.write(argument)
+                echo = self.line.read(1, self.patience_s)
+                if echo == argument:
+                    answer = self.line.read(reply, self.patience_s) if reply else b""
+                    if len(answer) == reply:
+                        return answer
         raise self._no_answer(letter.decode(), echo)
 
     def _echo(self) -> bytes:
@@ -95,9 +86,6 @@ class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4
         self._command(b"L", bytes([count & 0xFF]))
         self._command(b"M", bytes([count >> 8]))
         return baudrate / (scan_bits + count)
-
-    def _start_stream(self) -> None:
-        self._command(b"S", b"1", undo=True)
 
     def stop(self) -> None:
         """End the stream, throw away what still arrives, and go back to 4800 baud."""
@@ -158,9 +146,6 @@ class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RAN
             self._send_line(f"chn {position} {_RANGE_CODES[range_volts] << 8 | channel - 1}")
         self._send_line(f"xrate {divisor + 256 * average} {max(1, round(burst_hz))}")
         return burst_hz / count
-
-    def _start_stream(self) -> None:
-        self._command(b"S", b"1", undo=True)
 
     def _ask(self, letter: bytes, argument: bytes) -> str:
         """Send a short command and return its answer, which ends in CR or in silence."""

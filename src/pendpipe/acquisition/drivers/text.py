@@ -135,12 +135,9 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
         product = _CDC_HZ / rate_hz
         further = math.ceil(product / (high * self.decimations))
         further = min(self.further_decimations, max(1, further))
-        first = max(1, math.ceil(product / (high * further)))
-        last = min(self.decimations, max(first, int(product / (low * further))))
-        first = min(first, self.decimations)
         found = (
             (min(high, max(low, round(product / (decimation * further)))), decimation)
-            for decimation in range(first, last + 1)
+            for decimation in range(1, self.decimations + 1)
         )
         divisor, decimation = min(
             found, key=lambda pair: abs(pair[0] * pair[1] * further - product)
