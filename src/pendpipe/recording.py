@@ -468,28 +468,24 @@ def check(place: str | Path, recording: Recording, *, first_line: int | None = N
     first = first_line or 0
     time, values = recording.time_s, recording.values
     refuse_if(len(time) == 0, place, "there are no samples", "record again, or give another file")
-    marked = np.zeros(len(time), dtype=bool)
-    if recording.quality is not None:
-        marked = recording.quality == MISSING
-        odd = np.flatnonzero(recording.quality > MISSING)
-        if odd.size:
-            raise InputError(
-                f"{row} {first + odd[0]}", "quality is not 0, 1 or 2", "correct the row"
-            )
-    bad = np.flatnonzero(~np.isfinite(time) | (~np.isfinite(values) & ~marked))
-    if bad.size:
-        raise InputError(
-            f"{row} {first + bad[0]}",
-            f"{bad.size} value(s) that are NaN or infinite",
+    quality = np.zeros(len(time)) if recording.quality is None else recording.quality
+    bad = ~np.isfinite(time) | (~np.isfinite(values) & (quality != MISSING))
+    falls = np.append(False, np.diff(time) <= 0)
+    at = int(np.argmax(falls))
+    for wrong, problem, remedy in (
+        (quality > MISSING, "quality is not 0, 1 or 2", "correct the row"),
+        (
+            bad,
+            f"{np.sum(bad)} value(s) that are NaN or infinite",
             "drop the rows, or mark them with quality 2",
-        )
-    falls = np.flatnonzero(np.diff(time) <= 0)
-    if falls.size:
-        raise InputError(
-            f"{row} {first + falls[0] + 1}",
-            f"time_s does not rise ({time[falls[0]]:.9g} is followed by {time[falls[0] + 1]:.9g})",
+        ),
+        (
+            falls,
+            f"time_s does not rise ({time[at - 1]:.9g} is followed by {time[at]:.9g})",
             "sort the rows by time and drop repeated ones",
-        )
+        ),
+    ):
+        refuse_if(wrong.any(), f"{row} {first + int(np.argmax(wrong))}", problem, remedy)
 
 
 def converter_step(recording: Recording, place: str | Path = "recording") -> float | None:

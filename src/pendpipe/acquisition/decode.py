@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -108,35 +108,39 @@ def _check_description(place: str, raw: RawRecording) -> None:
     InputError
         On a missing or impossible entry, or time stamps that fall.
     """
-    fault = next(_faults(raw), None)
-    refuse_if(
-        fault, place, f"the description of the recording is damaged ({fault})", "give another copy"
-    )
-
-
-def _faults(raw: RawRecording) -> Iterator[str]:
-    """Say what in a description is missing or impossible."""
-    header = raw.header
-    yield from (f"{key} is missing" for key in _NEEDED if key not in header)
-    yield from (f"{key} is no text" for key in _TEXTS if not isinstance(header[key], str))
-    for key, (low, high) in _NUMBERS.items():
-        value = header.get(key, low)
-        # A comparison with NaN is false.
-        if isinstance(value, bool) or not (isinstance(value, int | float) and low <= value <= high):
-            yield f"{key} is {value!r:.40}"
-    channels = header["channels"]
-    if (
-        not isinstance(channels, list)
-        or not 0 < len(channels) <= _MOST_CHANNELS
-        or not all(type(channel) is int and channel > 0 for channel in channels)
-        or len(set(channels)) != len(channels)
-    ):
-        yield f"channels are {channels!r:.40}"
+    header, channels = raw.header, raw.header.get("channels")
     kept = raw.event("stopped").get("keep_scans")
-    if kept is not None and not (type(kept) is int and kept > 0):
-        yield f"keep_scans is {kept!r:.40}"
-    if not np.isfinite(raw.arrival_s).all() or np.any(np.diff(raw.arrival_s) < 0):
-        yield "time stamps that fall"
+    faults = (
+        *((key not in header, f"{key} is missing") for key in _NEEDED),
+        *((not isinstance(header.get(key), str), f"{key} is no text") for key in _TEXTS),
+        *(
+            (
+                not _lies_between(header.get(key, low), low, high),
+                f"{key} is {header.get(key)!r:.40}",
+            )
+            for key, (low, high) in _NUMBERS.items()
+        ),
+        (
+            not isinstance(channels, list)
+            or not 0 < len(channels) <= _MOST_CHANNELS
+            or not all(type(channel) is int and channel > 0 for channel in channels)
+            or len(set(channels)) != len(channels),
+            f"channels are {channels!r:.40}",
+        ),
+        (kept is not None and not (type(kept) is int and kept > 0), f"keep_scans is {kept!r:.40}"),
+        (
+            not np.isfinite(raw.arrival_s).all() or np.any(np.diff(raw.arrival_s) < 0),
+            "time stamps that fall",
+        ),
+    )
+    for wrong, fault in faults:
+        problem = f"the description of the recording is damaged ({fault})"
+        refuse_if(wrong, place, problem, "give another copy")
+
+
+def _lies_between(value: object, low: float, high: float) -> bool:
+    """Whether it is a number between the two; NaN is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
 
 
 def _join(

@@ -2,15 +2,15 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.samples import Swing, derivative_slope, swing_of
+from pendpipe.errors import refuse_if
+from pendpipe.formats.samples import derivative_slope, swing_of
 from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Role, plain, role_of, unit_of
 
@@ -48,8 +48,6 @@ class Choice:
         All that could have been chosen as the reading.
     notes, weak_guesses
         What was guessed, and what of it on slender grounds.
-    roles
-        What each column (by its number) holds.
     """
 
     time: Column | None
@@ -58,7 +56,6 @@ class Choice:
     channels: tuple[Column, ...]
     notes: tuple[str, ...] = ()
     weak_guesses: tuple[str, ...] = ()
-    roles: Mapping[int, Role] = field(default_factory=dict)
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
@@ -79,10 +76,6 @@ _BY_UNIT: Final[Mapping[str, Role]] = {
 def meaning(column: Column) -> Role:
     """Say what a column holds, by its name and, where that is silent, by its unit."""
     role: Role = role_of(column.name) if column.name else "unknown"
-    # Of "field.header.stamp" the last part counts, unless it is one letter ("acc.x").
-    last = column.name.rpartition(".")[2]
-    if len(last) > 2 and role_of(last) != "unknown":
-        role = role_of(last)
     unit = unit_of(column.unit) if column.unit else None
     if unit is None or role == "none":
         return role
@@ -112,53 +105,45 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     refuse_if(
         not table.columns, table.place, "there is no column of numbers", "give time and readings"
     )
-    roles = {column.number: meaning(column) for column in table.columns}
-    for column in table.columns:
-        # "run1" counts nothing where it swings.
-        if roles[column.number] == "index" and swing_of(column.values).clear:
-            roles[column.number] = "unknown"
-    columns = _whole_times(table.columns, roles)
-    clocks = {c.number: _counted_on(c.values) for c in columns if roles[c.number] == "time"}
-    columns = tuple(replace(c, values=clocks.get(c.number, c.values)) for c in columns)
-    table = replace(table, columns=columns)
-    own_clock = [column for column in table.columns if column.time_s is not None]
-    time, counts = (None, False) if own_clock else _time(table, options, roles)
-    channels = tuple(column for column in table.columns if column is not time)
-    if time is not None and roles[time.number] in ("length", "unknown"):
+    columns = _whole_times([replace(column, role=meaning(column)) for column in table.columns])
+    table = replace(table, columns=tuple(map(_settled, columns)))
+    own_clock = any(column.time_s is not None for column in columns)
+    time, counts = (None, False) if own_clock else _time(table, options)
+    if time is not None and time.role in ("length", "unknown"):
         # Headed "x, y", with x the time: then y is what was plotted, and no height.
-        for column in channels:
-            if re.fullmatch(r"[yYzZ]\d?", column.name) and not column.unit:
-                roles[column.number] = "unknown"
+        plotted = {c for c in table.columns if re.fullmatch(r"[yYzZ]\d?", c.name) and not c.unit}
+        columns = [replace(c, role="unknown") if c in plotted else c for c in table.columns]
+        table = replace(table, columns=tuple(columns))
+    channels = tuple(column for column in table.columns if column is not time)
     parts = _parts(table, options) if options.reading_column is not None else []
     picked = [find(table, table.columns, part) for part in parts]
     if not parts and options.channel is not None:
         picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
     if picked:
-        return Choice(time, counts, tuple(picked), channels, roles=roles)
-    mine, others = _of_one_run(channels, time, roles)
-    readings, notes, weak = _readings(mine, time, roles)
+        return Choice(time, counts, tuple(picked), channels)
+    mine, others = _of_one_run(channels, time)
+    readings, notes, weak = _readings(mine, time)
     # What an instrument sampled by a clock of its own is no list.
-    told = readings or [c for c in mine if roles[c.number] != "index"]
-    falling = [c for c in told if c.time_s is None and _only_falls(c.values)]
-    if reading and falling and len(falling) == len(readings or falling):
-        raise InputError(
-            table.place,
-            f"'{falling[0].label}' only falls: amplitudes, not a recording of the swing",
-            "give the recording that they were read from",
-        )
-    if not readings and reading:
-        names = listed([column.label for column in table.columns])
-        timed = any(plain(column.name).startswith("period") for column in table.columns)
-        raise InputError(
-            table.place,
-            f"no column looks like the motion of a pendulum (found {names})",
-            "give the recording of the swing: periods alone tell no loss"
-            if timed
-            else "name it with --column (and its unit with --unit)",
-        )
+    told = readings or [c for c in mine if c.role != "index"]
+    falling = [c.label for c in told if c.time_s is None and _only_falls(c.values)]
+    refuse_if(
+        reading and falling and len(falling) == len(readings or falling),
+        table.place,
+        f"'{''.join(falling[:1])}' only falls: amplitudes, not a recording of the swing",
+        "give the recording that they were read from",
+    )
+    names = listed([column.label for column in table.columns])
+    refuse_if(
+        reading and not readings,
+        table.place,
+        f"no column looks like the motion of a pendulum (found {names})",
+        "give the recording of the swing: periods alone tell no loss"
+        if any(plain(column.name).startswith("period") for column in table.columns)
+        else "name it with --column (and its unit with --unit)",
+    )
     if others:
         notes = (*notes, f"the first of several runs is read; choose with --column: {others}")
-    return Choice(time, counts, readings, channels, notes, weak, roles)
+    return Choice(time, counts, readings, channels, notes, weak)
 
 
 def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[int] = ()) -> Column:
@@ -192,18 +177,26 @@ def _parts(table: Table, options: ReadOptions) -> list[str]:
     return parts
 
 
-def _whole_times(columns: tuple[Column, ...], roles: Mapping[int, Role]) -> tuple[Column, ...]:
+def _settled(column: Column) -> Column:
+    """Undo a clock's overflow; and "run1" counts nothing where it swings."""
+    if column.role == "time":
+        return replace(column, values=_counted_on(column.values))
+    swings = column.role == "index" and column.swing.clear
+    return replace(column, role="unknown") if swings else column
+
+
+def _whole_times(columns: list[Column]) -> list[Column]:
     """Add to a time in whole seconds the part of a second that stands in the next column."""
     for whole, part in pairwise(columns):
         unit = unit_of(part.unit) or unit_of(part.name)
-        if roles[whole.number] != "time" or unit is None or unit.kind != "time":
+        if whole.role != "time" or unit is None or unit.kind != "time":
             continue
         steps, fraction = np.diff(whole.values), part.values * unit.factor
         in_part = unit.factor < 1.0 and fraction.min() >= 0.0 and 0.5 < fraction.max() < 1.0
         in_whole = len(steps) > 0 and steps.min() >= 0.0 and set(np.unique(steps)) <= {0.0, 1.0}
         if in_part and in_whole and np.any(np.diff(fraction) < 0.0):
             one = replace(whole, values=whole.values + fraction, unit="s")
-            return tuple(one if c is whole else c for c in columns if c is not part)
+            return [one if c is whole else c for c in columns if c is not part]
     return columns
 
 
@@ -227,17 +220,15 @@ def one_way(values: FloatArray) -> float:
     return float(np.mean(steps >= 0)) if np.any(steps > 0) else 0.0
 
 
-def _time(
-    table: Table, options: ReadOptions, roles: Mapping[int, Role]
-) -> tuple[Column | None, bool]:
+def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
     """Find the column of times, or else one that counts the samples.
 
     Times may fall (the newest row first) and repeat (printed with few digits).
     """
     if options.time_column is not None:
         given = find(table, table.columns, options.time_column)
-        return given, roles[given.number] == "index"
-    runs = [column for column in table.columns if roles[column.number] == "time"]
+        return given, given.role == "index"
+    runs = [column for column in table.columns if column.role == "time"]
     wanted = (options.reading_column or options.channel or "").lower()
     if wanted and len(runs) > 1 and not (options.channel is not None and wanted.isdigit()):
         # Runs side by side, each with its own time: the one before the reading is meant.
@@ -247,11 +238,9 @@ def _time(
             return before[-1], False
     taken = (options.reading_column or "").lower()
     best: tuple[float, Column | None] = (0.0, None)
-    counted = len(table.columns) > 2 and _counts_samples(
-        table.columns[0], roles[table.columns[0].number]
-    )
+    counted = len(table.columns) > 2 and _counts_samples(table.columns[0])
     for place, column in enumerate(table.columns, start=-counted):
-        role, share = roles[column.number], one_way(column.values)
+        role, share = column.role, one_way(column.values)
         named = role == "time"
         if (
             role in ("none", "signal", "volts", "velocity", "acceleration")
@@ -268,27 +257,25 @@ def _time(
             continue
         score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
         # A number of the row, where anything else is a time.
-        score -= 5.0 * (role == "index") or 3.0 * (not named and _counts_samples(column, role))
+        score -= 5.0 * (role == "index") or 3.0 * (not named and _counts_samples(column))
         score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
         best = max(best, (score, column), key=lambda each: each[0])
     found = best[1]
-    return found, found is not None and _counts_samples(found, roles[found.number])
+    return found, found is not None and _counts_samples(found)
 
 
-def _of_one_run(
-    channels: Sequence[Column], time: Column | None, roles: Mapping[int, Role]
-) -> tuple[Sequence[Column], str]:
+def _of_one_run(channels: Sequence[Column], time: Column | None) -> tuple[Sequence[Column], str]:
     """Of runs side by side, each with its own time column, keep one; name the others."""
     start = time.number if time is not None else len(channels) + 2
     clocks = [
         c.number
         for c in channels
-        if time is not None and _moves(c) and (roles[c.number] == "time" or _same(time, c))
+        if time is not None and _moves(c) and (c.role == "time" or _same(time, c))
     ]
-    holding = [c.number for c in channels if _WORTH[roles[c.number]] > 0.5 and _moves(c)]
+    holding = [c.number for c in channels if _WORTH[c.role] > 0.5 and _moves(c)]
     end = min((number for number in clocks if number > start), default=start)
     # Readings before the first clock: then those are several clocks of one run.
-    before = any(c.number < start and _WORTH[roles[c.number]] > 0.5 for c in channels)
+    before = any(c.number < start and _WORTH[c.role] > 0.5 for c in channels)
     if before or not any(start < number < end for number in holding):
         return channels, ""
     mine = [c for c in channels if start < c.number < end]
@@ -310,59 +297,54 @@ def _evenness(finite: FloatArray) -> float:
     return float(np.mean(np.abs(steps - middle) <= 0.1 * middle)) if middle > 0 else 0.0
 
 
-def _counts_samples(column: Column, role: Role) -> bool:
+def _counts_samples(column: Column) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
     values = column.values
-    if role not in ("index", "unknown", "length") or len(values) < 2:
+    if column.role not in ("index", "unknown", "length") or len(values) < 2:
         return False
     whole = np.isfinite(values).all() and np.all(values == np.rint(values))
     return bool(whole and abs(np.median(np.diff(values))) == 1.0)
 
 
 def _readings(
-    channels: Sequence[Column], time: Column | None, roles: Mapping[int, Role]
+    channels: Sequence[Column], time: Column | None
 ) -> tuple[tuple[Column, ...], tuple[str, ...], tuple[str, ...]]:
     """Choose the reading by its name, then by how it swings."""
-    alive = [c for c in channels if _moves(c) and _WORTH[roles[c.number]] > 0]
-    swings = {column.number: swing_of(column.values) for column in alive}
-    any_clear = any(swing.clear for swing in swings.values())
-
-    def worth(column: Column) -> float:
-        base = _WORTH[roles[column.number]]
-        return base if swings[column.number].clear or not any_clear else _STILL * base
-
-    candidates: list[tuple[float, tuple[Column, ...]]] = [(worth(c), (c,)) for c in alive]
+    alive = [c for c in channels if _moves(c) and _WORTH[c.role] > 0]
+    any_clear = any(column.swing.clear for column in alive)
+    candidates: list[tuple[float, tuple[Column, ...]]] = [
+        (_WORTH[c.role] if c.swing.clear or not any_clear else _STILL * _WORTH[c.role], (c,))
+        for c in alive
+    ]
     pair = _position_pair(alive)
     if pair is not None:
         candidates.append((_PAIR, pair))
     if not candidates:
         return (), (), ()
     most = max(entry[0] for entry in candidates)
-    chosen, why = _of_equals([entry[1] for entry in candidates if entry[0] == most], swings)
+    chosen, why = _of_equals([entry[1] for entry in candidates if entry[0] == most])
     clock = time.values if time is not None else None
     if len(chosen) == 1:
-        chosen, why = _not_a_derivative(chosen[0], alive, clock, roles, why)
+        chosen, why = _not_a_derivative(chosen[0], alive, clock, why)
     labels = " and ".join(f"'{column.label}'" for column in chosen)
     others = [column.label for column in channels if column not in chosen]
     rest = f" (not {listed(others, 8)})" if others else ""
     note = f"the reading is taken from {labels}{why}{rest}"
-    nameless = len(alive) > 1 and roles[chosen[0].number] == "unknown" and len(chosen) == 1
-    unclear = any_clear and not swings[chosen[0].number].clear
+    nameless = len(alive) > 1 and chosen[0].role == "unknown" and len(chosen) == 1
+    unclear = any_clear and not chosen[0].swing.clear
     if (nameless and not why) or unclear:
         what = "its name does not tell what it holds" if not unclear else "it hardly oscillates"
         return chosen, (), (f"{note}: {what} (--column)",)
     return chosen, (note,), ()
 
 
-def _of_equals(
-    equals: Sequence[tuple[Column, ...]], swings: Mapping[int, Swing]
-) -> tuple[tuple[Column, ...], str]:
+def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...], str]:
     """The first of equals, unless another swings far more, or it is a drive."""
     first = equals[0]
     if len(equals) == 1 or len(first) > 1:
         return first, ""
     # A drive has one size from beginning to end; a free decay has all of them.
-    of = [swings[c[0].number] for c in equals]
+    of = [each[0].swing for each in equals]
     graded = [c for c, swing in zip(equals, of, strict=True) if swing.clear and swing.graded > 0.3]
     if graded and of[0].graded < 0.1 and of[0].clear:
         return graded[0], ", whose swing decays"
@@ -383,15 +365,12 @@ def _not_a_derivative(
     chosen: Column,
     alive: Sequence[Column],
     clock: FloatArray | None,
-    roles: Mapping[int, Role],
     why: str,
 ) -> tuple[tuple[Column, ...], str]:
     """Of two nameless columns take the one whose derivative the other is."""
-    if clock is None or roles[chosen.number] != "unknown":
+    if clock is None or chosen.role != "unknown":
         return (chosen,), why
-    for column in alive:
-        if column is chosen or roles[column.number] not in ("unknown", "signal"):
-            continue
+    for column in (each for each in alive if each is not chosen):
         forward = derivative_slope(clock, chosen.values, column.values)
         backward = derivative_slope(clock, column.values, chosen.values)
         if forward is None and backward is None:
@@ -474,9 +453,7 @@ def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
         or not swing_of(x).clear
     ):
         return False
-    if not np.ptp(x**2) > 0.0 or not np.ptp(y) > 0.0:
-        return named
     # On a circle y falls with x squared; two columns without names must show it.
-    follows = float(np.corrcoef(x**2, y)[0, 1])
+    follows = float(np.corrcoef(x**2, y)[0, 1])  # NaN where either stands still
     shown = follows < -0.5 and np.std(radius) < 0.5 * np.std(y) and one_way(y) < 0.9
-    return follows < 0.5 if named else bool(shown)
+    return not follows >= 0.5 if named else bool(shown)

@@ -15,7 +15,14 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
+from pendpipe.formats.table import (
+    Column,
+    NotThisFormatError,
+    ReadOptions,
+    Table,
+    most_unpacked,
+    next_reader_if,
+)
 from pendpipe.formats.text import read_table as read_text
 from pendpipe.formats.text import table_of_text
 
@@ -41,8 +48,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     """
     if data.startswith(_OLD_EXCEL):
         return _of_sheets(place, _sheets_of_excel(data), options)
-    if not data.startswith(b"PK"):
-        raise NotThisFormatError("the file is no zip archive")
+    next_reader_if(not data.startswith(b"PK"), "the file is no zip archive")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = archive.namelist()
         whole = sum(part.file_size for part in archive.infolist())
@@ -183,8 +189,6 @@ def _is_number(cell: Any) -> bool:
 
 def _written(cell: Any) -> str:
     """Write a cell as CSV would: numbers in full, dates and times as ISO text."""
-    if isinstance(cell, int | float):
-        return repr(int(cell) if isinstance(cell, bool) else cell)
     return " ".join(str(cell.isoformat() if hasattr(cell, "isoformat") else cell).split())
 
 
@@ -206,12 +210,12 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     InputError
         When it is damaged, or holds no samples.
     """
-    if not _START.match(data[:200]):
-        raise NotThisFormatError("the file is no XML")
-    declares = b"<!DOCTYPE" in data or b"<!ENTITY" in data
-    if declares or len(data) > _LARGEST:
-        what = "declares entities" if declares else f"holds more than {_LARGEST >> 20} MB"
-        raise InputError(place, f"the XML {what}", "export the data as CSV")
+    next_reader_if(not _START.match(data[:200]), "the file is no XML")
+    for wrong, what in (
+        (b"<!DOCTYPE" in data or b"<!ENTITY" in data, "declares entities"),
+        (len(data) > _LARGEST, f"holds more than {_LARGEST >> 20} MB"),
+    ):
+        refuse_if(wrong, place, f"the XML {what}", "export the data as CSV")
     try:
         root = ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError) as fault:

@@ -14,8 +14,6 @@ from pendpipe.formats.samples import (
     follows_sine,
     periods,
     resolution,
-    same_motion,
-    swing_of,
 )
 from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Unit, plain, unit_of
@@ -94,7 +92,6 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
     if column is None:
         return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
-    _refuse_missing_times(table, column, np.ones(len(every), dtype=bool))
     time_s = (column.values - column.values[0]) * table.interval_s
     base = TimeBase(time_s, every, [f"{note} and '{column.label}'"])
     return _in_order(table, choice, base, table.interval_s)
@@ -108,7 +105,12 @@ def _from_column(
     if len(reading.values) == len(filled):
         # Of runs side by side one is shorter.
         filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
-    _refuse_missing_times(table, column, filled)
+    refuse_text(table, column, "correct or drop the row")
+    bad = np.flatnonzero(~np.isfinite(column.values) & filled)
+    if bad.size:
+        raise InputError(
+            table.where(int(bad[0])), "the time is missing or NaN", "correct or drop the row"
+        )
     factor, note, weak = _time_unit(column, reading, options)
     if weak and table.interval_s is not None:
         # A clock without a unit ticks in some decimal part of a second.
@@ -125,28 +127,16 @@ def _from_column(
 
 def refuse_text(table: Table, column: Column, remedy: str) -> None:
     """Refuse a column by the first of its cells that should be a number and is not."""
-    if column.fault is not None:
-        row, text = column.fault
-        raise InputError(table.where(row), f"'{text}' is no number", remedy)
-
-
-def _refuse_missing_times(table: Table, column: Column, rows: BoolArray) -> None:
-    refuse_text(table, column, "correct or drop the row")
-    bad = np.flatnonzero(~np.isfinite(column.values) & rows)
-    if bad.size:
-        raise InputError(
-            table.where(int(bad[0])), "the time is missing or NaN", "correct or drop the row"
-        )
+    row, text = column.fault or (0, "")
+    refuse_if(column.fault, table.where(row), f"'{text}' is no number", remedy)
 
 
 def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
     """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
     if options.time_unit is not None:
-        given = unit_of(options.time_unit)
-        if given is None or given.kind != "time":
-            raise InputError(
-                "--unit", f"'{options.time_unit}' is no unit of time", "give s, ms, us"
-            )
+        given = unit_of(options.time_unit) or _UNKNOWN
+        problem = f"'{options.time_unit}' is no unit of time"
+        refuse_if(given.kind != "time", "--unit", problem, "give s, ms, us")
         return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
@@ -165,7 +155,7 @@ def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[f
 
 def _period(reading: Column, values: FloatArray) -> float:
     """Period of the reading on a clock, in the clock's unit; 0 where nothing swings."""
-    cycle = swing_of(reading.values).samples_per_cycle
+    cycle = reading.swing.samples_per_cycle
     span = float(np.ptp(values)) if len(values) else 0.0
     return cycle * span / max(1, len(values) - 1)
 
@@ -445,17 +435,17 @@ def _unit(
 ) -> _Guess:
     """Find the unit: from the user, from the file, or from the numbers."""
     if options.reading_unit is not None:
-        given = unit_of(options.reading_unit)
-        if given is None or given.kind not in _QUANTITIES:
-            raise InputError(
-                "--unit",
-                f"'{options.reading_unit}' is not known",
-                "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
-            )
+        given = unit_of(options.reading_unit) or Unit("none", 1.0)
+        refuse_if(
+            given.kind not in _QUANTITIES,
+            "--unit",
+            f"'{options.reading_unit}' is not known",
+            "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
+        )
         return _Guess(given)
     # "second,Volt,Volt": some programs print the unit for a name.
     written = unit_of(column.unit or (column.name if len(column.name) > 2 else ""))
-    role = choice.roles.get(column.number, "unknown")
+    role = column.role
     if written is not None and written.kind in _QUANTITIES:
         if role == "velocity" and written.kind in ("angle", "length"):
             return _Guess(Unit("own", written.factor, f"{written.name}/s"))
@@ -476,26 +466,31 @@ def _unit(
     # pendulum seldom goes beyond 180 degrees.
     few = {"volts": 20.0, "signal": 20.0, "angle": 180.0, "length": 400.0, "unknown": 400.0}
     counted = re.search(r"(?i)enc|count|tick|raw", column.name) is not None
-    if whole and (counted or reach > few.get(role, np.inf)):
-        return _Guess(
-            Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", weak=True
-        )
-    headed = _UNITS_OF.search(table.metadata.get("header", ""))
-    named = unit_of(headed[1]) if headed else None
-    if headed and named and named.kind in ("length", "volts") and role in ("unknown", named.kind):
-        return _Guess(named, f"is in {headed[1]}, by the header")
-    if role == "volts":
-        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", weak=True)
+    headed = [*_UNITS_OF.findall(table.metadata.get("header", "")), ""][0]
+    named = unit_of(headed) or Unit("none", 1.0)
+    by_header = named.kind in ("length", "volts") and role in ("unknown", named.kind)
     names = {other.name.lower() for other in choice.channels if not other.unit}
     # A phone's sensor: of a position it knows nothing.
     sensed = role == "length" and {"x", "y", "z"} <= names
-    if sensed or role in ("velocity", "acceleration", "signal"):
-        what = "one of x, y, z" if sensed else role
-        return _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", weak=True)
-    if role == "length" and reach > 2.0:
-        return _Guess(
-            _UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", weak=True
-        )
+    what = "one of x, y, z" if sensed else role
+    for holds, guess in (
+        (
+            whole and (counted or reach > few.get(role, np.inf)),
+            _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True),
+        ),
+        (by_header, _Guess(named, f"is in {headed}, by the header")),
+        (role == "volts", _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)),
+        (
+            sensed or role in ("velocity", "acceleration", "signal"),
+            _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", True),
+        ),
+        (
+            role == "length" and reach > 2.0,
+            _Guess(_UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", True),
+        ),
+    ):
+        if holds:
+            return guess
     if role == "length":
         grown = _by_period(column, time_s, named=False)
         metres = _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
@@ -547,15 +542,15 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     if stated and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     return (
-        _by_step(finite, choice.roles.get(column.number) == "angle")
-        or _by_sibling(choice, column, time_s)
-        or _by_size(choice, column, finite, time_s)
+        _by_step(finite, column.role == "angle")
+        or _by_rate(choice, column, time_s)
+        or _by_size(column, finite, time_s)
     )
 
 
-def _by_size(choice: Choice, column: Column, finite: FloatArray, time_s: FloatArray) -> _Guess:
+def _by_size(column: Column, finite: FloatArray, time_s: FloatArray) -> _Guess:
     """Judge by how far it swings, and by whether the period follows the amplitude."""
-    named, reach = choice.roles.get(column.number) == "angle", _reach(finite)
+    named, reach = column.role == "angle", _reach(finite)
     # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
     if jumps_of_a_turn(finite):
         return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
@@ -579,9 +574,6 @@ def _by_size(choice: Choice, column: Column, finite: FloatArray, time_s: FloatAr
         return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
     # No pendulum of so many radians: a torsion pendulum, or another unit.
     odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
-    level = float(np.median(finite))
-    if named and abs(level - 0.5 * np.pi * np.rint(level / (0.5 * np.pi))) > 0.35:
-        return _Guess(_DEGREE, f"{odd}; it hangs at {level:.3g}: taken to be degrees", True)
     taken, unit = ("taken to be radians of a torsion pendulum", _RADIAN)
     if not named:
         taken, unit = "analysed in its own", _UNKNOWN
@@ -650,23 +642,15 @@ def _is_round(step: float, *, named: bool) -> bool:
     return bool(np.min(np.abs(leading - np.array(digits)) / leading) < 2e-5)
 
 
-def _by_sibling(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
-    """Compare with the same angle in another unit, or with its derivative in a known one."""
+def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Compare its derivative with one in a known unit that stands beside it."""
     for other in choice.channels:
         unit = unit_of(other.unit) if other.unit else None
-        if other is column or unit is None or len(other.values) != len(column.values):
+        if unit is None or unit.name != "rad/s" or len(other.values) != len(column.values):
             continue
-        if unit.kind == "angle":
-            good = np.isfinite(column.values) & np.isfinite(other.values)
-            ratio = same_motion(column.values[good], other.values[good], 0.99) if good.any() else 0
-            scale = unit.factor * ratio if ratio else None
-        elif unit.name == "rad/s":
-            slope = derivative_slope(time_s, column.values, other.values)
-            scale = unit.factor * abs(slope) if slope is not None else None
-        else:
-            continue
+        slope = derivative_slope(time_s, column.values, other.values) or 0.0
         for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
-            if scale is not None and abs(scale / guess.factor - 1.0) < 0.25:
+            if abs(unit.factor * abs(slope) / guess.factor - 1.0) < 0.25:
                 return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
     return None
 
@@ -678,7 +662,6 @@ def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     turn = 2.0 ** np.ceil(np.log2(high + 1.0)) if high > 0.0 else 1.0
     if low < 0.0 or turn < 256.0 or not np.any(np.abs(np.diff(values[finite])) > 0.8 * turn):
         return values, ()
-    values = values.copy()
     values[finite] = np.unwrap(values[finite], period=turn)
     return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
 

@@ -299,9 +299,9 @@ def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:
         problem = f"{odd.size} reading(s) that are infinite"
         raise InputError(where, problem, "drop the rows, or leave the cells blank")
     for name, some in (("times", base.time_s), ("readings", values[~np.isnan(values)])):
-        if some.size and np.ptp(some) and not 1e-30 < np.ptp(some) < 1e30:
-            problem = f"the {name} span {np.ptp(some):.3g}, which no pendulum does"
-            raise InputError(table.place, problem, "check their unit")
+        span = np.ptp(some) if some.size else 0.0
+        problem = f"the {name} span {span:.3g}, which no pendulum does"
+        refuse_if(span and not 1e-30 < span < 1e30, table.place, problem, "check their unit")
 
 
 _KEPT: Final = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "recorded_at")

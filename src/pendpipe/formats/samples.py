@@ -158,14 +158,12 @@ def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float 
     lasted, size = periods(time, values)
     keep = size > 0.3 * size.max(initial=0.0)
     lasted, angle = lasted[keep], radians * size[keep]
-    if len(lasted) < 8 or angle.max() > 3.0:
-        return None
     expected, found = np.log(ellipk(np.sin(0.5 * angle) ** 2)), np.log(lasted)
     for _ in range(2):
-        across = expected - expected.mean()
-        spread = float(across @ across)
-        if not spread > 0.0 or len(found) < 8:
+        if len(found) < 8 or angle.max() > 3.0:
             return None
+        across = expected - expected.mean()
+        spread = float(across @ across) or np.nan
         slope = float(across @ found) / spread
         rest = found - found.mean() - slope * across
         sd = float(np.sqrt(rest @ rest / (len(rest) - 2) / spread))
@@ -188,17 +186,10 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.
     kernel = np.array([0.25, 0.5, 0.25])
     rate, other = np.convolve(rate, kernel, "valid"), np.convolve(other, kernel, "valid")
-    return same_motion(rate, other, 0.9)
-
-
-def same_motion(one: FloatArray, other: FloatArray, least: float) -> float | None:
-    """How many times `one` `other` is; ``None`` where they correlate less than `least`."""
-    one, other = one - one.mean(), other - other.mean()
-    if not max(np.abs(one).max(), np.abs(other).max()) < 1e70:
-        return None
-    both = float(one @ one) * float(other @ other)
-    product = float(one @ other)
-    return product / float(one @ one) if abs(product) > least * np.sqrt(both) > 0.0 else None
+    rate, other = rate - rate.mean(), other - other.mean()
+    product, size = float(rate @ other), float(rate @ rate)
+    alike = abs(product) > 0.9 * np.sqrt(size * float(other @ other)) > 0.0
+    return product / size if alike else None
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
+from pendpipe.formats.samples import Swing, swing_of
+from pendpipe.formats.words import Role
 
 
 class NotThisFormatError(Exception):
     """A reader's reason why the file is none of its own; the next one is tried."""
+
+
+def next_reader_if(wrong: object, reason: str) -> None:
+    """Leave the file to the next reader where something says that it is none of this one's.
+
+    Raises
+    ------
+    NotThisFormatError
+        Where `wrong` is true.
+    """
+    if wrong:
+        raise NotThisFormatError(reason)
 
 
 def most_unpacked(size: int) -> int:
@@ -46,6 +61,8 @@ class Column:
         Step of the converter in `unit`, where the file gives it.
     limits
         The lowest and the highest value that the converter can give.
+    role
+        What it holds, once that is settled.
     """
 
     name: str
@@ -56,6 +73,12 @@ class Column:
     time_s: FloatArray | None = None
     resolution: float | None = None
     limits: tuple[float, float] | None = None
+    role: Role = "unknown"
+
+    @cached_property
+    def swing(self) -> Swing:
+        """Its strongest oscillation."""
+        return swing_of(self.values)
 
     @property
     def label(self) -> str:

@@ -21,10 +21,9 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import refuse_if
-from pendpipe.formats.layout import column_of_clock_times
 from pendpipe.formats.samples import swing_of
 from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
-from pendpipe.formats.text import table_of_text
+from pendpipe.formats.text import column_of_clock_times, table_of_text
 from pendpipe.formats.words import role_of, split_header
 
 _SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
@@ -316,6 +315,11 @@ class DamagedError(ValueError):
     """The file's tags contradict one another."""
 
 
+def _damaged_if(wrong: object, problem: str) -> None:
+    if wrong:
+        raise DamagedError(problem)
+
+
 def is_matlab(data: bytes) -> bool:
     """Say whether a file is one of version 5 to 7 by its head; version 7.3 is HDF5."""
     head = data[:10] == b"MATLAB 5.0" or data[126:128] in (b"IM", b"MI")
@@ -330,18 +334,16 @@ def tree_of(data: bytes) -> dict[str, Any]:
     DamagedError
         When a size or a type can't be true.
     """
-    order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
-    if order is None:
-        raise DamagedError("its header is damaged")
+    order = {b"IM": "<", b"MI": ">"}.get(data[126:128], "")
+    _damaged_if(not order, "its header is damaged")
     most, tree = most_unpacked(len(data)), {}
     for kind, content in _elements(data, order, 128):
         if kind == _COMPRESSED:
             unpacker = zlib.decompressobj()
             unpacked = unpacker.decompress(content, most)
-            if not unpacker.eof:
-                many = len(unpacked) >= most
-                fault = f"are more than {most >> 20} MB" if many else "are cut short"
-                raise DamagedError(f"its compressed data {fault}")
+            many = len(unpacked) >= most
+            fault = f"are more than {most >> 20} MB" if many else "are cut short"
+            _damaged_if(not unpacker.eof, f"its compressed data {fault}")
             most -= len(unpacked)
             kind, content = next(_elements(unpacked, order), (0, b""))
         name, value = _array(kind, content, order)
@@ -356,8 +358,8 @@ def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes
         start, small = at + 8, kind >> 16
         if 0 < small <= 4:  # so few bytes stand in the tag itself
             start, kind, size = at + 4, kind & 0xFFFF, small
-        if start + size > len(data):
-            raise DamagedError(f"an element of {size} bytes does not fit at byte {at}")
+        too_long = f"an element of {size} bytes does not fit at byte {at}"
+        _damaged_if(start + size > len(data), too_long)
         yield kind, data[start : start + size]
         at = start + size + (0 if kind == _COMPRESSED else -(start + size - at) % 8)
 
@@ -365,8 +367,7 @@ def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes
 def _element(parts: Iterator[tuple[int, bytes]], order: str, *kinds: int) -> AnyArray:
     """Read the next element, which must be of one of these types."""
     kind, content = next(parts, (0, b""))
-    if kind not in kinds:
-        raise DamagedError(f"an element of type {kind} stands where {kinds} is due")
+    _damaged_if(kind not in kinds, f"an element of type {kind} stands where {kinds} is due")
     return np.frombuffer(content, order + _STORED[kind])
 
 
@@ -375,15 +376,14 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
 
     ``None`` stands for what holds no readings: complex numbers, functions, objects.
     """
-    if kind != _MATRIX or depth > _DEEPEST:
-        raise DamagedError(f"an element of type {kind} stands where an array is due")
+    wrong = kind != _MATRIX or depth > _DEEPEST
+    _damaged_if(wrong, f"an element of type {kind} stands where an array is due")
     if not content:
         return "", None
     parts = _elements(content, order)
     flags, shape = _element(parts, order, 6), _element(parts, order, 5).tolist()
     name = _element(parts, order, 1, 2, 16).tobytes().decode("latin-1")
-    if not len(flags) or min(shape, default=-1) < 0:
-        raise DamagedError(f"an array has the size {shape}")
+    _damaged_if(not len(flags) or min(shape, default=-1) < 0, f"an array has the size {shape}")
     group, count = int(flags[0]) & 0xFF, prod(shape)
     if group in _NUMERIC:
         values = _element(parts, order, *_STORED).reshape(shape, order="F")
@@ -396,12 +396,12 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
     if group == _STRUCT:
         width = int(_element(parts, order, 5).sum())
         names = _element(parts, order, 1).tobytes().decode("latin-1")
-        if width < 1 or len(names) % width:
-            raise DamagedError("the names of a structure's fields are damaged")
+        uneven = width < 1 or len(names) % width
+        _damaged_if(uneven, "the names of a structure's fields are damaged")
         fields = [names[at : at + width].partition("\0")[0] for at in range(0, len(names), width)]
     held = [_array(*each, order, depth + 1)[1] for each in islice(parts, count * len(fields))]
-    if len(held) < count * len(fields):
-        raise DamagedError(f"{len(held)} arrays stand where {count * len(fields)} are due")
+    due = count * len(fields)
+    _damaged_if(len(held) < due, f"{len(held)} arrays stand where {due} are due")
     entries = np.empty(len(held) // max(len(fields), 1), dtype=object)
     for place in range(len(entries)):
         some = held[place * len(fields) : (place + 1) * len(fields)]

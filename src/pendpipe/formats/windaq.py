@@ -18,10 +18,16 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.layout import Layout
-from pendpipe.formats.table import Column, Marker, NotThisFormatError, ReadOptions, Table
-from pendpipe.formats.text import decode, table_of_text
+from pendpipe.errors import refuse_if
+from pendpipe.formats.table import (
+    Column,
+    Marker,
+    NotThisFormatError,
+    ReadOptions,
+    Table,
+    next_reader_if,
+)
+from pendpipe.formats.text import Layout, decode, table_of_text
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {
@@ -147,8 +153,8 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     """
     suffix = place.suffix.lower()
     size, notes = _size(data)
-    if not size and suffix not in SUFFIXES:
-        raise NotThisFormatError("the mark 0x8001 at the end of a WinDaq header is missing")
+    other = not size and suffix not in SUFFIXES
+    next_reader_if(other, "the mark 0x8001 at the end of a WinDaq header is missing")
     refuse_if(
         not size,
         place,
@@ -290,15 +296,9 @@ def _decoded(text: bytes) -> str:
 def repaired(data: bytes, header: WindaqHeader) -> WindaqHeader | None:
     """Find sizes under which a file with damaged ones makes sense from end to end.
 
-    The data size is sought among the header's with bits taken away (a bit that was set by
-    damage is the commonest damage), then among all. The trailers it implies must read as
-    events, then as texts to the end of the file.
+    The trailers that a data size implies must read as events, then as texts to the end of the
+    file.
     """
-    unit, masks = 2 * len(header.channels), [0]
-    available = len(data) - header.size
-    bits = [1 << place for place in range(32) if header.data_bytes >> place & 1]
-    for bit in bits if len(bits) <= 12 else []:
-        masks += [mask | bit for mask in masks]
     # From here on there is nothing but printable signs and NULs.
     tail = np.frombuffer(data[-_LONGEST_TAIL:], dtype=np.uint8)
     odd = np.flatnonzero((tail != 0) & (tail < 32) & ((tail < 9) | (tail > 13)) | (tail == 255))
@@ -319,13 +319,11 @@ def repaired(data: bytes, header: WindaqHeader) -> WindaqHeader | None:
                 return found[0][0].stamp_s is not None, len(found[0]), changed
         return None
 
-    likely = (size for size in sorted(masks, reverse=True) if 0 < size <= available)
-    first = next(filter(None, (consistent(size) for size in likely if size % unit == 0)), None)
     # A recording without comments ends a few hundred bytes after its samples. Part of an
     # event list reads as a list too: the one that begins with the start, else the longest.
-    end = available // unit * unit
-    others = range(end, max(end - _LONGEST_TAIL, 0), -unit) if first is None else ()
-    found = [first, *map(consistent, others)]
+    unit = 2 * len(header.channels)
+    end = (len(data) - header.size) // unit * unit
+    found = map(consistent, range(end, max(end - _LONGEST_TAIL, 0), -unit))
     return max(filter(None, found), key=lambda each: each[:2], default=(False, 0, None))[2]
 
 
@@ -631,8 +629,8 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
     InputError
         When a scan is damaged.
     """
-    if not re.search(rb"(^|[\r\n])sc\s+[+-]?\d", data[:65536]):
-        raise NotThisFormatError("there is no line 'sc' with counts")
+    scanned = re.search(rb"(^|[\r\n])sc\s+[+-]?\d", data[:65536])
+    next_reader_if(not scanned, "there is no line 'sc' with counts")
     text, notes = decode(data).replace("\0", ""), list[str]()
     lines = [line.strip() for line in text.split("\n")]
     scans = {n: line for n, line in enumerate(lines, start=1) if line.startswith("sc")}
@@ -642,10 +640,9 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
         notes.append(f"the last scan (line {last}) is cut short and left out")
         del rows[last]
     refuse_if(not rows, place, "there is no whole scan", "record again, or give another file")
-    for number, row in rows.items():
-        if not row or len(row) != width:
-            problem = f"'{scans[number][:60]}' is no whole scan"
-            raise InputError(f"{place}, line {number}", problem, "drop the row")
+    odd = next((number for number, row in rows.items() if not row or len(row) != width), 0)
+    problem = f"'{scans.get(odd, '')[:60]}' is no whole scan"
+    refuse_if(odd, f"{place}, line {odd}", problem, "drop the row")
     rates = re.findall(r"srate\s+(?:x([0-9a-f]{1,8})|(\d{1,9}))", text)
     srate = int(rates[-1][0] or rates[-1][1], 16 if rates[-1][0] else 10) if rates else 0
     if not srate and options.sample_rate is None:

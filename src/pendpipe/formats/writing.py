@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -24,21 +23,17 @@ _UNEVEN: Final = 0.25
 _WORTH_SAYING: Final = 0.02
 
 
-@dataclass(frozen=True)
-class Grid:
-    """The rows with a reading, their interval, the pauses between; what was lost by it.
-
-    A pause is a scan, and the seconds beyond the usual interval that are missing before it.
-    """
-
-    rows: IntArray
-    interval_s: float
-    pauses: tuple[tuple[int, float], ...]
-    notes: tuple[str, ...]
+_Pauses = list[tuple[int, float]]
+"""Each a scan, and the seconds beyond the usual interval that are missing before it."""
 
 
-def on_grid(place: str | Path, recording: Recording) -> Grid:
+def on_grid(place: str | Path, recording: Recording) -> tuple[IntArray, float, _Pauses, list[str]]:
     """Put the usable samples on an even grid.
+
+    Returns
+    -------
+    rows, interval_s, pauses, notes
+        The rows with a reading, their interval, the pauses between; what was lost by it.
 
     Raises
     ------
@@ -49,7 +44,7 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
     refuse_if(not len(rows), place, "there are no samples", "record again, or give another file")
     time_s = recording.time_s[rows]
     if len(rows) == 1:
-        return Grid(rows, recording.interval_s if len(recording) > 1 else 1.0, (), ())
+        return rows, recording.interval_s if len(recording) > 1 else 1.0, [], []
     steps = np.diff(time_s)
     breaks = np.flatnonzero(steps > 1.5 * float(np.median(steps)))
     edges = np.concatenate(([0], breaks + 1, [len(rows)]))
@@ -71,7 +66,7 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
         f"the samples are not evenly spaced (by up to {worst:.2g} of an interval)",
         "this form has no times: write OUT.csv instead",
     )
-    pauses = tuple((int(at) + 1, float(steps[at]) - interval_s) for at in breaks)
+    pauses = [(int(at) + 1, float(steps[at]) - interval_s) for at in breaks]
     notes = []
     if pauses:
         notes.append(
@@ -80,7 +75,7 @@ def on_grid(place: str | Path, recording: Recording) -> Grid:
         )
     if worst > _WORTH_SAYING:
         notes.append(f"times moved by up to {worst:.2g} of an interval, onto an even grid")
-    return Grid(rows, interval_s, pauses, tuple(notes))
+    return rows, interval_s, pauses, notes
 
 
 _LOWEST, _HIGHEST = -32768, 32767
@@ -144,17 +139,17 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
     InputError
         When the samples are not evenly spaced, or too many.
     """
-    grid = on_grid(place, recording)
-    values = recording.values[grid.rows]
-    begin_s = float(recording.time_s[grid.rows[0]])
-    length_s = float(recording.time_s[grid.rows[-1]]) - begin_s
+    rows, interval_s, pauses, notes = on_grid(place, recording)
+    values = recording.values[rows]
+    begin_s = float(recording.time_s[rows[0]])
+    length_s = float(recording.time_s[rows[-1]]) - begin_s
     for wrong, problem, remedy in (
         (len(values) > MOST_SAMPLES, f"{len(values)} samples are too many", "cut it"),
         (np.abs(values).max() > _LARGEST, "the readings are too large", "check their unit"),
         (length_s > _LONGEST_S, f"{length_s:.3g} s are too long", "check the time's unit"),
     ):
         refuse_if(wrong, place, f"{problem} for a .WDH", remedy)
-    slope, intercept, counts, notes = _scaled(recording, values)
+    slope, intercept, counts = _scaled(recording, values, notes)
     number = recording.metadata.get("channel", "1")
     channel = Channel(
         number=int(number) if number.isdecimal() and 0 < int(number) < 32 else 1,
@@ -171,19 +166,21 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
     content = pack(
         counts[:, None],
         [channel],
-        grid.interval_s,
+        interval_s,
         opened=opened,
         closed=min(opened + math.ceil(length_s), _LATEST) if opened else 0,
-        events=_events(recording, grid.rows, grid.pauses),
+        events=_events(recording, rows, pauses),
     )
     lost = [key for key in ("volts_per_radian",) if key in recording.metadata]
     notes += [f"a .WDH has no place for {key} ({recording.metadata[key]})" for key in lost]
-    if abs(begin_s) > 0.5 * grid.interval_s:
+    if abs(begin_s) > 0.5 * interval_s:
         notes.append(f"times in the .WDH count from its first sample ({begin_s:.6g} s here)")
-    return content, (*grid.notes, *notes)
+    return content, tuple(notes)
 
 
-def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, IntArray, list[str]]:
+def _scaled(
+    recording: Recording, values: FloatArray, notes: list[str]
+) -> tuple[float, float, IntArray]:
     """Find slope and intercept under which 16-bit counts hold the readings.
 
     Tried in turn: the converter's own range (its codes at the top of the word, as WinDaq
@@ -203,21 +200,21 @@ def _scaled(recording: Recording, values: FloatArray) -> tuple[float, float, Int
         tries.append((step, float(values[np.argmin(np.abs(values - middle))])))
     span_step = max((high - low) / (_HIGHEST - _LOWEST - 1), abs(middle) * 1e-12, 1e-12)
     tries.append((span_step, middle))
-    worst = 0.0
     for step, intercept in tries:
         counts = np.rint((values - intercept) / step)
         if counts.min() < _LOWEST or counts.max() > _HIGHEST:
             continue
         worst = float(np.abs(counts * step + intercept - values).max())
         if worst < 1e-3 * min(step, high - low or step):
-            return 4.0 * step, intercept, counts.astype(np.int64), []
-    note = f"readings rounded to the .WDH's 16 bits (by {worst:.2g} {recording.unit} at most)"
-    return 4.0 * step, intercept, counts.astype(np.int64), [note]
+            break
+    else:
+        notes.append(
+            f"readings rounded to the .WDH's 16 bits (by {worst:.2g} {recording.unit} at most)"
+        )
+    return 4.0 * step, intercept, counts.astype(np.int64)
 
 
-def _events(
-    recording: Recording, rows: IntArray, pauses: tuple[tuple[int, float], ...]
-) -> list[Event]:
+def _events(recording: Recording, rows: IntArray, pauses: _Pauses) -> list[Event]:
     """Gather pauses, markers and the starts of suspect stretches, in the order of scans."""
     time_s = recording.time_s[rows]
     by_scan: dict[int, list[str]] = {}
