@@ -74,6 +74,12 @@ def test_a_package_that_imports_its_own_modules_depends_on_each(library: Path) -
     assert version() != before
 
 
+def test_the_readers_of_files_count() -> None:
+    """They are imported by name, each when a file needs it."""
+    readers = {"pendpipe.formats.windaq", "pendpipe.formats.trees", "pendpipe.formats.containers"}
+    assert readers <= provenance._imports("pendpipe.formats.reading")
+
+
 def test_the_versions_of_all_commands_can_be_found() -> None:
     """An import that can't be followed would keep the workflow from starting."""
     for path in (provenance.PACKAGE / "commands").glob("*.py"):

@@ -118,13 +118,8 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
             found.append(Attempt(path, raw))
     if damages and not found:
         raise damages[0]
-    return sorted(found, key=lambda attempt: (attempt.recorded_at, _stamp(attempt.path)))
-
-
-def _stamp(path: Path) -> str:
-    """The time stamp in a name, down to microseconds; OUT.raw, the first of all, has none."""
-    found = re.search(_STAMP, path.name)
-    return found[0] if found else ""
+    # A name has its time stamp down to microseconds; OUT.raw, the first of all, has none.
+    return sorted(found, key=lambda one: (one.recorded_at, *re.findall(_STAMP, one.path.name)))
 
 
 def choose(attempts: Sequence[Attempt]) -> Attempt:

@@ -114,11 +114,10 @@ def _check_description(place: str, raw: RawRecording) -> None:
         *((key not in header, f"{key} is missing") for key in _NEEDED),
         *((not isinstance(header.get(key), str), f"{key} is no text") for key in _TEXTS),
         *(
-            (
-                not _lies_between(header.get(key, low), low, high),
-                f"{key} is {header.get(key)!r:.40}",
-            )
+            # (A comparison with NaN is false; and True is no number.)
+            (not (type(value) in (int, float) and low <= value <= high), f"{key} is {value!r:.40}")
             for key, (low, high) in _NUMBERS.items()
+            for value in (header.get(key, low),)
         ),
         (
             not isinstance(channels, list)
@@ -138,38 +137,28 @@ def _check_description(place: str, raw: RawRecording) -> None:
         refuse_if(wrong, place, problem, "give another copy")
 
 
-def _lies_between(value: object, low: float, high: float) -> bool:
-    """Whether it is a number between the two; NaN is none."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
-
-
 def _join(
     segments: Sequence[Segment], rate_hz: float, column: int, step: float
 ) -> tuple[FloatArray, FloatArray, ByteArray]:
     """Put the streams one after the other, with rows for what is missing between them."""
-    times: list[FloatArray] = []
-    values: list[FloatArray] = []
-    qualities: list[ByteArray] = []
-    for segment, offset_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
+    parts: list[tuple[FloatArray, FloatArray, ByteArray]] = []
+    for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
         length = len(segment.counts)
         inside = [loss for loss in segment.losses if 0 < loss.after_scan < length]
         number, index, quality = _place(length, inside)
-        begin_s = offset_s
-        if times:
-            last_s = float(times[-1][-1])
+        if parts:
+            last_s = float(parts[-1][0][-1])
             # Late stamps must not make time stand still.
-            begin_s = max(offset_s, last_s + 1.0 / rate_hz)
+            begin_s = max(begin_s, last_s + 1.0 / rate_hz)
             rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
             shown = np.arange(1, rows + 1) if rows <= _most_rows(length) else np.array([1, rows])
-            times.append(last_s + shown / rate_hz)
-            values.append(np.full(len(shown), np.nan))
-            qualities.append(np.full(len(shown), MISSING, dtype=np.uint8))
+            nothing = np.full(len(shown), np.nan), np.full(len(shown), MISSING, dtype=np.uint8)
+            parts.append((last_s + shown / rate_hz, *nothing))
         reading = np.full(len(quality), np.nan)
         reading[index] = segment.counts[:, column] * step
-        times.append(begin_s + number / rate_hz)
-        values.append(reading)
-        qualities.append(quality)
-    return np.concatenate(times), np.concatenate(values), np.concatenate(qualities)
+        parts.append((begin_s + number / rate_hz, reading, quality))
+    time_s, values, qualities = zip(*parts, strict=True)
+    return np.concatenate(time_s), np.concatenate(values), np.concatenate(qualities)
 
 
 def _most_rows(scans: int) -> int:
@@ -382,23 +371,23 @@ def _scans_of(
     losses: list[Loss] = []
     begin = scans = 0
     marked = not isinstance(decoder, WordDecoder)
-    for cut in _cuts(data, holes, size, marked=marked):
-        fed = decoder.feed(data[begin : cut.last_byte])
+    for cut in (*_cuts(data, holes, size, marked=marked), None):
+        fed = decoder.feed(data[begin : cut.last_byte if cut else len(data)])
         # (What might be the beginning of a stop code is held back.)
         ended = decoder.finish()
+        # A decoder counts its scans on over a cut.
         parts += [fed.counts, ended.counts]
         # A decoder of words tells of a stop code whenever it ends: once is enough.
-        losses += [*fed.losses, *ended.losses] if marked else []
+        losses += [*fed.losses, *ended.losses] if marked or not cut else []
         scans += len(fed) + len(ended)
+        if not cut:
+            break
         thrown = cut.next_byte - cut.last_byte
         lost = -(-(thrown + cut.bytes_missing) // size)
         losses.append(Loss(scans, thrown, lost, suspect_before=cut.suspect, reason=cut.reason))
         begin = cut.next_byte
-    fed, ended = decoder.feed(data[begin:]), decoder.finish()
-    # A decoder counts its scans on over a cut.
-    counts = [part for part in (*parts, fed.counts, ended.counts) if len(part)]
-    joined = np.concatenate(counts) if len(counts) > 1 else (counts or [fed.counts])[0]
-    return joined, (*losses, *fed.losses, *ended.losses)
+    counts = [part for part in parts if len(part)] or parts[:1]
+    return np.concatenate(counts) if len(counts) > 1 else counts[0], tuple(losses)
 
 
 class _Cut(NamedTuple):

@@ -107,8 +107,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     )
     columns = _whole_times([replace(column, role=meaning(column)) for column in table.columns])
     table = replace(table, columns=tuple(map(_settled, columns)))
-    own_clock = any(column.time_s is not None for column in columns)
-    time, counts = (None, False) if own_clock else _time(table, options)
+    time, counts = _time(table, options)
     if time is not None and time.role in ("length", "unknown"):
         # Headed "x, y", with x the time: then y is what was plotted, and no height.
         plotted = {c for c in table.columns if re.fullmatch(r"[yYzZ]\d?", c.name) and not c.unit}
@@ -223,8 +222,11 @@ def one_way(values: FloatArray) -> float:
 def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
     """Find the column of times, or else one that counts the samples.
 
-    Times may fall (the newest row first) and repeat (printed with few digits).
+    Times may fall (the newest row first) and repeat (printed with few digits). An instrument's own
+    clock needs none.
     """
+    if any(column.time_s is not None for column in table.columns):
+        return None, False
     if options.time_column is not None:
         given = find(table, table.columns, options.time_column)
         return given, given.role == "index"
@@ -248,14 +250,12 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
             or share < (0.5 if named else 0.95)
         ):
             continue
-        finite = column.values[np.isfinite(column.values)]
-        distinct = min(1.0, len(np.unique(finite)) / (0.5 * len(finite)))
         # A drifting reading rises too, but hardly in even steps.
-        even = _evenness(finite)
+        even = _evenness(column.values[np.isfinite(column.values)])
         first = place <= 0 and role in ("unknown", "index", "length") and share > 0.99
         if not named and even < 0.5 and not first:
             continue
-        score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share + 2.5 * (distinct - 1.0)
+        score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share
         # A number of the row, where anything else is a time.
         score -= 5.0 * (role == "index") or 3.0 * (not named and _counts_samples(column))
         score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
@@ -344,21 +344,21 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     if len(equals) == 1 or len(first) > 1:
         return first, ""
     # A drive has one size from beginning to end; a free decay has all of them.
-    of = [each[0].swing for each in equals]
-    graded = [c for c, swing in zip(equals, of, strict=True) if swing.clear and swing.graded > 0.3]
-    if graded and of[0].graded < 0.1 and of[0].clear:
+    own = first[0].swing
+    graded = [c for c in equals if c[0].swing.clear and c[0].swing.graded > 0.3]
+    if graded and own.graded < 0.1 and own.clear:
         return graded[0], ", whose swing decays"
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
     if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
         return first, ""
-    for column, swing in zip(equals, of, strict=True):
+    for column in equals:
         # Height, and the pull along the string, go through two cycles in one of the swing.
-        ratio = swing.samples_per_cycle / (of[0].samples_per_cycle or np.inf)
-        if swing.clear and abs(ratio - 2.0) < 0.05:
+        ratio = column[0].swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
+        if column[0].swing.clear and abs(ratio - 2.0) < 0.05:
             return column, f", of which '{first[0].label}' has twice the frequency"
-    largest = max(swing.amplitude for swing in of)
-    wide = [c for c, swing in zip(equals, of, strict=True) if swing.amplitude >= largest / 3]
-    return wide[0], "" if wide[0] is first else ", which swings most"
+    largest = max(column[0].swing.amplitude for column in equals)
+    wide = next(c for c in equals if c[0].swing.amplitude >= largest / 3)
+    return wide, "" if wide is first else ", which swings most"
 
 
 def _not_a_derivative(
@@ -376,18 +376,10 @@ def _not_a_derivative(
         if forward is None and backward is None:
             continue
         # Of a swing the derivative's derivative is the swing again, but upside down.
-        first = 2 * _like_units(forward) - 2 * _like_units(backward)
-        first += 1 if forward is not None and forward > 0 else -1
-        kept, other = (chosen, column) if first > 0 else (column, chosen)
+        first = forward is not None and forward > 0.0
+        kept, other = (chosen, column) if first else (column, chosen)
         return (kept,), f", whose derivative '{other.label}' is"
     return (chosen,), why
-
-
-def _like_units(slope: float | None) -> bool:
-    """Whether a slope is 1, or what comes of degrees beside radians."""
-    return slope is not None and any(
-        abs(abs(slope) / ratio - 1.0) < 0.1 for ratio in (1.0, np.pi / 180, 180 / np.pi)
-    )
 
 
 def _moves(column: Column) -> bool:

@@ -184,8 +184,7 @@ def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
 def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> TimeBase:
     """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
     if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
-        newest_last = np.arange(len(base.rows))[::-1]
-        base.keep(newest_last, "the newest row stands first: rows turned round")
+        base.keep(slice(None, None, -1), "the newest row stands first: rows turned round")
     if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
         start = float(base.time_s[0])
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
@@ -258,8 +257,7 @@ def _drop_repeats(choice: Choice, base: TimeBase) -> None:
                 same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
                 again &= same
     if again.any():
-        note = f"{again.sum()} row(s) that repeat the time of an earlier row left out"
-        base.keep(~again, note)
+        base.keep(~again, f"{again.sum()} row(s) that repeat the time of an earlier row left out")
 
 
 def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
@@ -286,7 +284,7 @@ def _sorted(choice: Choice, base: TimeBase) -> None:
     before, after = (float(np.nansum(np.abs(np.diff(some)))) for some in (values, values[order]))
     if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
         return
-    moved = int(np.sum(order != np.arange(len(order))))
+    moved = np.sum(order != np.arange(len(order)))
     base.keep(order, f"{moved} row(s) out of order: sorted by time")
 
 

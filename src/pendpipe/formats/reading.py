@@ -1,6 +1,7 @@
 """Any supported file to a recording: the readers in turn, then the choice of columns."""
 
 import bz2
+import importlib
 import lzma
 import re
 import stat
@@ -9,7 +10,6 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final
@@ -201,7 +201,7 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
         refuse_if(data.startswith(mark), place, f"this is {what}", remedy)
     reason: NotThisFormatError | None = None
     for name, (module, _, function) in ((name, where.partition(".")) for name, where in READERS):
-        reader: Reader = getattr(import_module(f"pendpipe.formats.{module}"), function)
+        reader: Reader = getattr(importlib.import_module(f"pendpipe.formats.{module}"), function)
         try:
             return reader(place, data, options)
         except NotThisFormatError as fault:
