@@ -168,15 +168,28 @@ class Rates:
     pace: FloatArray
 
 
-def rates(law: Law, motion: Motion) -> Rates:
+def rates(law: Law, motion: Motion, largest: float | None = None) -> Rates:
     """Return the rates of a law along a motion.
+
+    Parameters
+    ----------
+    law, motion
+        The law, and a motion.
+    largest
+        Along a motion that may be wrong, for a search on its way: g is bounded by this.
 
     Raises
     ------
     NoMotionError
         Where it does not turn.
     """
-    return _rates(_turning(law, motion), motion)
+    if largest is None:
+        g = _turning(law, motion)
+    else:
+        g = np.nan_to_num(np.clip(_pull(law, motion), -largest, largest))
+        g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
+    free = 1.0 - g * motion.clock.cosine
+    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free))
 
 
 def _turning(law: Law, motion: Motion) -> FloatArray:
@@ -187,22 +200,10 @@ def _turning(law: Law, motion: Motion) -> FloatArray:
     return g
 
 
-def _bounded_rates(law: Law, motion: Motion, largest: float) -> Rates:
-    """The same along a motion that may be wrong: with g bounded, for a search on its way."""
-    g = np.nan_to_num(np.clip(_pull(law, motion), -largest, largest))
-    steep = g * motion.clock.cosine > _STEEPEST
-    return _rates(np.where(steep, np.copysign(_STEEPEST, g), g), motion)
-
-
 def _pull(law: Law, motion: Motion) -> FloatArray:
     """G = f/(omega^2 r)."""
     omega = motion.angular_frequency
     return np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
-
-
-def _rates(g: FloatArray, motion: Motion) -> Rates:
-    free = 1.0 - g * motion.clock.cosine
-    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free))
 
 
 def follow(
@@ -259,9 +260,9 @@ def _solved(
     steepness: FloatArray | None = None
     before = math.inf
     for _ in range(_ROUNDS):
-        now = _bounded_rates(law, motion, largest)
+        now = rates(law, motion, largest)
         if steepness is None:
-            more = _bounded_rates(law, _larger(motion), largest)
+            more = rates(law, _larger(motion), largest)
             steepness = np.asarray((more.loss - now.loss) / _STEP)
         off = log_start + clock.integral(now.loss) - motion.log_amplitude
         change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)

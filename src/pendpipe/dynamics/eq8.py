@@ -170,7 +170,7 @@ class Eq8:
         )
 
     def shape_derivatives(self) -> FloatArray:
-        """Return the derivatives of m, h, q, g (columns) by a, b_h, b_v, c (rows)."""
+        """Return derivatives of m, h, q, g (columns) by the amplitude (none), a, b_h, b_v, c."""
         m, h, q, _, k = self.shape()
         half_turn = 0.5 * math.pi / self.angular_frequency
         stop = 0.0 if math.isinf(m) else m
@@ -178,6 +178,7 @@ class Eq8:
         by_delta = 0.0 if math.isinf(m) else 1.0 / (steepness - h - 2.0 * q * m)
         return np.array(
             [
+                [0.0, 0.0, 0.0, 0.0],
                 [half_turn * by_delta * stop * stop, 0.0, half_turn, 0.0],
                 [half_turn * by_delta * stop, half_turn, 0.0, 0.0],
                 [0.0, 0.0, 0.0, 1.0 / self.angular_frequency],

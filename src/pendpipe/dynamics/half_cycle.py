@@ -70,12 +70,15 @@ from pendpipe.dynamics.panel import (
 def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
     """Write the derivatives of nu by ln r, m, h and q (by g it is 2 sin(psi)/C), and their weights.
 
-    PULL is the weight of nu in dln r/dw and LAG in dtau/dw, TILT that of s in dtau/dw.
+    PULL is the weight of nu in dln r/dw and LAG in dtau/dw, TILT that of s in dtau/dw. What comes
+    of 1/C, and of what the sine adds to C nu, vanishes for the linear torque.
     """
-    m, h, q = shape[0], shape[1], shape[2]
+    m, h, q, g = shape[0], shape[1], shape[2], shape[VISCOUS]
+    k, centre = shape[CURVATURE], curve(shape, m)
     for j in range(NODE_COUNT):
-        cos = node[COS + j]
+        cos, bend = node[COS + j], node[BEND + j]
         r = radius * (1.0 + node[LOSS + j])
+        s = m + r * cos
         distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
         inverse = 1.0 / (distance + m)
         # Where s and u vanish together R has no derivative; its direction is then of no weight.
@@ -83,39 +86,21 @@ def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
         lever = r + 2.0 * m * cos
         stiffness = h * inverse + q
         drop = lever * h * inverse * inverse
-        bend, weight = node[BEND + j], node[WEIGHT + j] * node[SLIP + j] ** 2
+        nu = (lever * stiffness + 2.0 * g * node[SIN + j] + node[LEAN + j]) * bend
+        # d ln(1/C)/ds, and the same of the sum C + C(m) in the denominator of LEAN
+        steeper = 0.25 * k * s * bend * bend
+        whole = 1.0 / (1.0 / bend + centre)
+        by_s, by_m = 0.25 * s * bend * whole, 0.25 * m / centre * whole
+        scale = 0.25 * k * cos * whole * bend
         node[BY_RADIUS + j] = r * (stiffness - drop * (r + m * cos) * direction) * bend
-        node[BY_CENTRE + j] = 2.0 * cos * stiffness - drop * (1.0 + (m + r * cos) * direction)
-        node[BY_CENTRE + j] *= bend
+        node[BY_RADIUS + j] += r * cos * (scale * m * (1.0 + (s + m) * by_s) + nu * steeper)
+        node[BY_CENTRE + j] = (2.0 * cos * stiffness - drop * (1.0 + s * direction)) * bend
+        node[BY_CENTRE + j] += scale * (s + m + m * (2.0 + (s + m) * (by_s + by_m))) + nu * steeper
         node[BY_H + j] = lever * inverse * bend
         node[BY_Q + j] = lever * bend
+        weight = node[WEIGHT + j] * node[SLIP + j] ** 2
         node[PULL + j] = -weight * node[SIN + j]
-        node[LAG + j] = weight * node[COS + j] * bend
-        node[TILT + j] = 0.0
-    if shape[CURVATURE] > 0.0:
-        _differentiate_sine(node, shape, radius)
-
-
-@kernel
-def _differentiate_sine(node: FloatArray, shape: FloatArray, radius: float) -> None:
-    """Add what comes of 1/C and of what the sine adds to C nu."""
-    m, h, q, g = shape[0], shape[1], shape[2], shape[VISCOUS]
-    centre = curve(shape, m)
-    for j in range(NODE_COUNT):
-        cos, bend = node[COS + j], node[BEND + j]
-        r = radius * (1.0 + node[LOSS + j])
-        s = m + r * cos
-        distance = math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-        stiffness = (r + 2.0 * m * cos) * (h / (distance + m) + q)
-        nu = (stiffness + 2.0 * g * node[SIN + j] + node[LEAN + j]) * bend
-        # d ln(1/C)/ds, and the same of the sum C + C(m) in the denominator of LEAN
-        steeper = 0.25 * s * bend * bend
-        whole = 1.0 / (1.0 / bend + centre)
-        by_s = 0.25 * s * bend * whole
-        by_m = 0.25 * m / centre * whole
-        scale = 0.25 * cos * whole * bend
-        node[BY_RADIUS + j] += r * cos * (scale * m * (1.0 + (s + m) * by_s) + nu * steeper)
-        node[BY_CENTRE + j] += scale * (s + m + m * (2.0 + (s + m) * (by_s + by_m))) + nu * steeper
+        node[LAG + j] = weight * cos * bend
         node[TILT + j] = node[WEIGHT + j] * node[SLIP + j] * bend * steeper
 
 
@@ -149,10 +134,7 @@ def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float
     _differentiate(node, shape, radius)
     _grow(node, half_width)
     for c in range(work.sensitivities):
-        dm, dh, dq, dg = 0.0, 0.0, 0.0, 0.0
-        if c > 0:
-            dm, dh = directions[c - 1, 0], directions[c - 1, 1]
-            dq, dg = directions[c - 1, 2], directions[c - 1, 3]
+        dm, dh, dq, dg = directions[c, 0], directions[c, 1], directions[c, 2], directions[c, 3]
         column = columns[c]
         for j in range(NODE_COUNT):
             node[FORCING + j] = (
@@ -332,7 +314,7 @@ FINEST = 30
 def _start(work: Work, radius: float) -> None:
     """Set d ln r/dp and dtau/dp at the turning point y = m + r."""
     for c in range(work.sensitivities):
-        work.sigma[c] = 1.0 / radius if c == 0 else -work.directions[c - 1, 0] / radius
+        work.sigma[c] = ((1.0 if c == 0 else 0.0) - work.directions[c, 0]) / radius
         work.shift[c] = 0.0
 
 
@@ -341,12 +323,8 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
     """Write the derivatives of the next turning point, y' = r - m, to the row's head."""
     columns = work.sensitivities
     for c in range(columns):
-        if c == 0:
-            row[HEAD] = radius * work.sigma[0]
-            row[HEAD + columns] = y * work.shift[0]
-        else:
-            row[HEAD + c] = (radius * work.sigma[c] - work.directions[c - 1, 0]) / y
-            row[HEAD + columns + c] = work.shift[c]
+        row[HEAD + c] = (radius * work.sigma[c] - work.directions[c, 0]) / (1.0 if c == 0 else y)
+        row[HEAD + columns + c] = (y if c == 0 else 1.0) * work.shift[c]
 
 
 @kernel

@@ -214,6 +214,9 @@ class Kernel:
         return found
 
 
+_address_of, _double_in = ctypes.addressof, ctypes.c_double.from_buffer
+
+
 def address(array: FloatArray | IntArray) -> int:
     """Return where the numbers of a contiguous array are."""
     if array.size == 0:
@@ -221,7 +224,7 @@ def address(array: FloatArray | IntArray) -> int:
     if not array.flags.writeable and array.flags.c_contiguous:
         return array.ctypes.data
     # Twice as fast; it raises where the numbers are not contiguous.
-    return ctypes.addressof(ctypes.c_double.from_buffer(array))  # type: ignore[arg-type]
+    return _address_of(_double_in(array))  # type: ignore[arg-type]
 
 
 def folders() -> Iterator[Path]:

@@ -56,7 +56,7 @@ WORK: Final = np.dtype(
         ("head", "i8"),  # of a half cycle's row: its length, and that of each panel's part
         ("per_panel", "i8"),
         ("rate", "f8", _RATES),  # the rates themselves
-        ("directions", "f8", (_RATES, 4)),  # of m, h, q and g by each rate
+        ("directions", "f8", (_S, 4)),  # of m, h, q and g by the amplitude (none), and each rate
         # d ln r/dp and dtau/dp at fixed phase, at the end of the panel in hand, and at its start
         ("sigma", "f8", _S),
         ("shift", "f8", _S),

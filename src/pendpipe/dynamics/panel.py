@@ -185,6 +185,18 @@ def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
     return change, size
 
 
+@kernel(inline=True)
+def _force(node: FloatArray, shape: FloatArray, radius: float, j: int) -> tuple[float, float]:
+    """Return R + m, and nu (R + m), at a node."""
+    m, cos = shape[CENTRE], node[COS + j]
+    r = radius * (1.0 + node[LOSS + j])
+    # |.| because rounding can make the square negative where s and u vanish together
+    reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
+    force = (r + 2.0 * m * cos) * (shape[HYSTERETIC] + shape[QUADRATIC] * reach)
+    force += (2.0 * shape[VISCOUS] * node[SIN + j] + node[LEAN + j]) * reach
+    return reach, force * node[BEND + j]
+
+
 @kernel
 def solve(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
@@ -203,7 +215,6 @@ def solve(
     radius
         r at the start of the panel.
     """
-    m, h, q, g = shape[0], shape[1], shape[2], shape[3]
     for j in range(NODE_COUNT):
         latest, before, earlier = node[LOSS + j], node[BEFORE + j], node[EARLIER + j]
         node[EARLIER + j], node[BEFORE + j] = before, latest
@@ -212,14 +223,9 @@ def solve(
     for _ in range(60):
         _bend(node, shape, radius)
         for j in range(NODE_COUNT):
-            grown, cos, sin = 1.0 + node[LOSS + j], node[COS + j], node[SIN + j]
-            r = radius * grown
-            # |.| because rounding can make the square negative where s and u vanish together
-            reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-            force = (r + 2.0 * m * cos) * (h + q * reach)
-            force += (2.0 * g * sin + node[LEAN + j]) * reach
-            force *= node[BEND + j]  # nu (R + m)
-            node[SLOPE + j] = -grown * force * sin * node[WEIGHT + j] / (reach - force * cos)
+            reach, force = _force(node, shape, radius, j)
+            slope = -(1.0 + node[LOSS + j]) * force * node[SIN + j] * node[WEIGHT + j]
+            node[SLOPE + j] = slope / (reach - force * node[COS + j])
         multiply(INTEGRATION_T, node, SLOPE, node, SCRATCH)
         change, size = _renew(node, half_width)
         # The error left is the change times the rate at which changes shrink, once that is known.
@@ -234,16 +240,11 @@ def _finish(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
     """Integrate tau - w, and return whether the panel is resolved to `tolerance`."""
-    m, h, q, g = shape[0], shape[1], shape[2], shape[3]
     _bend(node, shape, radius)
     turned_back = 0
     for j in range(NODE_COUNT):
-        cos, sin = node[COS + j], node[SIN + j]
-        r = radius * (1.0 + node[LOSS + j])
-        reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-        force = (r + 2.0 * m * cos) * (h + q * reach)
-        force += (2.0 * g * sin + node[LEAN + j]) * reach
-        force *= node[BEND + j]
+        cos = node[COS + j]
+        reach, force = _force(node, shape, radius, j)
         scale = 1.0 / (reach - force * cos)
         still = node[WEIGHT + j] * node[BEND + j]
         node[SLIP + j] = reach * scale

@@ -133,7 +133,15 @@ def _fill_tables(reach: int, step: float, tables: Matrix) -> tuple[float, float,
     return flat, even, odd
 
 
-def track(values: FloatArray, start: FloatArray, columns: Matrix) -> tuple[int, float, float]:
+@kernel
+def _track(
+    values: FloatArray,
+    start: FloatArray,
+    table: Matrix,
+    result: FloatArray,
+    found: Matrix,
+    tables: Matrix,
+) -> int:
     """Fit half cycle after half cycle of evenly spaced readings, each placed by those before it.
 
     Parameters
@@ -144,34 +152,19 @@ def track(values: FloatArray, start: FloatArray, columns: Matrix) -> tuple[int, 
         Time of the first reading, interval; time of turning, half period, side (+1 above the
         level) and level of the first half cycle; rms of one reading; a, b, c of Eq. 13, so
         small that they shift times only (see `measure.py`).
-    columns
+    table
         To be filled: time, its sd, signed angle, its sd, level; shape (5, n). The level is
         estimated anew every `LEVEL_BLOCK` half cycles.
+    result
+        To be filled: the sum of squares about some of the fits, and its degrees of freedom.
+    found, tables
+        Room to work in; the loop ends if the half period outgrows its tables.
 
     Returns
     -------
-    count
+    int
         Half cycles measured: up to the end, or to where the lock is lost.
-    residual_square, freedom
-        Sum of squares about some of the fits, and its degrees of freedom.
     """
-    result = np.empty(2)
-    tables = np.empty((3, int(1.5 * start[3] / start[1]) + 2 * _LANES))
-    values = np.ascontiguousarray(values, dtype=np.float64)
-    count = _track(values, start, columns, result, np.empty((3, _BATCH)), tables)
-    return count, float(result[0]), float(result[1])
-
-
-@kernel
-def _track(
-    values: FloatArray,
-    start: FloatArray,
-    table: Matrix,
-    result: FloatArray,
-    found: Matrix,
-    tables: Matrix,
-) -> int:
-    """Do what `track` does; the loop ends if the half period outgrows its `tables`."""
     start_s, interval_s, centre_s, half_period_s = start[0], start[1], start[2], start[3]
     side, level, noise, rates = start[4], start[5], start[6], start[7:10]
     end, count, residual, freedom = table.shape[1], 0, 0.0, 0.0
@@ -309,10 +302,12 @@ def _tracked(
         head.noise_rms_rad,
         *_rates(head),
     ]
-    count, square, freedom = track(samples.values, np.array(begin), columns)
+    values, result = np.ascontiguousarray(samples.values, dtype=np.float64), np.empty(2)
+    tables = np.empty((3, int(1.5 * half_period / interval) + 2 * _LANES))
+    count = _track(values, np.array(begin), columns, result, np.empty((3, _BATCH)), tables)
     if count < 16:
         return None
-    noise = max(float(np.sqrt(square / freedom)), quantisation_rms(samples.step))
+    noise = max(math.sqrt(result[0] / result[1]), quantisation_rms(samples.step))
     columns[[1, 3], :count] *= noise / head.noise_rms_rad
     time, time_sd, angle, angle_sd, level = columns[:, :count]
     # A half cycle alone tells 0.19 of what its readings would say of a level alone.
