@@ -111,14 +111,14 @@ def draw_chance(bank: Bank, tones: ToneScans | None, seed: int, draws: int = DRA
         for name, parts in largest.items()
     }
     own = {
-        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local, _TRIALS_EXPONENT)
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local)
         for name, local in found.items()
     }
     smallest = np.min([np.exp(-0.5 * np.concatenate(loudest)), *found.values()], axis=0)
-    return Chance(_trials(smallest, _TRIALS_EXPONENT), own, draws)
+    return Chance(_trials(smallest), own, draws)
 
 
-def _trials(smallest: FloatArray, growth: float) -> Trials:
+def _trials(smallest: FloatArray) -> Trials:
     """Estimate the number of trials from the smallest p-values of many draws: 1 - F = (1 - p)^m."""
     ordered = np.sort(smallest)
     draws = len(ordered)
@@ -127,7 +127,7 @@ def _trials(smallest: FloatArray, growth: float) -> Trials:
     part = slice(max(2, draws // 50), int(_TAIL_SHARE * draws))
     middle = float(np.exp(np.mean(np.log(trials[part]))))
     at = float(np.exp(np.mean(np.log(ordered[part]))))
-    return Trials(max(middle, 1.0), growth, min(at, 0.5))
+    return Trials(max(middle, 1.0), _TRIALS_EXPONENT, min(at, 0.5))
 
 
 def printed(p_value: float) -> str:

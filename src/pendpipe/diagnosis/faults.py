@@ -100,10 +100,10 @@ class Forensics:
             self._examine(name, state, progress)
 
     def _tested(self, name: str, state: State, test: Test | None = None) -> tuple[Finding, float]:
-        """Make one test, and convert its p-value to a global one by its share of the level."""
+        """Make one test; return its finding and the global p-value."""
         made = test or TESTS[name]
         finding = made(state.data, state.fit, state.noise, self.samples)
-        return finding, min(finding.p_value / _SHARE_OF_EACH, 1.0)
+        return finding, _global(finding)
 
     def _examine(
         self, name: str, state: State, progress: Progress, test: Test | None = None
@@ -149,7 +149,7 @@ class Forensics:
         whole = replace(masked, weight=np.where(others, 0.0, 1.0))
         noise = replace(state.noise, weight=whole.weight)
         finding = TESTS[name](whole, state.fit, noise, self.samples)
-        p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
+        p_value = _global(finding)
         if p_value > self.level or finding.mask is None:
             progress(f"{name}: no longer needed with the final model")
             del state.faults[number]
@@ -200,7 +200,7 @@ class Forensics:
             + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
         corrected = replace(data, time_s=time, uniform=False)
-        if self._correct(state, corrected, found, 0.0, least=0.1 * state.fit.chi2):
+        if self._correct(state, corrected, found, least=0.1 * state.fit.chi2):
             progress(f"{number} samples were lost without a gap")
 
     def _correct_tracking(self, state: State, progress: Progress) -> None:
@@ -210,12 +210,11 @@ class Forensics:
         known = [f for f in state.faults if f.finding.identifier == tracking.TRACKING_NOISE]
         taken = known[0].finding.parameters["kappa"].value if known else 0.0
         corrected, finding = tracking.find(state.data, state.fit, self._recorded, taken)
-        p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
         kappa = finding.parameters.get("kappa")
-        if p_value > self.level or kappa is None or abs(kappa.value - taken) < kappa.sd:
+        if kappa is None or abs(kappa.value - taken) < kappa.sd:
             return
         gained = sum(fault.finding.delta_chi2 for fault in known)
-        if self._correct(state, corrected, replace(finding, delta_chi2=gained), p_value):
+        if self._correct(state, corrected, replace(finding, delta_chi2=gained)):
             progress(finding.summary)
             state.faults = [fault for fault in state.faults if fault not in known]
 
@@ -231,15 +230,14 @@ class Forensics:
             ):
                 continue
             corrected, finding = slips.find(name, state.data, state.fit, self.samples)
-            p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
-            if p_value <= self.level and self._correct(state, corrected, finding, p_value):
+            if self._correct(state, corrected, finding):
                 progress(finding.summary)
 
-    def _correct(
-        self, state: State, corrected: Data, finding: Finding, p_value: float, least: float = 0.0
-    ) -> bool:
-        """Keep a finding and its correction if chi^2 falls by more than `least`."""
-        model = state.fit.model
+    def _correct(self, state: State, corrected: Data, finding: Finding, least: float = 0.0) -> bool:
+        """Keep a significant finding and its correction if chi^2 falls by more than `least`."""
+        model, p_value = state.fit.model, _global(finding)
+        if p_value > self.level:
+            return False
         if corrected.time_s is not state.data.time_s:
             model = model.at_times(corrected.time_s)
         try:
@@ -271,6 +269,11 @@ class Forensics:
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))
         return True
+
+
+def _global(finding: Finding) -> float:
+    """Return a global p-value, by the test's share of the level."""
+    return min(finding.p_value / _SHARE_OF_EACH, 1.0)
 
 
 def _refit(state: State, out: BoolArray) -> None:

@@ -93,17 +93,12 @@ def _interval(argument: FloatArray, power: FloatArray) -> tuple[float, float] | 
     if not total > 0.0:
         return None
     order = np.argsort(argument, kind="stable")
-    cumulative = np.cumsum(power[order]) / total
-    sorted_argument = argument[order]
+    cumulative, rising = np.cumsum(power[order]) / total, argument[order]
     starts = np.concatenate([[0.0], cumulative[:-1]])
     ends = np.searchsorted(cumulative, starts + _INTERVAL_SHARE, side="left")
-    inside = ends < len(cumulative)
-    if not inside.any():
-        return float(sorted_argument[0]), float(sorted_argument[-1])
-    lengths = sorted_argument[ends[inside]] - sorted_argument[: len(ends)][inside]
-    best = int(np.argmin(lengths))
-    first = int(np.flatnonzero(inside)[best])
-    return float(sorted_argument[first]), float(sorted_argument[ends[first]])
+    firsts = np.flatnonzero(ends < len(cumulative))
+    first = firsts[np.argmin(rising[ends[firsts]] - rising[firsts])]
+    return float(rising[first]), float(rising[ends[first]])
 
 
 def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
@@ -112,8 +107,6 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
     Harmonics are fitted cycle by cycle, since the envelope varies slowly.
     """
     total = float(np.sum(difference**2))
-    if not total > 0.0:
-        return ()
     series, _ = by_cycle(difference, phase, _HARMONICS)
     held = np.sum(series**2, axis=0)
     # A cosine and a sine for each harmonic; the offset has one coefficient.
@@ -213,8 +206,6 @@ def powers_of_cycle(phase: FloatArray, power: FloatArray) -> FloatArray:
 def one_arc(powers: FloatArray, most: float) -> tuple[float, float] | None:
     """Return the shortest arc that holds the part `most`, if it is less than half the circle."""
     total = float(powers.sum())
-    if not total > 0.0:
-        return None
     for width in range(1, _HALF_CYCLE_BINS):
         sums = _arc_sums(powers, width)
         start = int(np.argmax(sums))

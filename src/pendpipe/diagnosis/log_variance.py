@@ -122,10 +122,8 @@ def log_variance(squares: Squares, smooth: Sequence[Smooth]) -> LogVariance:
 
 def _prior(smooth: Sequence[Smooth]) -> FloatArray:
     """Return the probability of each combination of strengths."""
-    parts = []
-    for each in smooth:
-        others = len(each.strengths) - 1
-        parts.append([0.5] + [0.5 / others] * others if others else [1.0])
+    others = [len(each.strengths) - 1 for each in smooth]
+    parts = [[0.5] + [0.5 / number] * number if number else [1.0] for number in others]
     return np.array([math.prod(shares) for shares in product(*parts)])
 
 

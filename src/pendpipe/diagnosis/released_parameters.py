@@ -76,8 +76,3 @@ class ReleasedParameter(Effect):
         by_part = (1.0 - share if self.frees == HYSTERETIC else -share) / float(value[B])
         along = by_part - share_by_b(value, parts)
         return fit.jacobian[:, B] + along * fit.jacobian[:, SHARE]
-
-
-def released_parameters(fixed: Mapping[str, float]) -> list[ReleasedParameter]:
-    """Return one for each held parameter."""
-    return [ReleasedParameter(name) for name in fixed]

@@ -19,11 +19,11 @@ from pendpipe.diagnosis.begin import SINE, Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.forensics.codes import with_true_step
-from pendpipe.diagnosis.forensics.coloured_noise import level_note
+from pendpipe.diagnosis.forensics.colour import level_note
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.released_parameters import released_parameters
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnosis.search import Search, search
@@ -314,7 +314,7 @@ def _searched(
         baseline=baseline,
         level=level,
         seed=seed,
-        released=released_parameters(fixed),
+        released=[ReleasedParameter(name) for name in fixed],
         progress=progress,
     )
     return *swap_in_likelier(found, beginning, progress), beginning

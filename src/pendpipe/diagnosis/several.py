@@ -21,10 +21,12 @@ from pendpipe.analysis.fit.result import Baseline, units
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
+from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.evidence import Scale
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.moves import price
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import (
@@ -372,8 +374,8 @@ def _misfit(found: Search) -> float:
 
 def _fitted(
     model: Stack,
-    data: StackedData,
-    noise: StackedNoise,
+    data: Data,
+    noise: Noise,
     searches: Sequence[Search],
     held: Sequence[int],
 ) -> Fit | None:
@@ -404,9 +406,10 @@ def _fitted(
         values.append(np.zeros(model.size))
         for mixing, fit in sorted(fits, key=lambda pair: pair is last):
             values[-1][np.argmax(mixing, axis=1)] = fit.value
-    starts = [each.copy() for each in values for _ in LESS_FRICTION]
-    for number, start in enumerate(starts):
-        start[C] *= LESS_FRICTION[number % len(LESS_FRICTION)]
+    friction = np.arange(model.size) == C
+    starts = [
+        np.where(friction, share * value, value) for value in values for share in LESS_FRICTION
+    ]
     return best_fit(model, data, noise, starts, held=held)
 
 
@@ -424,8 +427,6 @@ def _known_first(state: State, task: Task, searches: Sequence[Search]) -> None:
             return
         model, before = state.fit.model, state.fit
         assert isinstance(model, Stack)
-        assert isinstance(state.data, StackedData)
-        assert isinstance(state.noise, StackedNoise)
         step = max(steps, key=lambda each: each.winner.gain)
         common = model.admitted([step.winner.lead.effect])
         if step.winner.drawn or not common:
@@ -437,11 +438,12 @@ def _known_first(state: State, task: Task, searches: Sequence[Search]) -> None:
         lead = replace(step.winner.lead, effect=common[0])
         winner = replace(step.winner, lead=lead).again(fit, before.chi2, scale)
         # Rivals are refitted when they are weighed, each from its values in one recording.
-        rivals = [winner]
-        for rival in step.rivals[1:]:
-            same = model.admitted([rival.lead.effect]) == [rival.lead.effect]
-            rivals += [rival] if same and not rival.drawn else []
-        added = Step(tuple(rivals), step.p_value, before)
+        rivals = [
+            rival
+            for rival in step.rivals[1:]
+            if not rival.drawn and model.admitted([rival.lead.effect]) == [rival.lead.effect]
+        ]
+        added = Step((winner, *rivals), step.p_value, before)
         if winner.worth < price([*state.steps, added]) - price(state.steps):
             continue
         task.progress(f"beginning with {winner.name}")

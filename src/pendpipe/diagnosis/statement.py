@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendpipe.diagnosis.chance import printed
 from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
 
@@ -196,8 +197,6 @@ def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
 
 def _numbers(effect: FoundEffect) -> list[str]:
     """The parameters that the catalogue knows; what a test has counted, its sentence says."""
-    from pendpipe.effects.catalogue import CATALOGUE
-
     known = {each.identifier: {p.name for p in each.parameters} for each in CATALOGUE}
     wanted = known.get(effect.identifier, set(effect.parameters))
     shown = {name: each for name, each in effect.parameters.items() if name in wanted}
@@ -326,8 +325,6 @@ def _factor(ratio: float) -> str:
 
 def _rival(identifier: str) -> str:
     """The name behind an identifier."""
-    from pendpipe.effects.catalogue import by_identifier
-
     if identifier in _UNNAMED:
         return _UNNAMED[identifier]
     if identifier.startswith("parameter-"):

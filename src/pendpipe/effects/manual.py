@@ -4,7 +4,6 @@ import inspect
 import math
 
 from pendpipe.effects.catalogue import CATALOGUE
-from pendpipe.effects.effect import Effect
 from pendpipe.templates import render
 
 _HEADINGS = {
@@ -20,13 +19,9 @@ def page() -> str:
         "manual.md",
         effects=CATALOGUE,
         headings=_HEADINGS,
-        text=_text,
+        text=inspect.getdoc,
         number=_number,
     )
-
-
-def _text(effect: Effect) -> str:
-    return inspect.cleandoc(type(effect).__doc__ or "")
 
 
 def _number(value: float | None) -> str:

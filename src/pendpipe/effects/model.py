@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
@@ -182,11 +183,9 @@ class Model:
 
     def places(self) -> list[tuple[Effect, slice]]:
         """Each effect with the place of its values."""
-        found, first = [], self.first
-        for effect in self.effects:
-            found.append((effect, slice(first, first + effect.count)))
-            first += effect.count
-        return found
+        starts = accumulate((effect.count for effect in self.effects), initial=self.first)
+        pairs = zip(self.effects, starts, strict=False)
+        return [(effect, slice(start, start + effect.count)) for effect, start in pairs]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest values."""
@@ -398,8 +397,8 @@ def responses(
         part = slice(first, first + _AT_ONCE)
         total[part] += sampled.change(*tangent.of_force(np.stack(forces[part])))
     if effect.kick(changes[0][1]) is not None:
-        total += at.after_kicks([effect.kick(high) for _, high in changes])
-        total -= at.after_kicks([effect.kick(low) for low, _ in changes])
+        before = at.after_kicks([effect.kick(low) for low, _ in changes])
+        total += at.after_kicks([effect.kick(high) for _, high in changes]) - before
     for change, pair in zip(total, changes, strict=True):
         added = _change(effect, *pair, lambda values: effect.reading(sampled, pendulum, values))
         late = _change(effect, *pair, lambda values: effect.delay(sampled.time_s, values))

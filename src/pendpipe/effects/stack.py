@@ -93,14 +93,9 @@ def _block(effect: Effect, recording: int, size: int) -> FloatArray:
         found = np.zeros((size, 1))
         found[effect.index] = effect.recording == recording
         return found
-    rows = np.arange(single.count)
-    if single is not effect:
-        rows = np.where(
-            rows < single.sizes,
-            rows + recording * single.sizes,
-            rows + effect.sizes - single.sizes,
-        )
-    return np.eye(effect.count)[rows]
+    rows, own = np.arange(single.count), 0 if single is effect else recording * single.sizes
+    shifted = np.where(rows < single.sizes, rows + own, rows + effect.sizes - single.sizes)
+    return np.eye(effect.count)[shifted]
 
 
 @dataclass(frozen=True)
@@ -290,22 +285,21 @@ class Stack(Model):
 
 def _sampled(parts: Sequence[Part]) -> Sampled:
     """Return the motions one after the other, each in cycles of its own."""
-    first = parts[0].at.sampled
-    phases, cosines, sines = [first.phase], [first.cosine], [first.sine]
-    for part in parts[1:]:
-        one = part.at.sampled
-        sign = one.motion.upwards * first.motion.upwards
-        pace = one.motion.angular_frequency / first.motion.angular_frequency
+    samples = [part.at.sampled for part in parts]
+    first = samples[0]
+    signs = [one.motion.upwards * first.motion.upwards for one in samples]
+    omegas = [one.motion.angular_frequency for one in samples]
+    phases = [first.phase]
+    for one, sign in zip(samples[1:], signs[1:], strict=True):
         phase = one.phase + (0.0 if sign > 0.0 else math.pi)
         turns = math.ceil((phases[-1][-1] - phase[0]) / (2.0 * math.pi))
         phases.append(phase + 2.0 * math.pi * turns)
-        cosines.append(sign * one.cosine)
-        sines.append(sign * pace * one.sine)
+    each = list(zip(samples, signs, omegas, strict=True))
     return replace(
         first,
-        time_s=np.concatenate([part.at.sampled.time_s for part in parts]),
+        time_s=np.concatenate([one.time_s for one in samples]),
         phase=np.concatenate(phases),
-        amplitude=np.concatenate([part.at.sampled.amplitude for part in parts]),
-        cosine=np.concatenate(cosines),
-        sine=np.concatenate(sines),
+        amplitude=np.concatenate([one.amplitude for one in samples]),
+        cosine=np.concatenate([sign * one.cosine for one, sign, _ in each]),
+        sine=np.concatenate([sign * pace / omegas[0] * one.sine for one, sign, pace in each]),
     )

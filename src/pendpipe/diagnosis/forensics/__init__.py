@@ -11,8 +11,7 @@ from typing import Final
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import (
-    broadband_drive,
-    coloured_noise,
+    colour,
     converter,
     glitches,
     sampling_times,
@@ -31,8 +30,8 @@ TESTS: Final[dict[str, Test]] = {
     "missing-codes": converter.find_missing_codes,
     "coarse-quantisation": converter.find_coarse_steps,
     "jitter": sampling_times.find_jitter,
-    "coloured-noise": coloured_noise.find,
-    "broadband-drive": broadband_drive.find,
+    "coloured-noise": colour.find_coloured_noise,
+    "broadband-drive": colour.find_random_torque,
 }
 """In order: readings masked by one test are not used by those after it."""
 

@@ -236,8 +236,8 @@ class Coded:
         Standard deviation of `position`'s error, in steps.
     ratio
         Noise before rounding, in steps.
-    index
-        Index among the samples; shape (m,).
+    datum
+        Index among the data, shape (m,); None where these are means of several readings.
     """
 
     lattice: Lattice
@@ -245,7 +245,7 @@ class Coded:
     position: FloatArray
     blur: float
     ratio: float
-    index: IntArray
+    datum: IntArray | None
 
     @property
     def error(self) -> FloatArray:
@@ -261,15 +261,15 @@ class Raw:
     ----------
     values, residual, phase, used
         Readings, readings minus model, phase of the motion, and whether each counts.
-    index
-        Index among the samples.
+    datum
+        Index among the data; None where these are means.
     """
 
     values: FloatArray
     residual: FloatArray
     phase: FloatArray
     used: BoolArray
-    index: IntArray
+    datum: IntArray | None = None
 
 
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
@@ -277,8 +277,8 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     sampled, reading = fit.at.sampled, fit.at.reading
     part = whole_readings(data, samples)
     if part is not None:
-        error, index = error_of(data, fit), np.arange(part.start, part.stop)
-        return Raw(samples.values[part], error, sampled.phase, data.weight > 0.0, index)
+        error, datum = error_of(data, fit), np.arange(len(data))
+        return Raw(samples.values[part], error, sampled.phase, data.weight > 0.0, datum)
     first, last = np.searchsorted(samples.time_s, data.time_s[[0, -1]] + [-1e-9, 1e-9]).tolist()
     index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
     when, values = samples.time_s[index], samples.values[index]
@@ -287,7 +287,6 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
         values - _between(data.time_s, reading, when),
         np.interp(when, data.time_s, sampled.phase),
         np.interp(when, data.time_s, data.weight) > 0.99,
-        index,
     )
 
 
@@ -313,7 +312,8 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     if misfit < _GOOD_MODEL:
         error, blur = raw.residual, min(0.5 * misfit, 0.05)
     position = lattice.position((raw.values - error)[good])
-    return Coded(lattice, lattice.code[good], position, blur, ratio, raw.index[good])
+    datum = None if raw.datum is None else raw.datum[good]
+    return Coded(lattice, lattice.code[good], position, blur, ratio, datum)
 
 
 def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:

@@ -251,21 +251,22 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         lead = f"every {comb.period}th code (from {codes[0]}"
         found = _rare(data, coded, codes, comb.residue, lead)
         more = {"period": Estimate(float(comb.period), 0.0, "")}
-        gain, summary = comb.residue.gain, found.summary
-    else:
-        bad = counts.chosen(chance < _SIGNIFICANT)
-        seldom = bad.chosen(bad.found < bad.expected)
-        named = ", ".join(map(str, seldom.code[:5])) + (", ..." if len(seldom.code) > 5 else "")
-        found = _rare(data, coded, seldom.code, seldom, f"{len(seldom.code)} code(s) ({named}")
-        more, gain, summary = {}, bad.gain, found.summary
-        if by_bit <= by_code:
-            half = Estimate(0.5, 0.5 / math.sqrt(len(coded.code)), "")
-            more = {"bit": Estimate(float(bit), 0.0, ""), "share": half}
-            gain = max(gain, -2.0 * math.log(max(p_value, 1e-300)))
-            summary = f"bit {bit} of the converter is stuck or unreliable: {100 * part:.0f} % of"
-            summary += " the readings lie in one half of its codes"
-    parameters = {**found.parameters, **more}
-    return replace(found, p_value=p_value, delta_chi2=gain, parameters=parameters, summary=summary)
+        return replace(found, p_value=p_value, parameters={**found.parameters, **more})
+    bad = counts.chosen(chance < _SIGNIFICANT)
+    seldom = bad.chosen(bad.found < bad.expected)
+    named = ", ".join(map(str, seldom.code[:5])) + (", ..." if len(seldom.code) > 5 else "")
+    found = _rare(data, coded, seldom.code, seldom, f"{len(seldom.code)} code(s) ({named}")
+    found = replace(found, p_value=p_value, delta_chi2=bad.gain)
+    if by_bit > by_code:
+        return found
+    half = Estimate(0.5, 0.5 / math.sqrt(len(coded.code)), "")
+    return replace(
+        found,
+        delta_chi2=max(bad.gain, -2.0 * math.log(max(p_value, 1e-300))),
+        parameters={**found.parameters, "bit": Estimate(float(bit), 0.0, ""), "share": half},
+        summary=f"bit {bit} of the converter is stuck or unreliable: {100 * part:.0f} % of the"
+        " readings lie in one half of its codes",
+    )
 
 
 def _rare(data: Data, coded: Coded, codes: IntArray, counts: Counts, lead: str) -> Finding:
@@ -276,6 +277,7 @@ def _rare(data: Data, coded: Coded, codes: IntArray, counts: Counts, lead: str) 
     return Finding(
         "missing-codes",
         1.0,
+        counts.gain,
         parameters={
             "share": Estimate(missing / readings, sd / readings, ""),
             "number": Estimate(float(len(codes)), 0.0, ""),
@@ -421,8 +423,8 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     If the observed codes are several of the converter's steps apart, its lowest bits are dead or
     an earlier stage has a coarser step, and no estimate is needed.
     """
-    if samples.promised_step is not None:
-        return _dead_bits(data, fit, samples)
+    if samples.step is not None and samples.promised_step is not None:
+        return _dead_bits(data, fit, samples, samples.step, samples.promised_step)
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 60:
         return nothing("coarse-quantisation")
@@ -449,23 +451,20 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     )
 
 
-def _dead_bits(data: Data, fit: Fit, samples: Samples) -> Finding:
+def _dead_bits(data: Data, fit: Fit, samples: Samples, step: float, promised: float) -> Finding:
     """Report codes that all lie on a coarser lattice; by chance each would with 1/times.
 
     With noise above half the converter's step every code is as probable as its neighbours, so
     that each reading contributes ln(times) to the log-likelihood. The lattice's origin is
     estimated from the codes, and so is its spacing if that is not a whole number.
     """
-    assert samples.step is not None
-    assert samples.promised_step is not None
-    times = samples.step / samples.promised_step
+    times = step / promised
     whole = abs(times - round(times)) < _WHOLE_WITHIN
     free = len(np.unique(samples.values)) - (1 if whole else 2)
-    steps = f"the step is {samples.step:.3g} {data.unit}, but the converter's bits give"
-    steps += f" {samples.promised_step:.3g}"
+    steps = f"the step is {step:.3g} {data.unit}, but the converter's bits give {promised:.3g}"
     parameters = {
-        "step": Estimate(samples.step, 0.0, data.unit),
-        "promised": Estimate(samples.promised_step, 0.0, data.unit),
+        "step": Estimate(step, 0.0, data.unit),
+        "promised": Estimate(promised, 0.0, data.unit),
     }
     if whole:
         parameters["dead_bits"] = Estimate(math.log2(times), 0.0, "")

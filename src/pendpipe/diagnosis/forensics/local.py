@@ -152,7 +152,7 @@ def local_residual(
         again = np.abs(local.scaled) > _OUTLIER_SD
         if np.any(again != far):
             far, local = again, _fitted(columns, window, values, part & ~again, used)
-        if not _has_harmonics(phase, window, local, part & ~far):
+        if harmonics > 1 or not _has_harmonics(phase, window, local, part & ~far):
             break
     return local
 
@@ -217,13 +217,10 @@ def _rms(left: FloatArray, freedom: float) -> float:
 def _has_harmonics(phase: FloatArray, window: IntArray, local: Local, part: BoolArray) -> bool:
     """Whether windows contain more of the second or third harmonic than noise would."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    total, number = 0.0, 0
-    for harmonic in (2, 3):
-        for column in (np.cos(harmonic * phase), np.sin(harmonic * phase)):
-            kept = column * part
-            norm = np.add.reduceat(kept * kept, starts)
-            size = np.add.reduceat(kept * local.left, starts)
-            good = norm > 4.0
-            total += float(np.sum(np.minimum(size[good] ** 2 / norm[good] / local.rms**2, 50.0)))
-            number += int(np.count_nonzero(good))
-    return total > number + _HARMONICS_SD * math.sqrt(2.0 * max(number, 1))
+    waves = [wave(order * phase) for order in (2, 3) for wave in (np.cos, np.sin)]
+    kept = np.array(waves) * part
+    norm = np.add.reduceat(kept * kept, starts, axis=1)
+    size = np.add.reduceat(kept * local.left, starts, axis=1)
+    power = np.minimum(size[norm > 4.0] ** 2 / norm[norm > 4.0] / local.rms**2, 50.0)
+    chance = len(power) + _HARMONICS_SD * math.sqrt(2.0 * max(len(power), 1))
+    return float(power.sum()) > chance

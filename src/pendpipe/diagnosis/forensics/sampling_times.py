@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.codes import Coded, read_codes, rounding_moments, whole_readings
+from pendpipe.diagnosis.forensics.codes import Coded, read_codes, rounding_moments
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
@@ -181,7 +181,7 @@ def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
         return nothing("jitter")
     coded = read_codes(data, fit, samples)
     if coded is not None and coded.ratio < _DITHERED:
-        squares = _rounded(data, fit, samples, coded)
+        squares = _rounded(fit, coded)
     else:
         squares = _dithered(data, fit, noise)
     if squares is None or len(squares.square) < 50:
@@ -212,12 +212,11 @@ def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit / speed, shared)
 
 
-def _rounded(data: Data, fit: Fit, samples: Samples, coded: Coded) -> Squares | None:
+def _rounded(fit: Fit, coded: Coded) -> Squares | None:
     """Return squares of rounding errors; None if the angles are not known well enough."""
-    part = whole_readings(data, samples)
-    if part is None or coded.blur > _LARGEST_BLUR:
+    index = coded.datum
+    if index is None or coded.blur > _LARGEST_BLUR:
         return None
-    index = coded.index - part.start
     # At rest within a step all errors are equal: they contain no information on noise.
     moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
     if np.count_nonzero(moving) < 50:
