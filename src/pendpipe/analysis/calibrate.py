@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
@@ -104,17 +104,16 @@ def _columns(place: Path, delimiter: str | None, decimal: str | None) -> dict[st
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    if not lines:
-        raise InputError(place, "the file is empty", "give a table with a header")
+    refuse_if(not lines, place, "the file is empty", "give a table with a header")
     mark = delimiter or next((sign for sign in "\t;," if sign in lines[0][1]), ",")
     names = [name.strip().strip('"') for name in lines[0][1].split(mark)]
     for needed in (("volts",), ANGLES):
-        if sum(name in names for name in needed) != 1:
-            raise InputError(
-                f"{place}, line {lines[0][0]}",
-                f"exactly one column {' or '.join(needed)} is needed (found {', '.join(names)})",
-                "rename the columns",
-            )
+        refuse_if(
+            sum(name in names for name in needed) != 1,
+            f"{place}, line {lines[0][0]}",
+            f"exactly one column {' or '.join(needed)} is needed (found {', '.join(names)})",
+            "rename the columns",
+        )
     wanted = [name for name in (*ANGLES, "volts", "volts_sd", "angle_sd_rad") if name in names]
     rows = [(number, next(csv.reader([line], delimiter=mark))) for number, line in lines[1:]]
     return {
@@ -129,8 +128,7 @@ def _number(
     """Read one cell."""
     number, cells = row
     where = f"{place}, line {number}"
-    if index >= len(cells):
-        raise InputError(where, f"{name} is missing", "complete or drop the row")
+    refuse_if(index >= len(cells), where, f"{name} is missing", "complete or drop the row")
     text = cells[index].strip()
     if decimal == "," or (decimal is None and "." not in text):
         text = text.replace(",", ".")
@@ -140,8 +138,8 @@ def _number(
         raise InputError(
             where, f"{name} '{text}' is no number", "correct or drop the row"
         ) from None
-    if not abs(value) < _LARGEST:  # nor is NaN
-        raise InputError(where, f"{name} is {text}", "correct or drop the row")
+    # nor is NaN
+    refuse_if(not abs(value) < _LARGEST, where, f"{name} is {text}", "correct or drop the row")
     return value
 
 
@@ -362,28 +360,45 @@ def _check(
     angle_sd: FloatArray,
 ) -> None:
     """Refuse points through which no line can be drawn."""
-    if len(angle) < FEWEST_POINTS:
-        raise InputError(
-            place, f"{len(angle)} point(s) are too few for a line", f"give {FEWEST_POINTS} or more"
-        )
-    if not (np.isfinite(angle).all() and np.isfinite(volts).all()):
-        raise InputError(place, "a value is NaN or infinite", "drop the row")
+    refuse_if(
+        len(angle) < FEWEST_POINTS,
+        place,
+        f"{len(angle)} point(s) are too few for a line",
+        f"give {FEWEST_POINTS} or more",
+    )
+    refuse_if(
+        not (np.isfinite(angle).all() and np.isfinite(volts).all()),
+        place,
+        "a value is NaN or infinite",
+        "drop the row",
+    )
     # Angles made from lengths may differ by rounding only.
-    if np.ptp(angle) <= 1e-12 * np.max(np.abs(angle)):
-        raise InputError(place, "all the angles are the same", "move the sensor between readings")
-    if np.ptp(volts) == 0.0:
-        raise InputError(place, "all the volts are the same", "check the sensor's connection")
+    refuse_if(
+        np.ptp(angle) <= 1e-12 * np.max(np.abs(angle)),
+        place,
+        "all the angles are the same",
+        "move the sensor between readings",
+    )
+    refuse_if(
+        np.ptp(volts) == 0.0, place, "all the volts are the same", "check the sensor's connection"
+    )
     spread = np.zeros_like(angle) if volts_sd is None else volts_sd
     negative = (spread < 0.0) | (angle_sd < 0.0)
     # Without any, all weigh the same; with some, a point without would outweigh the rest.
     unweighted = (spread == 0.0) & (angle_sd == 0.0)
     none_given = volts_sd is None and not angle_sd.any()
-    if negative.any() or not np.isfinite(spread + angle_sd).all():
-        raise InputError(place, "a standard deviation is negative or not finite", "correct it")
-    if unweighted.any() and not none_given:
-        raise InputError(
-            place, "a point has no error, neither in volts nor in angle", "give its volts_sd"
-        )
+    refuse_if(
+        negative.any() or not np.isfinite(spread + angle_sd).all(),
+        place,
+        "a standard deviation is negative or not finite",
+        "correct it",
+    )
+    refuse_if(
+        unweighted.any() and not none_given,
+        place,
+        "a point has no error, neither in volts nor in angle",
+        "give its volts_sd",
+    )
 
 
 def _within(value: float, sd: float, unit: str, reach: float) -> Estimate:

@@ -22,7 +22,7 @@ from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
 from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 
 
@@ -512,10 +512,12 @@ def compare(
         If no record can be compared.
     """
     losses = viscous_losses(records, surroundings)
-    if not losses.records:
-        raise InputError(
-            "comparison", "no record swings in a fluid with a known sphere", "add a geometry"
-        )
+    refuse_if(
+        not losses.records,
+        "comparison",
+        "no record swings in a fluid with a known sphere",
+        "add a geometry",
+    )
     factor = theory_factor(losses, errors)
     steady = losses.drag_over_theory(0.0)
     theory = losses.quality_factor_theory()

@@ -12,7 +12,7 @@ from math import inf, isfinite, nan, pi
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import hysteretic_quality_factor
 
@@ -149,10 +149,9 @@ def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
     InputError
         Without records, or if their losses are not positive.
     """
-    if not records:
-        raise InputError(
-            "air benchmark", "no record in air can be used", "add records with fluid air"
-        )
+    refuse_if(
+        not records, "air benchmark", "no record in air can be used", "add records with fluid air"
+    )
     frequency = np.array([record.frequency.value for record in records])
     rate = np.array([record.linear.value for record in records])
     per_inverse = np.pi / frequency
@@ -165,8 +164,9 @@ def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
     weights = sd**-2
     information = float(np.sum(weights * per_inverse**2))
     inverse = float(np.sum(weights * per_inverse * rate)) / information
-    if not inverse > 0.0:
-        raise InputError("air benchmark", "the losses in air are not positive", "check the fits")
+    refuse_if(
+        not inverse > 0.0, "air benchmark", "the losses in air are not positive", "check the fits"
+    )
     inverse_sd = information**-0.5
     chi2 = float(np.sum(weights * (rate - inverse * per_inverse) ** 2))
     exponent, chi2_free = _free_exponent(frequency, rate, sd, inverse)

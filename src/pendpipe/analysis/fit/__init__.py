@@ -16,7 +16,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.analysis.two_modes import BEAT
-from pendpipe.errors import InputError, NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -74,10 +74,12 @@ def fit_recording(
         or the search did not come to its end.
     """
     check_fixed(fixed or {}, baseline)
-    if restoring == "sine" and recording.quantity == "displacement_m":
-        raise InputError(
-            place, "a displacement in metres has no sine", "leave --restoring out, or give --unit"
-        )
+    refuse_if(
+        restoring == "sine" and recording.quantity == "displacement_m",
+        place,
+        "a displacement in metres has no sine",
+        "leave --restoring out, or give --unit",
+    )
     result = _fit(recording, method, restoring, baseline, fixed, points, place)
     beats = [note for note in points.notes if note.startswith(BEAT)] if points else []
     if beats:

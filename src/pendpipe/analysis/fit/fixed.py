@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from pendpipe.analysis.fit.result import Baseline
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 NAMES: Final = (
     "a",
@@ -35,8 +35,7 @@ def parse_fixed(words: Iterable[str], baseline: Baseline = "eq8") -> dict[str, f
         name, equals, text = word.partition("=")
         if not equals:
             raise _nameless(word)
-        if name in fixed:
-            raise InputError(f"--fix {word}", f"{name} is held twice", "give it once")
+        refuse_if(name in fixed, f"--fix {word}", f"{name} is held twice", "give it once")
         try:
             fixed[name] = float(text)
         except ValueError:
@@ -59,14 +58,18 @@ def check_fixed(fixed: Mapping[str, float], baseline: Baseline) -> None:
         if name not in NAMES:
             raise _nameless(word)
         least = 0.0 if name != "offset" else -math.inf
-        if not math.isfinite(value) or value < least or (name in _POSITIVE and value == 0.0):
-            raise InputError(f"--fix {word}", f"{name} can't be {value:g}", "give a possible value")
-        if baseline == "viscous" and name in _NOT_VISCOUS:
-            raise InputError(
-                f"--fix {word}",
-                f"the viscous baseline (Eq. 3) has no {name}",
-                "leave it out, or use --baseline eq8",
-            )
+        refuse_if(
+            not math.isfinite(value) or value < least or (name in _POSITIVE and value == 0.0),
+            f"--fix {word}",
+            f"{name} can't be {value:g}",
+            "give a possible value",
+        )
+        refuse_if(
+            baseline == "viscous" and name in _NOT_VISCOUS,
+            f"--fix {word}",
+            f"the viscous baseline (Eq. 3) has no {name}",
+            "leave it out, or use --baseline eq8",
+        )
     quality_factors = [name for name in fixed if name.startswith("quality_factor")]
     if "b" in fixed and quality_factors:
         raise InputError(

@@ -17,7 +17,7 @@ from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.analysis.two_modes import BEAT
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number
 from pendpipe.files import make_folder, read_json, write_json
 from pendpipe.quantities import compact, with_error
@@ -374,8 +374,12 @@ def read_fit(path: str | Path) -> FitResult:
         If the file is absent, is no fit, or holds the refusal of its record.
     """
     content = read_json(path)
-    if "refused" in content:
-        raise InputError(path, f"the record was refused ({content['refused']})", "correct it first")
+    refuse_if(
+        "refused" in content,
+        path,
+        f"the record was refused ({content.get('refused')})",
+        "correct it first",
+    )
     try:
         return FitResult.from_json(content)
     except (KeyError, TypeError) as fault:

@@ -117,12 +117,8 @@ def first_places(rough: Rough) -> Places:
     at = np.arange(rough.number[0] - 1, rough.number[-1] + 1)
     weight = np.ones(len(rough.number))
     centre, half_period = smooth_times(rough.number, rough.time_s, weight, 5.0, at)
-    return _places(at, centre, half_period, -int(rough.side[0]))
-
-
-def _places(number: np.ndarray, centre: FloatArray, half_period: FloatArray, side: int) -> Places:
-    alternating = side * (1.0 - 2.0 * ((number - number[0]) % 2))
-    return Places(number, centre, half_period, alternating)
+    alternating = rough.side[0] * (2.0 * ((at - at[0]) % 2) - 1.0)
+    return Places(at, centre, half_period, alternating)
 
 
 def times_and_weights(
@@ -159,14 +155,14 @@ def _further(places: Places, measured: Measured, noise: float, count: int) -> Pl
     used = np.cumsum(weight[known][::-1])
     enough = int(np.searchsorted(used, 400.0 * weight[known].max())) + 1
     known = known[-max(enough, 24) :]
-    n, t, w = places.number[known].astype(np.float64), time[known], weight[known]
-    middle, mean = float(np.average(n, weights=w)), float(np.average(t, weights=w))
-    slope = float(np.sum(w * (n - middle) * (t - mean)) / np.sum(w * (n - middle) ** 2))
+    line = np.polynomial.Polynomial.fit(
+        places.number[known], time[known], 1, w=np.sqrt(weight[known])
+    )
     number = places.number[-1] + 1 + np.arange(count)
     return Places(
         number,
-        mean + slope * (number - middle),
-        np.full(count, slope),
+        line(number),
+        np.full(count, line.deriv()(0.0)),
         places.side[-1] * (2.0 * (np.arange(count) % 2) - 1.0),
     )
 

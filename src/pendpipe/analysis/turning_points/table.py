@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import replaced
 from pendpipe.recording import whole_lines
 
@@ -172,12 +172,18 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
     metadata = {key: value for key, value in head if key not in ("cut", "note")}
-    if "refused" in metadata:
-        raise InputError(
-            place, f"the record was refused ({metadata['refused']})", "correct it first"
-        )
-    if start == len(lines) or lines[start].strip() != ",".join(COLUMNS):
-        raise InputError(place, "this is no table of turning points", "run pendpipe turning-points")
+    refuse_if(
+        "refused" in metadata,
+        place,
+        f"the record was refused ({metadata.get('refused')})",
+        "correct it first",
+    )
+    refuse_if(
+        start == len(lines) or lines[start].strip() != ",".join(COLUMNS),
+        place,
+        "this is no table of turning points",
+        "run pendpipe turning-points",
+    )
     try:
         table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
         numbers = {key: float(metadata.pop(key)) for key in _NUMBERS}
