@@ -39,16 +39,22 @@ class InputError(Exception):
         return type(self), (self.place, self.problem, self.remedy)
 
 
-def refuse_if(wrong: object, place: str | Path, problem: str, remedy: str) -> None:
+def refuse_if(
+    wrong: object,
+    place: str | Path,
+    problem: str,
+    remedy: str,
+    error: type[InputError] = InputError,
+) -> None:
     """Refuse the input where something is wrong with it.
 
     Raises
     ------
     InputError
-        Where `wrong` is true.
+        Or what `error` names, where `wrong` is true.
     """
     if wrong:
-        raise InputError(place, problem, remedy)
+        raise error(place, problem, remedy)
 
 
 class NotAnalysableError(InputError):

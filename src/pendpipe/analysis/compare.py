@@ -413,8 +413,7 @@ def _derivative(
 def _log_quality(branch: ViscousLosses) -> FloatArray:
     """Return ln Q_v; where an error of k leaves no loss at all, the smallest that counts."""
     rate = np.maximum(branch.rate_per_s, 1e-3 * branch.rate_sd_per_s + 1e-300)
-    logarithm: FloatArray = np.log(np.pi * branch.frequency_hz / rate)
-    return logarithm
+    return np.asarray(np.log(np.pi * branch.frequency_hz / rate))
 
 
 def _part(branch: ViscousLosses, low: int, high: int) -> ViscousLosses:

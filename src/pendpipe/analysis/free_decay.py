@@ -23,7 +23,7 @@ from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
 from pendpipe.analysis.two_modes import BEAT, two_modes
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
 
@@ -384,12 +384,13 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     if told.legs < _MANY and rivals >= max(2, told.legs // 3):
         # Many half cycles that follow one another are no accident, however small they are.
         longer = [run for run in found if run.legs >= _MANY]
-        if not longer:
-            raise NotAnalysableError(
-                place,
-                f"no free decay: {rivals + 1} short oscillations of {told.legs} half cycles or so",
-                "irregular motion can't be analysed",
-            )
+        refuse_if(
+            not longer,
+            place,
+            f"no free decay: {rivals + 1} short oscillations of {told.legs} half cycles or so",
+            "irregular motion can't be analysed",
+            NotAnalysableError,
+        )
         told = max(longer, key=lambda run: run.worth)
         used = _chained(found, told)
     _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
@@ -555,29 +556,32 @@ def _refuse_without_fall(
 ) -> None:
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
     swing = run.swing
-    if float(swing[:3].max()) < 3.0 * least:
-        raise NotAnalysableError(
-            place,
-            f"the largest half cycle ({swing[:3].max():.2g}) hardly stands out of noise and step"
-            f" ({least:.2g})",
-            "record with a larger amplitude",
-        )
+    refuse_if(
+        float(swing[:3].max()) < 3.0 * least,
+        place,
+        f"the largest half cycle ({swing[:3].max():.2g}) hardly stands out of noise and step"
+        f" ({least:.2g})",
+        "record with a larger amplitude",
+        NotAnalysableError,
+    )
     if _falls(run, least):
         return
     fall, sd, wavers = _fall_of_all(time, values, run.middle_s)
-    if wavers:
-        raise NotAnalysableError(
-            place,
-            f"the amplitude does not fall over {len(swing)} half cycles",
-            "a driven oscillation has no free decay",
-        )
-    if fall < 4.0 * sd:
-        raise NotAnalysableError(
-            place,
-            f"the amplitude does not fall over {len(swing)} half cycles by more than its error"
-            f" ({100.0 * fall:.2g} +- {100.0 * sd:.1g} %): the decay is too slow to be resolved",
-            "record longer, unless something drives it",
-        )
+    refuse_if(
+        wavers,
+        place,
+        f"the amplitude does not fall over {len(swing)} half cycles",
+        "a driven oscillation has no free decay",
+        NotAnalysableError,
+    )
+    refuse_if(
+        fall < 4.0 * sd,
+        place,
+        f"the amplitude does not fall over {len(swing)} half cycles by more than its error"
+        f" ({100.0 * fall:.2g} +- {100.0 * sd:.1g} %): the decay is too slow to be resolved",
+        "record longer, unless something drives it",
+        NotAnalysableError,
+    )
 
 
 def _fall_of_all(

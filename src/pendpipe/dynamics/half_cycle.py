@@ -345,11 +345,18 @@ def _solve_panel(
     tolerance = math.inf if finest else LOSS_TOLERANCE
     if not solve(node, work.shape, radius, half_width, tolerance):
         return False
-    if work.sensitivities > 0:
-        sensitivities(work, node, radius, half_width)
-    if polynomials.size == 0:
+    timed = polynomials.size > 0
+    if timed and not (_in_time(work, node, radius, half_width, y, polynomials) or finest):
+        return False
+    if work.sensitivities == 0:
         return True
-    return _in_time(work, node, radius, half_width, y, polynomials) or finest
+    sensitivities(work, node, radius, half_width)
+    for c in range(work.sensitivities if timed else 0):
+        column = work.columns[c]
+        for j in range(NODE_COUNT):
+            column[j] /= 1.0 if c == 0 else y
+        polynomial(node, column, work.chebyshev, polynomials, (c + 1) * NODE_COUNT)
+    return True
 
 
 @kernel
@@ -361,23 +368,15 @@ def _in_time(
     y: float,
     polynomials: FloatArray,
 ) -> bool:
-    """Write a solved panel's polynomials in time; return whether they resolve the waveform."""
-    n, count = NODE_COUNT, work.sensitivities
+    """Write a solved panel's waveform as a polynomial in time; return whether that resolves it."""
     time_nodes(node, half_width, work.chebyshev)
-    waveform = work.columns[count]
-    for j in range(n):
+    waveform = work.columns[work.sensitivities]
+    for j in range(NODE_COUNT):
         s = work.shape[0] + radius * (1.0 + node[LOSS + j]) * node[COS + j]
         waveform[j] = angle_of(work.shape, s) / y
     polynomial(node, waveform, work.chebyshev, polynomials, 0)
     bent = work.shape[CURVATURE] > 0.0
-    resolved = unresolved(waveform, 0) <= (SINE_TOLERANCE if bent else WAVEFORM_TOLERANCE)
-    for c in range(count):
-        column = work.columns[c]
-        if c > 0:
-            for j in range(n):
-                column[j] /= y
-        polynomial(node, column, work.chebyshev, polynomials, (c + 1) * n)
-    return resolved
+    return unresolved(waveform, 0) <= (SINE_TOLERANCE if bent else WAVEFORM_TOLERANCE)
 
 
 @kernel
@@ -445,8 +444,6 @@ def direct_half_cycle(
     while k < 1 << level:
         panels = 1 << level
         node = work.nodes[(panels + k) % SLOTS]
-        for c in range(work.sensitivities):
-            work.kept[0, c], work.kept[1, c] = work.sigma[c], work.shift[c]
         if not _solve_panel(
             work,
             node,
@@ -460,8 +457,6 @@ def direct_half_cycle(
         ):
             if level >= FINEST:
                 return y, 0.0, first, -1
-            for c in range(work.sensitivities):
-                work.sigma[c], work.shift[c] = work.kept[0, c], work.kept[1, c]
             level, k = level + 1, 2 * k
             continue
         if coarsest < 0:

@@ -162,7 +162,10 @@ class Kernel:
                 machine_code.keep(folder / name, library.get_llvm_str(), entry)
             except OSError:
                 continue
-            self._remove_older(folder, name)
+            for old in folder.glob(f"{self.__name__}-*.bin"):
+                if old.name != name:
+                    # The code of other sources.
+                    old.unlink(missing_ok=True)
             break
         return library.get_pointer_to_function(entry), library
 
@@ -176,12 +179,6 @@ class Kernel:
         library, entry = numba_side.compiled(self)
         for processor, path in paths.items():
             machine_code.keep(path, library.get_llvm_str(), entry, processor)
-
-    def _remove_older(self, folder: Path, name: str) -> None:
-        """Remove the code of other sources."""
-        for old in folder.glob(f"{self.__name__}-*.bin"):
-            if old.name != name:
-                old.unlink(missing_ok=True)
 
     def file_name(self) -> str:
         """Return a name that changes with the sources, the constants and the machine."""

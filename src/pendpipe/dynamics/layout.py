@@ -57,10 +57,9 @@ WORK: Final = np.dtype(
         ("per_panel", "i8"),
         ("rate", "f8", _RATES),  # the rates themselves
         ("directions", "f8", (_S, 4)),  # of m, h, q and g by the amplitude (none), and each rate
-        # d ln r/dp and dtau/dp at fixed phase, at the end of the panel in hand, and at its start
+        # d ln r/dp and dtau/dp at fixed phase, at the end of the last panel that was resolved
         ("sigma", "f8", _S),
         ("shift", "f8", _S),
-        ("kept", "f8", (2, _S)),
         # dy/dp and dtau/dp at the last turning point
         ("amplitude", "f8", _S),
         ("clock", "f8", _S),

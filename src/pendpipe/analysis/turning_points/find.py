@@ -28,7 +28,7 @@ from pendpipe.analysis.turning_points.measure import (
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
 _ENOUGH: Final = 24
@@ -37,12 +37,11 @@ _LOOK: Final = 200_000
 
 
 class Rough(NamedTuple):
-    """Extremes of the readings: their half cycle's number, time, side and value."""
+    """Extremes of the readings: their half cycle's number, time and side; the level."""
 
     number: IntArray
     time_s: FloatArray
     side: IntArray
-    value: FloatArray
     level: float
 
 
@@ -68,13 +67,13 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
     if len(index) < 3:
-        return Rough(np.arange(len(index)), time, side, value, float(np.median(piece))), stride
+        return Rough(np.arange(len(index)), time, side, float(np.median(piece))), stride
     whole, gap_before = _beside_gaps(samples.time_s, index)
     time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
     number = np.zeros(len(time), dtype=np.int64)
     usual = float(np.median(np.diff(time[:6])))
     cut = slice(0, count_half_cycles(time, side, gap_before, usual, number))
-    return Rough(number[cut], time[cut], side[cut], value[cut], _level(value[cut])), stride
+    return Rough(number[cut], time[cut], side[cut], _level(value[cut])), stride
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
@@ -246,25 +245,24 @@ def turning_points_of(samples: Samples, place: str | Path = "recording") -> Turn
 def _of_piece(samples: Samples, place: str | Path) -> TurningPoints:
     """Measure readings that fit into the memory many times over."""
     rough, stride = rough_half_cycles(samples)
-    if len(rough.number) < 3:
-        raise NotAnalysableError(place, *_too_few(samples, len(rough.number)))
+    _refuse_few(samples, len(rough.number), place)
     places, first = _locate(samples, rough, stride)
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))
     keep = kept(samples, places, measured)
-    if keep.sum() < 3:
-        raise NotAnalysableError(place, *_too_few(samples, int(keep.sum())))
+    _refuse_few(samples, int(keep.sum()), place)
     return finished(samples, places, measured, shape, rates, level, keep)
 
 
-def _too_few(samples: Samples, found: int) -> tuple[str, str]:
-    """What to say of a record without three half cycles."""
-    swing = float(samples.values.max() - samples.values.min())
-    if swing < 12.0 * samples.noise_rms:
-        problem = f"no motion stands out of the noise ({samples.noise_rms:.3g} rms)"
-        return problem, "raise the amplitude, or pick another channel"
-    return f"fewer than three half cycles ({found} turning points)", "record longer"
+def _refuse_few(samples: Samples, found: int, place: str | Path) -> None:
+    """Refuse a record without three half cycles."""
+    swing, noise = float(samples.values.max() - samples.values.min()), samples.noise_rms
+    problem = f"no motion stands out of the noise ({noise:.3g} rms)"
+    remedy = "raise the amplitude, or pick another channel"
+    refuse_if(found < 3 and swing < 12.0 * noise, place, problem, remedy, NotAnalysableError)
+    problem = f"fewer than three half cycles ({found} turning points)"
+    refuse_if(found < 3, place, problem, "record longer", NotAnalysableError)
 
 
 def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measured]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pendpipe.analysis.noise import find_step, noise_rms
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
 _FEWEST: Final = 16
@@ -74,14 +74,20 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
         time, values = time[recording.usable], values[recording.usable]
         radius = None if radius is None else radius[recording.usable]
         low, high = _range(values)
-    if len(values) < _FEWEST:
-        raise NotAnalysableError(
-            place, f"{len(values)} readings are too few", "record at least three half cycles"
-        )
-    if low == high:
-        raise NotAnalysableError(
-            place, f"the channel is dead: it reads {low:.6g} throughout", "check the sensor"
-        )
+    refuse_if(
+        len(values) < _FEWEST,
+        place,
+        f"{len(values)} readings are too few",
+        "record at least three half cycles",
+        NotAnalysableError,
+    )
+    refuse_if(
+        low == high,
+        place,
+        f"the channel is dead: it reads {low:.6g} throughout",
+        "check the sensor",
+        NotAnalysableError,
+    )
     _refuse_saturated(values, low, high, place)
     step = recording.resolution or find_step(values)
     if step is not None and _one_row_a_count(time, values, step):
@@ -113,13 +119,13 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
         levels = np.unique(piece)
         step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
         expected = math.sqrt(max(step, 1e-12) / (high - low))
-        if len(levels) > 16 and share > 2.0 * expected and count > 8 * runs:
-            raise NotAnalysableError(
-                place,
-                f"the channel is saturated: {100.0 * share:.0f} % of the readings are"
-                f" {extreme:.6g}",
-                "lower the gain or the starting amplitude, or cut with --start",
-            )
+        refuse_if(
+            len(levels) > 16 and share > 2.0 * expected and count > 8 * runs,
+            place,
+            f"the channel is saturated: {100.0 * share:.0f} % of the readings are {extreme:.6g}",
+            "lower the gain or the starting amplitude, or cut with --start",
+            NotAnalysableError,
+        )
 
 
 def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
