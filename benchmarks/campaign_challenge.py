@@ -245,8 +245,7 @@ def judge(
     """What the library answers on the readings."""
     from pendpipe.campaign.design import design_of
     from pendpipe.campaign.diagnose import search
-    from pendpipe.campaign.fit import joint_fit, measured, named
-    from pendpipe.campaign.joint import coefficient, loss_torques
+    from pendpipe.campaign.fit import coefficient, joint_fit, loss_torques, measured, named
     from pendpipe.configuration.load import load_campaign, read_configuration
 
     content = read_configuration(ROOT / "config/config.yaml")
@@ -264,7 +263,7 @@ def judge(
     if answer.found:
         first = answer.found[0]
         members = [first.leader, *(rival for rival, _ in first.rivals)]
-    inside = {rival.candidate.effect.identifier: rival for rival in members}
+    inside = {rival.last.identifier: rival for rival in members}
     fit = inside[cause].fit if cause in inside else answer.baseline
     pulls = {}
     if cause is None or cause in inside:
@@ -278,7 +277,7 @@ def judge(
         "seconds": spent,
     }
     if cause in inside and cause != "wall-confinement":  # whose size has another meaning here
-        size = inside[cause].fit.size(inside[cause].position)
+        size = inside[cause].size()
         pulls["size"], result["sd"] = pull(size, truth["size"]), size.sd
     if cause is None:  # the drag factor and C_H of campaigns that lack nothing
         for name in ("uniform-drag-excess", "history-term"):

@@ -4,11 +4,21 @@ import numpy as np
 import pytest
 
 from pendpipe import physics
+from pendpipe.campaign.answer import next_measurements
 from pendpipe.campaign.diagnose import global_p_value, held_out, local_scores, search
 from pendpipe.campaign.effects import CATALOGUE
-from pendpipe.campaign.fit import Candidate, candidates, joint_fit, named, predict
-from pendpipe.campaign.joint import coefficient, inertia_errors, joint_values, loss_torques, only
-from pendpipe.campaign.next_measurement import next_measurements
+from pendpipe.campaign.fit import (
+    Candidate,
+    candidates,
+    coefficient,
+    inertia_errors,
+    joint_fit,
+    joint_values,
+    loss_torques,
+    named,
+    only,
+    predict,
+)
 from pendpipe.campaign.walls import Surface, confined, height_sd
 
 from .campaigns import data, default
@@ -107,9 +117,9 @@ def test_a_hidden_cause_is_in_the_class(hidden: str, size: float) -> None:
     answer = search(design, data(design, cause, (size,), seed=7))
     assert answer.missing
     members = [answer.found[0].leader, *(rival for rival, _ in answer.found[0].rivals)]
-    inside = {rival.candidate.effect.identifier: rival for rival in members}
+    inside = {rival.last.identifier: rival for rival in members}
     assert hidden in inside
-    found = inside[hidden].fit.size(inside[hidden].position)
+    found = inside[hidden].size()
     assert abs(found.value - size) < 4.0 * found.sd
     assert len(answer.found) == 1
     # Each other cause is excluded, and by more than the records tell the members apart.
@@ -160,18 +170,18 @@ def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> N
     added = named("uniform-drag-excess")
     measured = data(design, added, (0.12,))
     fit = joint_fit(design, measured, added)
-    rivals = {
-        name: joint_fit(design, measured, named(name))
+    rivals = [
+        joint_fit(design, measured, named(name))
         for name in ("viscosity-temperature", "history-term")
-    }
+    ]
     runs = next_measurements(fit, rivals)
     sigma = {run.what: run.worst for run in runs}
     # The second derivation: 50 % glycerol 4 to 8 sigma for history, a repeat almost nothing.
     assert 4.0 < sigma["half glycerol, half water"] < 9.0
     assert sigma["the same records once more"] < 3.0
     assert sigma["the same records once more"] >= 0.999 * min(runs[0].now.values())
-    for name, rival in rivals.items():  # without further runs: what this campaign can say
-        assert runs[0].now[name] == pytest.approx(np.sqrt(rival.chi2), rel=0.01)
+    for rival in rivals:  # without further runs: what this campaign can say
+        assert runs[0].now[rival.last.identifier] == pytest.approx(np.sqrt(rival.chi2), rel=0.01)
 
 
 def test_scores_of_noise_are_normal_and_the_largest_counts_all_trials() -> None:

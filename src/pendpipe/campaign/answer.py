@@ -1,18 +1,124 @@
-"""The answer about a campaign: campaign_diagnosis.json and its paragraph."""
+"""The answer about a campaign: campaign_diagnosis.json and its paragraph.
 
-from __future__ import annotations
+With it goes what each cause alone would do to the records, and which further runs would tell the
+rivals of a class apart.
+"""
 
-from collections.abc import Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.campaign.causes import causes
-from pendpipe.campaign.diagnose import CampaignSearch, Found, Rival, held_out
-from pendpipe.campaign.fit import JointFit
-from pendpipe.campaign.next_measurement import NextRun, next_measurements
+from pendpipe.arrays import FloatArray
+from pendpipe.campaign.design import Design, Run
+from pendpipe.campaign.diagnose import CampaignSearch, Found, held_out
+from pendpipe.campaign.fit import JointFit, Measured, candidates, chi2_near, predict
 from pendpipe.estimate import chi_square_p_value
-from pendpipe.quantities import with_error
+
+_CLAMPED_ANEW_M: Final = 1e-9
+"""A place this far away is the same place with an error of its own."""
+_GLYCEROL: Final = {"viscosity_pa_s": 5.6e-3, "density_kg_per_m3": 1122.0}
+"""Half glycerol, half water by mass at 20 C: about 5 mm^2/s."""
+
+
+def _fluid(run: Run, changes: dict[str, float]) -> Run:
+    return replace(run, fluid=run.fluid.model_copy(update=changes) if run.fluid else None)
+
+
+RUNS: Final[dict[str, Callable[[Run], Run]]] = {
+    "a large and deep tank": lambda run: replace(run, tank=False),
+    "half glycerol, half water": lambda run: _fluid(run, _GLYCEROL),
+    "half glycerol, half water in a large and deep tank": lambda run: replace(
+        _fluid(run, _GLYCEROL), tank=False
+    ),
+    "the bare screw in the water": lambda run: replace(run, sphere=False),
+    "the same settings without water": lambda run: replace(run, fluid=None),
+    "releases at 10 mrad": lambda run: replace(run, release_rad=0.010),
+    "a lid on the water": lambda run: replace(run, open_surface=False),
+    "the reversed order": lambda run: replace(run, order=-run.order),
+    "water at 35 °C": lambda run: replace(run, temperature_c=35.0),
+    "the same records once more": lambda run: run,
+}
+"""Candidates: what each does to every record in the fluid."""
+
+
+class NextRun(NamedTuple):
+    """One candidate: the sigma at which it would reject each rival, before and with it."""
+
+    what: str
+    now: dict[str, float]
+    then: dict[str, float]
+
+    @property
+    def worst(self) -> float:
+        """The sigma of the rival that is rejected least."""
+        return min(self.then.values())
+
+
+def next_measurements(fit: JointFit, rivals: Sequence[JointFit]) -> list[NextRun]:
+    """Rank the candidates by the sigma at which they would reject every rival.
+
+    The campaign with the runs added, as the leader predicts it, is fitted with each rival instead:
+    the root of its chi^2 is that sigma. A new record is as good, relative to its b and its
+    frequency, as the one whose weights it has; the weights are clamped anew for it.
+
+    Parameters
+    ----------
+    fit
+        With the leader.
+    rivals
+        The fits with each of the others in its place.
+    """
+    if not rivals:
+        return []
+    with np.errstate(invalid="ignore", divide="ignore"):  # without the sphere some turn over
+        now = _sigmas(fit, rivals, None)
+        found = [NextRun(what, now, _sigmas(fit, rivals, change)) for what, change in RUNS.items()]
+    return sorted(found, key=lambda run: -run.worst)
+
+
+def _sigmas(
+    fit: JointFit, rivals: Sequence[JointFit], change: Callable[[Run], Run] | None
+) -> dict[str, float]:
+    """How many sigma each rival would be away."""
+    design, again = _extended(fit.design, change)
+    expected = predict(design, fit.added, _carried(fit, fit, design))
+    usable = np.asarray(np.isfinite(expected).all(axis=-1))
+    # The same relative errors at other values.
+    whitening = fit.data.whitening[again] * (fit.data.values[again] / expected)[:, None, :]
+    runs = tuple(run for run, good in zip(design.runs, usable.tolist(), strict=True) if good)
+    kept, data = replace(design, runs=runs), Measured(expected[usable], whitening[usable])
+    return {
+        rival.last.identifier: math.sqrt(
+            chi2_near(kept, data, rival.added, _carried(rival, fit, kept))
+        )
+        for rival in rivals
+    }
+
+
+def _extended(design: Design, change: Callable[[Run], Run] | None) -> tuple[Design, list[int]]:
+    """The design with changed copies of its records in the fluid, and what each run repeats."""
+    every = list(range(len(design.runs)))
+    if change is None:
+        return design, every
+    wet = [number for number in every if design.runs[number].fluid is not None]
+    more = []
+    for number in wet:
+        run = design.runs[number]
+        places = {name: place + _CLAMPED_ANEW_M for name, place in run.weights_m.items()}
+        more.append(change(replace(run, weights_m=places)))
+    return replace(design, runs=(*design.runs, *more)), [*every, *wet]
+
+
+def _carried(fit: JointFit, truth: JointFit, design: Design) -> FloatArray:
+    """Unknowns of a fit for another design, where the truth has its inputs as configured."""
+    there, count = fit.design.index, len(fit.design.nuisances)
+    moved = fit.unknowns[:count] - truth.design.has_prior * truth.unknowns[:count]
+    found = [moved[there[each.name]] if each.name in there else 0.0 for each in design.nuisances]
+    return np.array([*found, *fit.unknowns[count:]])
+
 
 BASELINE = "eq16"
 """Eq. 16 with the exact root, the priors of the configuration and the loss torque."""
@@ -26,10 +132,7 @@ def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> di
     ``patterns`` (`causes`).
     """
     ranked = [
-        next_measurements(
-            found.leader.fit,
-            {rival.candidate.effect.identifier: rival.fit for rival, _ in found.rivals},
-        )
+        next_measurements(found.leader, [rival for rival, _ in found.rivals])
         for found in search.found
     ]
     before, _ = held_out(search.baseline)
@@ -90,7 +193,7 @@ def _fit(fit: JointFit) -> dict[str, Any]:
 
 
 def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> dict[str, Any]:
-    effect = found.leader.candidate.effect
+    effect = found.leader.last
     return {
         "id": effect.identifier,
         "name": effect.name,
@@ -101,14 +204,14 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
         "p_value_global": found.p_value,
         "probability": found.probability,
         "indistinguishable_from": [
-            {"id": rival.candidate.effect.identifier, "probability": probability}
+            {"id": rival.last.identifier, "probability": probability}
             for rival, probability in found.rivals
         ],
         "rivals": [
             {
-                "id": rival.candidate.effect.identifier,
+                "id": rival.last.identifier,
                 "parameters": _parameters(rival),
-                "chi2_above_best": rival.fit.chi2 - found.leader.fit.chi2,
+                "chi2_above_best": rival.chi2 - found.leader.chi2,
             }
             for rival, _ in found.rivals
         ],
@@ -121,13 +224,11 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
     }
 
 
-def _parameters(rival: Rival) -> dict[str, Any]:
-    name = rival.candidate.effect.parameter.name
-    found = {name: rival.fit.size(rival.position).as_json()}
-    if rival.candidate.shape is not None:
-        shape = rival.candidate.shape
-        found[name]["of"] = " ".join(shape) if isinstance(shape, tuple) else shape
-    return found
+def _parameters(fit: JointFit) -> dict[str, Any]:
+    size, shape = fit.size().as_json(), fit.added[-1].shape
+    if shape is not None:
+        size["of"] = " ".join(shape) if isinstance(shape, tuple) else shape
+    return {fit.last.parameter.name: size}
 
 
 def _unnamed(search: CampaignSearch) -> dict[str, Any]:
@@ -195,27 +296,23 @@ def statement(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> st
             f"The {count} records agree with Eq. 16, the loss torque and the stated errors of the"
             f" apparatus (global {chance})."
         )
-    if not search.found:
-        return (
-            f"The {count} records do not agree with Eq. 16 and the stated errors of the apparatus"
-            f" (global {chance}), and no effect of the catalogue explains how they differ."
-        )
-    words = [
+    unlike = (
         f"The {count} records do not agree with Eq. 16 and the stated errors of the apparatus"
-        f" (global {chance})."
-    ]
+        f" (global {chance})"
+    )
+    if not search.found:
+        return f"{unlike}, and no effect of the catalogue explains how they differ."
+    words = [f"{unlike}."]
     for found, runs in zip(search.found, ranked, strict=True):
-        effect = found.leader.candidate.effect
-        size = found.leader.fit.size(found.leader.position)
+        effect, size = found.leader.last, found.leader.size()
         words.append(
             f"Most probable is {effect.name} ({effect.parameter.name.replace('_', ' ')}"
-            f" {with_error(size.value, size.sd, size.unit)});"
+            f" {size});"
             f" chi^2 falls by {found.delta_chi2:.0f}."
         )
         if found.rivals:
             names = ", ".join(
-                f"{rival.candidate.effect.name} ({_share(probability)})"
-                for rival, probability in found.rivals
+                f"{rival.last.name} ({_share(probability)})" for rival, probability in found.rivals
             )
             words.append(f"These records cannot tell it from {names}.")
             words.append(f"What would decide is {_deciding(runs)}.")
@@ -223,3 +320,77 @@ def statement(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> st
     if left < 0.01:
         words.append(f"Something is left that this does not explain ({_chance(left)}).")
     return " ".join(words)
+
+
+_STEP = 1e-3
+"""Of a size, in what is expected of it: the patterns are those of small sizes."""
+
+
+def causes(search: CampaignSearch) -> dict[str, Any]:
+    """Patterns over the records in the fluid, as excesses of the viscous loss over Eq. 16.
+
+    Inputs are taken as configured, the loss torque as fitted. Each cause is given the size that
+    follows the measured excess best, whether that size is believable or not; its joint fit, which
+    knows priors and frequencies, says whether it is in the class.
+
+    Returns
+    -------
+    dict
+        ``records`` (name, frequency, excess measured and its sd from b), and ``causes``: for each
+        its size, what it predicts, rms of what it leaves, and by how much chi^2 of the joint fit
+        exceeds the best one's (None where nothing was found).
+    """
+    fit = search.improved
+    design, count = fit.design, len(fit.design.nuisances)
+    free = np.where(design.has_prior, 0.0, fit.unknowns[:count])
+    wet = np.flatnonzero(design.wet > 0.0)
+    plain = predict(design, (), free)
+    solid = np.exp(-design.inputs(free).log_coefficient) * np.pi / plain[:, 0]
+    viscous = (plain[:, 1] - solid)[wet]
+    measured = fit.data.values[wet, 1]
+    excess = (measured - plain[wet, 1]) / viscous
+    sd = 1.0 / np.linalg.norm(fit.data.whitening[wet, :, 1], axis=-1) / viscous
+    members = [
+        rival
+        for found in search.found[:1]
+        for rival in (found.leader, *(rival for rival, _ in found.rivals))
+    ]
+    best = min((rival.chi2 for rival in members), default=0.0)
+    above = search.excluded | {rival.last.identifier: rival.chi2 - best for rival in members}
+    rows: dict[str, dict[str, Any]] = {}
+    for one in candidates(design):
+        moved = predict(design, (one,), np.append(free, _STEP))
+        pattern = (moved - plain)[wet, 1] / viscous / _STEP
+        square = float(pattern @ pattern)
+        if not square > 0.0:
+            continue
+        units = float(pattern @ excess) / square
+        left = float(np.sqrt(np.mean((excess - units * pattern) ** 2)))
+        name = one.effect.identifier
+        if name in rows and rows[name]["rms_left"] <= left:
+            continue
+        rows[name] = {
+            "id": name,
+            "name": one.effect.name,
+            "size": units * one.effect.expected,
+            "parameter": one.effect.parameter.name,
+            "unit": one.effect.parameter.unit,
+            "possible": one.bounds[0] <= units <= one.bounds[1],
+            "excess": (units * pattern).tolist(),
+            "rms_left": left,
+            "chi2_above_best": above.get(name),
+            "in_class": name in above and name not in search.excluded,
+        }
+    return {
+        "records": [
+            {
+                "record": design.runs[number].record,
+                "branch": design.runs[number].branch,
+                "frequency_hz": float(fit.data.values[number, 0]),
+                "excess": float(value),
+                "sd": float(spread),
+            }
+            for number, value, spread in zip(wet, excess, sd, strict=True)
+        ],
+        "causes": sorted(rows.values(), key=lambda row: row["rms_left"]),
+    }

@@ -1,4 +1,4 @@
-"""What a campaign's records have in common, and how well it is known beforehand.
+"""A campaign's records: what is uncertain of them beforehand, and what their equation predicts.
 
 Every uncertain input is a `Nuisance` with a Gaussian prior: each distance by itself as often as
 a weight is clamped, the zero that they share, masses, sphere, thermometer, screw, loss torque.
@@ -168,6 +168,11 @@ class Design:
         return tuple(each for each in found if each.sd > 0.0)
 
     @cached_property
+    def index(self) -> dict[str, int]:
+        """Where each nuisance stands, by its name."""
+        return {each.name: number for number, each in enumerate(self.nuisances)}
+
+    @cached_property
     def has_prior(self) -> BoolArray:
         """Which nuisances have a prior; shape (nuisances,), boolean."""
         return np.array([math.isfinite(each.sd) for each in self.nuisances])
@@ -205,17 +210,15 @@ class Design:
     def inputs(self, moved: FloatArray) -> Inputs:
         """Return the inputs for nuisances in standard deviations, shape (..., nuisances)."""
         deviations = moved * self.sds
-        index = {each.name: number for number, each in enumerate(self.nuisances)}
 
         def deviation(name: str) -> FloatArray:
-            if name not in index:
+            if name not in self.index:
                 return np.zeros((*moved.shape[:-1], 1))
-            return np.asarray(deviations[..., index[name], None])
+            return np.asarray(deviations[..., self.index[name], None])
 
         places = np.array([place for _, place in self.clamps])
-        if self.apparatus.position_sd_m > 0.0:
-            start = 1  # behind the one that is free
-            places = places + deviations[..., start : start + len(places)]
+        if self.apparatus.position_sd_m > 0.0:  # they stand behind the one that is free
+            places = places + deviations[..., 1 : 1 + len(places)]
         places = places + deviation("zero of the scale")
         own, sphere = self.apparatus, self.apparatus.sphere
         masses = [own.weights[name].mass_kg + deviation(f"mass of {name}") for name in self.weights]
@@ -271,8 +274,6 @@ class Design:
     @cached_property
     def rod_air_drag(self) -> FloatArray:
         """Drag of the air on the rod at the configured geometry, N m s; shape (records,)."""
-        from pendpipe.campaign.prediction import terms_of
-
         radius, length = self.apparatus.rod.radius_m, self.apparatus.rod.length_m
         if self.air is None or radius == 0.0:
             return np.zeros(len(self.runs))
@@ -299,6 +300,7 @@ def design_of(campaign: Campaign, records: Sequence[Record]) -> Design:
         float(row) if record.order is None else record.order for row, record in enumerate(records)
     ]
     first, span = min(numbers), max(numbers) - min(numbers)
+    plans = settings.simulated.release if settings.simulated else {}
     runs, gases = [], []
     for record, number in zip(records, numbers, strict=True):
         geometry = campaign.geometry(record)
@@ -306,7 +308,6 @@ def design_of(campaign: Campaign, records: Sequence[Record]) -> Design:
         fluid = settings.fluids[record.fluid]
         if not geometry.sphere:
             gases.append(fluid)
-        plans = settings.simulated.release if settings.simulated else {}
         plan = plans.get(record.record) or plans.get(record.fluid)
         runs.append(
             Run(
@@ -322,3 +323,120 @@ def design_of(campaign: Campaign, records: Sequence[Record]) -> Design:
             )
         )
     return Design(apparatus, tuple(runs), gases[0] if gases else None)
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The equation of motion of every record: ``I s^2 + D1 s + D2 s^(3/2) + K = 0``.
+
+    Arrays of shape (..., records), SI units. Solid friction stands beside: it changes the rate
+    and not Eq. 8's frequency.
+
+    Parameters
+    ----------
+    inertia, torque
+        I of the solid and of the potential flow, and K.
+    steady, history
+        D1 and D2 of the sphere.
+    screw, screw_history
+        The same of the screw's immersed part.
+    air
+        Drag of the air on rod and weights, N m s.
+    displaced
+        rho V L^2 of the sphere: an added mass counts in it.
+    rate
+        What else is added to b, 1/s.
+    inputs
+        What they were made of.
+    """
+
+    inertia: FloatArray
+    torque: FloatArray
+    steady: FloatArray
+    history: FloatArray
+    screw: FloatArray
+    screw_history: FloatArray
+    air: FloatArray
+    displaced: FloatArray
+    rate: FloatArray
+    inputs: Inputs
+
+    @property
+    def angular_frequency(self) -> FloatArray:
+        """Nearly Eq. 8's omega: without losses, the boundary layer's inertia counted."""
+        bare = np.sqrt(self.torque / self.inertia)
+        layer = (self.history + self.screw_history) / np.sqrt(2.0 * bare)
+        return np.asarray(np.sqrt(self.torque / (self.inertia + layer)))
+
+
+def terms_of(design: Design, inputs: Inputs) -> Terms:
+    """Put the equation of motion of every record together."""
+    gravity = design.apparatus.gravity_m_per_s2
+    sphere, spheres, wet = design.apparatus.sphere, design.spheres, design.wet
+    places, masses = inputs.positions_m, inputs.masses_kg
+    sizes = [design.apparatus.weights[name].radius_m for name in design.weights]
+    inertia = (masses * (places**2 + 0.4 * np.square(sizes))).sum(axis=-1)
+    inertia = inertia + inputs.rod_mass_kg * inputs.rod_length_m**2 / 12.0
+    radius, lever = inputs.radius_m, inputs.lever_m
+    ball = inputs.sphere_mass_kg * spheres
+    inertia = inertia + ball * (0.4 * radius**2 + lever**2)
+    density, viscosity = design.fluids(inputs.warmer_k)
+    viscosity = viscosity * (1.0 + inputs.thicker)
+    displaced = wet * spheres * density * physics.sphere_volume(radius)
+    at = sphere.screw_distance_m if sphere else 0.0
+    thick = sphere.screw_radius_m if sphere else 0.0
+    length = wet * ((sphere.screw_length_m if sphere else 0.0) + inputs.screw_m)
+    volume = (sphere.screw_volume_m3 if sphere else 0.0) + np.pi * thick**2 * inputs.screw_m
+    screw = wet * density * volume
+    moment = (masses * places).sum(axis=-1) + ball * lever
+    steady = 6.0 * np.pi * viscosity * radius * lever**2 * wet * spheres
+    around = np.sqrt(density * viscosity)
+    turning = 1.0 + physics.rotation_of_sphere(radius, lever)
+    history = 6.0 * np.pi * radius**2 * around * lever**2 * turning * wet * spheres
+    whole = Terms(
+        # Across its axis a cylinder carries as much fluid along as it displaces.
+        inertia=inertia + 0.5 * displaced * lever**2 + screw * at**2,
+        torque=gravity * (moment - displaced * lever - screw * at),
+        steady=steady,
+        history=history,
+        screw=2.0 * np.pi * viscosity * length * at**2,
+        screw_history=4.0 * np.pi * thick * around * length * at**2,
+        air=np.zeros_like(steady),
+        displaced=displaced * lever**2,
+        rate=np.zeros_like(steady),
+        inputs=inputs,
+    )
+    if design.air is None:
+        return whole
+    # What the air does: Eq. 2's drag on weights (spheres of their area) and rod.
+    areas = np.array([design.apparatus.weights[name].frontal_area_m2 for name in design.weights])
+    drags = physics.harmonic_drag(
+        1.0,
+        np.sqrt(areas / np.pi),
+        whole.angular_frequency[..., None],
+        design.air.viscosity_pa_s,
+        design.air.density_kg_per_m3,
+    )
+    on_weights = (drags * places**2 * design.mounted).sum(axis=-1)
+    return replace(whole, air=on_weights + design.rod_air_drag)
+
+
+def solve(design: Design, terms: Terms) -> FloatArray:
+    """Return frequency in Hz and b in 1/s of every record, shape (..., records, 2).
+
+    Both are those of Eq. 8: the frequency is |s|/(2 pi), and b holds the loss torque too,
+    ``b_h = (pi/(k f)) (I_0/I)^(1 - p)``.
+    """
+    inputs = terms.inputs
+    root = physics.free_decay_root(
+        terms.inertia,
+        terms.steady + terms.screw + inputs.air_drag * terms.air,
+        terms.history + terms.screw_history,
+        terms.torque,
+    )
+    omega = np.abs(root)
+    frequency = omega / (2.0 * np.pi)
+    relative = terms.torque / omega**2 / design.reference_inertia
+    lighter = relative ** (inputs.inertia_exponent - 1.0)
+    hysteretic = np.pi / frequency * np.exp(-inputs.log_coefficient) * lighter
+    return np.stack(np.broadcast_arrays(frequency, hysteretic + terms.rate - root.real), axis=-1)

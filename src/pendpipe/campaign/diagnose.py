@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtr
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit
 from pendpipe.estimate import chi_square_p_value
@@ -26,38 +26,13 @@ effects change the records by a fifth at most, where the linear gain is good to 
 
 
 @dataclass(frozen=True)
-class Rival:
-    """An effect after its refit.
-
-    Parameters
-    ----------
-    candidate, fit
-        The effect with its shape, and the campaign's fit with it.
-    position
-        Where it stands among the fit's effects.
-    """
-
-    candidate: Candidate
-    fit: JointFit
-    position: int
-
-    @property
-    def log_evidence(self) -> float:
-        """Logarithm of its evidence, for a Gaussian prior of the size (Laplace's method)."""
-        number = len(self.fit.design.nuisances) + self.position
-        size = float(self.fit.unknowns[number])
-        sd = float(np.sqrt(self.fit.covariance[number, number]))
-        shapes = len(self.candidate.effect.shapes_in(self.fit.design))
-        return -0.5 * (self.fit.chi2 + size**2) + math.log(min(sd, 1.0)) - math.log(shapes)
-
-
-@dataclass(frozen=True)
 class Found:
     """One effect that the model lacks, with the rivals that the data cannot tell from it."""
 
-    leader: Rival
-    rivals: tuple[tuple[Rival, float], ...]
-    """The rest of the class and their probabilities."""
+    leader: JointFit
+    """The campaign's fit with it."""
+    rivals: tuple[tuple[JointFit, float], ...]
+    """The fits with each of the rest of the class in its place, and their probabilities."""
     probability: float
     p_value: float
     delta_chi2: float
@@ -111,10 +86,14 @@ def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray,
     return -(patterns.T @ fit.residuals), patterns.T @ patterns
 
 
+def _one_sided(tried: Sequence[Candidate]) -> BoolArray:
+    """Which candidates' sizes can only be positive."""
+    return np.array([one.effect.parameter.low >= 0.0 for one in tried])
+
+
 def _local_p(scores: FloatArray, tried: Sequence[Candidate]) -> FloatArray:
     """Probability of each score by chance; only positive scores count where the size must be."""
-    one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
-    return np.where(one_sided, ndtr(-scores), 2.0 * ndtr(-np.abs(scores)))
+    return np.where(_one_sided(tried), ndtr(-scores), 2.0 * ndtr(-np.abs(scores)))
 
 
 def global_p_value(
@@ -129,11 +108,7 @@ def global_p_value(
     values, vectors = np.linalg.eigh(correlations)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(scores))) @ root.T
-    one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
-    least = np.minimum(
-        ndtr(-drawn[:, one_sided].max(axis=1, initial=0.0)),
-        2.0 * ndtr(-np.abs(drawn[:, ~one_sided]).max(axis=1, initial=0.0)),
-    )
+    least = np.min(_local_p(drawn, tried), axis=-1)
     resolved = np.quantile(least, 0.01)
     if smallest >= resolved:
         return float(np.mean(least <= smallest))
@@ -172,56 +147,47 @@ def search(
             break
         rivals = refit(fit, tried, scores)
         members = class_of(rivals)
-        if members[0][0].fit.chi2 > fit.chi2 - 1.0:
+        if members[0][0].chi2 > fit.chi2 - 1.0:
             break
         leader, probability = members[0]
-        best = min(rival.fit.chi2 for rival in rivals)
+        best = min(rival.chi2 for rival in rivals)
         if not number:
-            inside = {rival.candidate.effect.identifier for rival, _ in members}
-            excluded = {
-                one.effect.identifier: float(fit.chi2 - score**2 - best)
+            inside = {rival.last.identifier for rival, _ in members}
+            above = [
+                (one.effect.identifier, float(fit.chi2 - score**2 - best))
                 for one, score in zip(tried, scores, strict=True)
-                if one.effect.identifier not in inside
-            }
-            excluded |= {
-                rival.candidate.effect.identifier: rival.fit.chi2 - best
-                for rival in rivals
-                if rival.candidate.effect.identifier not in inside
-            }
+            ]
+            above += [(rival.last.identifier, rival.chi2 - best) for rival in rivals]
+            excluded = {name: rise for name, rise in above if name not in inside}
         found.append(
-            Found(leader, tuple(members[1:]), probability, p_value, fit.chi2 - leader.fit.chi2)
+            Found(leader, tuple(members[1:]), probability, p_value, fit.chi2 - leader.chi2)
         )
-        fit = leader.fit
+        fit = leader
     return CampaignSearch(baseline, fit, first, tuple(found), first < level, excluded)
 
 
-def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[Rival]:
+def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[JointFit]:
     """Refit with each candidate whose linear gain is within reach of the best one's."""
-    one_sided = np.array([one.effect.parameter.low >= 0.0 for one in tried])
-    gains = np.where(one_sided, np.maximum(scores, 0.0), scores) ** 2
+    gains = np.where(_one_sided(tried), np.maximum(scores, 0.0), scores) ** 2
     reach = max(_REACH, 0.25 * float(gains.max()))
     near = [one for one, gain in zip(tried, gains, strict=True) if gain >= gains.max() - reach]
-    position = len(fit.added)
-    return [
-        Rival(one, joint_fit(fit.design, fit.data, (*fit.added, one), fit.unknowns), position)
-        for one in near
-    ]
+    return [joint_fit(fit.design, fit.data, (*fit.added, one), fit.unknowns) for one in near]
 
 
-def class_of(rivals: Sequence[Rival]) -> list[tuple[Rival, float]]:
+def class_of(rivals: Sequence[JointFit]) -> list[tuple[JointFit, float]]:
     """The rivals that the data cannot tell apart, the most probable first, with probabilities.
 
     One shape of an effect stands for it. What is left to 1 is "none of these": it is likely where
     even the best of them leaves more chi^2 than chance would.
     """
-    best = min(rival.fit.chi2 for rival in rivals)
-    inside: dict[str, Rival] = {}
-    for rival in sorted(rivals, key=lambda rival: rival.fit.chi2):
-        if rival.fit.chi2 <= best + CLASS_CHI2:
-            inside.setdefault(rival.candidate.effect.identifier, rival)
+    best = min(rival.chi2 for rival in rivals)
+    inside: dict[str, JointFit] = {}
+    for rival in sorted(rivals, key=lambda rival: rival.chi2):
+        if rival.chi2 <= best + CLASS_CHI2:
+            inside.setdefault(rival.last.identifier, rival)
     members = sorted(inside.values(), key=lambda rival: -rival.log_evidence)
     weights = np.exp([rival.log_evidence - members[0].log_evidence for rival in members])
-    left = chi_square_p_value(best, members[0].fit.degrees_of_freedom)
+    left = chi_square_p_value(best, members[0].degrees_of_freedom)
     named = left / (left + 0.01)
     return list(zip(members, (named * weights / weights.sum()).tolist(), strict=True))
 

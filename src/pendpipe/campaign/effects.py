@@ -17,8 +17,7 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
-from pendpipe.campaign.design import Design, Inputs
-from pendpipe.campaign.prediction import Terms
+from pendpipe.campaign.design import Design, Inputs, Terms
 from pendpipe.campaign.walls import DEPTHS, Surface, confined
 from pendpipe.effects.effect import Parameter
 
@@ -32,8 +31,8 @@ class CampaignEffect:
 
     Parameters
     ----------
-    identifier, name, equation, text
-        As in the contract, in words, in LaTeX, and what it is.
+    identifier, name, equation
+        As in the contract, in words, and in LaTeX.
     parameter
         Its size, with bounds.
     expected
@@ -49,7 +48,6 @@ class CampaignEffect:
     identifier: str
     name: str
     equation: str
-    text: str
     parameter: Parameter
     expected: float
     on: Literal["inputs", "terms"]
@@ -83,9 +81,8 @@ def campaign_effect(
     """Declare a campaign effect by the function through which it enters."""
 
     def declare(function: Acts) -> CampaignEffect:
-        text = " ".join((function.__doc__ or "").split())
         effect = CampaignEffect(
-            identifier, name, equation, text, parameter, expected, on, function, shapes
+            identifier, name, equation, parameter, expected, on, function, shapes
         )
         CATALOGUE[identifier] = effect
         return effect

@@ -1,19 +1,23 @@
-"""Generalised least squares: all records' frequencies and losses, and all priors, at once."""
+"""Generalised least squares: all records' frequencies and losses, and all priors, at once.
+
+What these say of k, the drag and the added mass stands beside the numbers of the paper's route.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.design import Design
+from pendpipe.campaign.design import Design, solve, terms_of
 from pendpipe.campaign.effects import CATALOGUE, CampaignEffect
-from pendpipe.campaign.prediction import solve, terms_of
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, chi_square_p_value
+from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
 
 STEP: Final = 1e-4
 """Of the derivatives, in standard deviations of the priors."""
@@ -141,11 +145,24 @@ class JointFit:
         sd = float(np.sqrt(self.covariance[number, number]))
         return Estimate(about + scale * float(self.unknowns[number]), abs(scale) * sd, unit)
 
-    def size(self, position: int) -> Estimate:
-        """The size of an added effect."""
+    def size(self, position: int = -1, about: float = 0.0) -> Estimate:
+        """The size of an added effect, by default of the last; `about` is what it adds to."""
         effect = self.added[position].effect
-        number = len(self.design.nuisances) + position
-        return self.estimate(number, effect.parameter.unit, effect.expected)
+        number = range(len(self.design.nuisances), len(self.unknowns))[position]
+        return self.estimate(number, effect.parameter.unit, effect.expected, about)
+
+    @property
+    def last(self) -> CampaignEffect:
+        """The effect that was added last."""
+        return self.added[-1].effect
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the last effect's evidence, for a Gaussian prior of its size (Laplace)."""
+        sd = float(np.sqrt(self.covariance[-1, -1]))
+        shapes = len(self.last.shapes_in(self.design))
+        penalty = self.chi2 + float(self.unknowns[-1]) ** 2
+        return -0.5 * penalty + math.log(min(sd, 1.0)) - math.log(shapes)
 
     @cached_property
     def prediction(self) -> FloatArray:
@@ -263,3 +280,118 @@ def _derivatives(
     moved = _residuals(design, data, added, both)
     half = len(unknowns)
     return np.asarray((moved[:half] - moved[half:]).T / (2.0 * steps))
+
+
+def only(design: Design, data: Measured, keep: BoolArray) -> tuple[Design, Measured]:
+    """The chosen records; shape of `keep` (records,), boolean."""
+    chosen = np.flatnonzero(keep)
+    runs = tuple(design.runs[number] for number in chosen)
+    return replace(design, runs=runs), Measured(data.values[chosen], data.whitening[chosen])
+
+
+def joint_values(design: Design, data: Measured) -> dict[str, Any]:
+    """k, loss torques, drag factor, C_H and added mass, with and without the benchmark.
+
+    Returns
+    -------
+    dict
+        ``with_benchmark`` and ``without_benchmark`` (None where it cannot be fitted), each with
+        estimates and the chi^2 of its fits; the form of campaign.json.
+    """
+    wet = design.wet > 0.0
+    alone = _values(*only(design, data, wet)) if not wet.all() and wet.sum() > 1 else None
+    return {"with_benchmark": _values(design, data), "without_benchmark": alone}
+
+
+def _values(design: Design, data: Measured) -> dict[str, Any]:
+    plain = joint_fit(design, data)
+    factor, history, both = (
+        joint_fit(design, data, named(*added), plain.unknowns)
+        for added in (
+            ("uniform-drag-excess",),
+            ("history-term",),
+            ("uniform-drag-excess", "added-mass"),
+        )
+    )
+    return {
+        "hysteretic_coefficient": coefficient(factor).as_json(),
+        "loss_torque": {name: each.as_json() for name, each in loss_torques(factor).items()},
+        "drag_factor": factor.size(about=1.0).as_json(),
+        "history_coefficient": history.size(about=1.0).as_json(),
+        "added_mass_coefficient": both.size(about=POTENTIAL_FLOW_ADDED_MASS).as_json(),
+        "fits": {
+            name: {
+                "chi2": fit.chi2,
+                "dof": fit.degrees_of_freedom,
+                "p_value": chi_square_p_value(fit.chi2, fit.degrees_of_freedom),
+            }
+            for name, fit in (("eq16", plain), ("drag_factor", factor), ("history", history))
+        },
+    }
+
+
+def coefficient(fit: JointFit) -> Estimate:
+    """Return k of ``Q_hys = k f^2`` at the reference inertia, of the first assembly."""
+    value = fit.design.coefficient_s2 * float(np.exp(fit.unknowns[0]))
+    return Estimate(value, value * float(np.sqrt(fit.covariance[0, 0])), "s^2")
+
+
+def loss_torques(fit: JointFit) -> dict[str, Estimate]:
+    """Return kappa'' of each assembly at the reference inertia, ``4 pi^2 I_0/k``."""
+    design, found = fit.design, {}
+    for name in design.assemblies:
+        slope = np.zeros(len(fit.unknowns))
+        slope[0] = -1.0
+        if (number := design.index.get(f"loss torque in {name}")) is not None:
+            slope[number] = design.sds[number]
+        log = float(slope @ fit.unknowns) - np.log(design.coefficient_s2)
+        value = 4.0 * np.pi**2 * design.reference_inertia * float(np.exp(log))
+        sd = value * float(np.sqrt(slope @ fit.covariance @ slope))
+        found[name] = Estimate(value, sd, "N m/rad")
+    return found
+
+
+def inertia_errors(design: Design) -> tuple[FloatArray, FloatArray]:
+    """Standard deviations of I from what is measured of the apparatus, correlated over records.
+
+    Returns
+    -------
+    from_distances, from_frequency
+        Changes of I (with its added mass), relative, for one sd of each nuisance, shape
+        (nuisances, records): from distances and masses, and as ``K/omega^2`` of a measured
+        frequency. The covariance over the records is ``x.T @ x``.
+    """
+    steps = 0.01 * np.eye(len(design.nuisances))
+    ends = [terms_of(design, design.inputs(sign * steps)) for sign in (1.0, -1.0)]
+    torques = [np.log(end.torque) for end in ends]
+    inertias = [np.log(end.torque / end.angular_frequency**2) for end in ends]
+    known = design.has_prior[:, None]
+    return (
+        known * (inertias[0] - inertias[1]) / 0.02,
+        known * (torques[0] - torques[1]) / 0.02,
+    )
+
+
+class InertiaSds(NamedTuple):
+    """Relative standard deviations of one record's moment of inertia.
+
+    Parameters
+    ----------
+    own, common
+        From distances and masses: what its own clamps add, and what all records share.
+    from_frequency
+        As ``K/omega^2`` of an exact frequency.
+    """
+
+    own: float
+    common: float
+    from_frequency: float
+
+
+def inertia_sds(design: Design) -> dict[str, InertiaSds]:
+    """Return the errors of `inertia_errors` by record."""
+    distances, frequency = inertia_errors(design)
+    clamp = np.array([each.name.startswith("distance of") for each in design.nuisances])
+    columns = (distances[clamp], distances[~clamp], frequency)
+    sds = np.array([np.sqrt(np.sum(each**2, axis=0)) for each in columns]).T.tolist()
+    return {run.record: InertiaSds(*each) for run, each in zip(design.runs, sds, strict=True)}

@@ -21,7 +21,7 @@ from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import load, shared
 from pendpipe.campaign.design import design_of
-from pendpipe.campaign.joint import InertiaSds, inertia_sds, joint_values
+from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign

@@ -13,7 +13,7 @@ from pendpipe.analysis.separate import (
     separate,
 )
 from pendpipe.arguments import load, shared
-from pendpipe.campaign.joint import InertiaSds, inertia_sds
+from pendpipe.campaign.fit import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
