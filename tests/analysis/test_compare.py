@@ -103,10 +103,10 @@ def campaign(records: list[MeasuredRecord], errors: SharedErrors | None = None) 
 def test_an_exact_campaign_gives_its_drag_factor(factor: float) -> None:
     found = campaign(water_records(drag_factor=factor))
     assert found.theory_factor.estimate.value == pytest.approx(factor, rel=1e-12)
-    np.testing.assert_allclose(found.drag_over_theory, factor, rtol=1e-12)
+    np.testing.assert_allclose(found.table["drag_over_theory"], factor, rtol=1e-12)
     assert found.theory_factor.chi2 == pytest.approx(0.0, abs=1e-15)
     # 6 pi eta a (1 + C_H x) = factor 6 pi eta a (1 + x): C_H = factor + (factor - 1)/x.
-    x = found.radius_over_depth
+    x = found.table["radius_over_depth"]
     history = found.history_coefficient.estimate.value
     low, high = sorted([factor + (factor - 1.0) / x.min(), factor + (factor - 1.0) / x.max()])
     assert low - 1e-12 <= history <= high + 1e-12
@@ -237,7 +237,9 @@ def test_shared_errors_move_the_factor_as_eq16_says() -> None:
     assert relative["temperature"] == pytest.approx(by_viscosity + by_density, rel=1e-3)
     assert set(found.budget) == {"the records themselves", *relative}
     assert found.budget["temperature"] == pytest.approx(relative["temperature"])
-    assert np.all(found.quality_factor_theory_sd > 0.004 * found.quality_factor_theory)
+    assert np.all(
+        found.table["quality_factor_theory_sd"] > 0.004 * found.table["quality_factor_theory"]
+    )
 
 
 def test_an_error_of_a_records_own_inertia_is_its_own() -> None:
@@ -256,8 +258,8 @@ def test_an_error_of_a_records_own_inertia_is_its_own() -> None:
 def test_steady_stokes_underestimates_the_damping_by_1000_to_3000_percent() -> None:
     found = campaign(water_records())
     low, high = found.steady_stokes_percent
-    assert low == pytest.approx(100.0 * found.radius_over_depth.min(), rel=1e-9)
-    assert high == pytest.approx(100.0 * found.radius_over_depth.max(), rel=1e-9)
+    assert low == pytest.approx(100.0 * found.table["radius_over_depth"].min(), rel=1e-9)
+    assert high == pytest.approx(100.0 * found.table["radius_over_depth"].max(), rel=1e-9)
     assert 700.0 < low < 1200.0
     assert 3000.0 < high < 3600.0
 
@@ -278,7 +280,7 @@ def test_records_without_theory_are_left_out() -> None:
     records = water_records()
     split = separate(records, known_benchmark(K, 0.0))
     found = compare(split, {"high-0": POINT, "low-3": POINT}, SharedErrors())
-    assert set(found.losses.records) == {"high-0", "low-3"}
+    assert set(found.table["record"]) == {"high-0", "low-3"}
     assert found.exponents == {}
     with pytest.raises(InputError, match="known sphere"):
         compare(split, {}, SharedErrors())

@@ -36,7 +36,7 @@ rule calibrate:
         sensor=lambda wildcards, input: option("sensor", input.sensor or None),
         given=lambda wildcards: jobs.sensor_constant(CAMPAIGN, wildcards.record),
         repaired=repaired("{record}", "calibrate"),
-        code=code_version("pendpipe.stages.calibrate"),
+        code=code_version("pendpipe.commands.calibrate"),
     message:
         "{wildcards.record}: calibrate"
     shell:

@@ -23,26 +23,15 @@ _LARGEST: Final = 1e6
 """No angle, displacement or voltage of a sensor is as large: what claims to be is a slip."""
 
 
-@dataclass(frozen=True)
-class CaliperTable:
-    """Points of a calibration, each array of shape (n,)."""
-
-    angle_rad: FloatArray
-    volts: FloatArray
-    volts_sd: FloatArray | None
-    angle_sd_rad: FloatArray
-    by_displacement: bool
-    """Whether the angles were made from displacements, with an arm's common error."""
-
-
 def read_caliper_table(
     path: str | Path,
     *,
     arm_m: float | None = None,
+    arm_sd_m: float = 0.0,
     displacement_sd_m: float = 0.0,
     delimiter: str | None = None,
     decimal: str | None = None,
-) -> CaliperTable:
+) -> dict[str, Any]:
     """Read a calibration's table.
 
     Parameters
@@ -50,13 +39,18 @@ def read_caliper_table(
     path
         A CSV with a header: ``volts``, one of ``angle_rad``, ``angle_deg``,
         ``displacement_m``, optionally ``volts_sd`` and ``angle_sd_rad``.
-    arm_m
+    arm_m, arm_sd_m
         From the axis to where the caliper touches: angle = displacement/arm.
     displacement_sd_m
         Standard deviation of a displacement, where the table gives none of the angle.
     delimiter, decimal
         Where the guess is wrong: tab, semicolon and comma are tried in this order, and
         the decimal mark is a point, or a comma where cells can be read with it only.
+
+    Returns
+    -------
+    dict
+        The arguments of `calibrate`.
 
     Raises
     ------
@@ -65,30 +59,24 @@ def read_caliper_table(
     """
     place = Path(path)
     columns = _columns(place, delimiter, decimal)
-    found = [name for name in ANGLES if name in columns]
-    angle, sd = _angles(place, columns[found[0]], found[0], arm_m, displacement_sd_m)
-    return CaliperTable(
-        angle_rad=angle,
-        volts=columns["volts"],
-        volts_sd=columns.get("volts_sd"),
-        angle_sd_rad=columns.get("angle_sd_rad", np.full(len(angle), sd)),
-        by_displacement=found[0] == "displacement_m",
-    )
-
-
-def _angles(
-    place: Path, values: FloatArray, name: str, arm_m: float | None, displacement_sd_m: float
-) -> tuple[FloatArray, float]:
-    """Turn a column into radians, with the standard deviation that the caliper leaves."""
-    if name == "angle_rad":
-        return values, 0.0
+    name = next(name for name in ANGLES if name in columns)
+    angle, angle_sd, scale_sd = columns[name], 0.0, 0.0
     if name == "angle_deg":
-        return np.deg2rad(values), 0.0
-    if arm_m is None or not 0.0 < arm_m < np.inf:
-        raise InputError(
-            place, "displacements need the arm on which they were measured", "give --arm-m 0.3"
-        )
-    return values / arm_m, displacement_sd_m / arm_m
+        angle = np.deg2rad(angle)
+    elif name == "displacement_m":
+        if arm_m is None or not 0.0 < arm_m < np.inf:
+            raise InputError(
+                place, "displacements need the arm on which they were measured", "give --arm-m 0.3"
+            )
+        angle, angle_sd, scale_sd = angle / arm_m, displacement_sd_m / arm_m, arm_sd_m / arm_m
+    return {
+        "angle_rad": angle,
+        "volts": columns["volts"],
+        "volts_sd": columns.get("volts_sd"),
+        "angle_sd_rad": columns.get("angle_sd_rad", angle_sd),
+        "relative_scale_sd": scale_sd,
+        "place": str(path),
+    }
 
 
 def _columns(place: Path, delimiter: str | None, decimal: str | None) -> dict[str, FloatArray]:
@@ -138,7 +126,7 @@ def _number(
         raise InputError(
             where, f"{name} '{text}' is no number", "correct or drop the row"
         ) from None
-    # nor is NaN
+    # (Nor is NaN below it.)
     refuse_if(not abs(value) < _LARGEST, where, f"{name} is {text}", "correct or drop the row")
     return value
 
@@ -224,6 +212,30 @@ class Calibration:
             },
             "points": [dict(zip(names, row, strict=True)) for row in columns],
         }
+
+    def __str__(self) -> str:
+        """Say the result in a few lines."""
+        constant, offset = self.volts_per_radian, self.offset
+        low, high = self.angle_rad.min(), self.angle_rad.max()
+        misfit = self.chi2_p_value
+        linear = "linearity        not tested: it takes five points at four angles"
+        if curve := self.linearity:
+            verdict = (
+                "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
+            )
+            linear = (
+                f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
+                f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
+            )
+        lines = (
+            f"volts_per_radian {constant.value:.7g} +- {constant.sd:.2g} V/rad",
+            f"offset           {offset.value:.5g} +- {offset.sd:.2g} V",
+            f"points           {len(self.volts)}, from {low:.4g} to {high:.4g} rad",
+            f"residual sd      {self.residual_sd_volts:.3g} V",
+            *([f"lack of fit      p = {misfit:.3g}"] if np.isfinite(misfit) else []),
+            linear,
+        )
+        return "\n".join(lines)
 
 
 FEWEST_POINTS = 3
@@ -366,35 +378,22 @@ def _check(
         f"{len(angle)} point(s) are too few for a line",
         f"give {FEWEST_POINTS} or more",
     )
-    refuse_if(
-        not (np.isfinite(angle).all() and np.isfinite(volts).all()),
-        place,
-        "a value is NaN or infinite",
-        "drop the row",
-    )
+    finite = np.isfinite(angle).all() and np.isfinite(volts).all()
+    refuse_if(not finite, place, "a value is NaN or infinite", "drop the row")
     # Angles made from lengths may differ by rounding only.
-    refuse_if(
-        np.ptp(angle) <= 1e-12 * np.max(np.abs(angle)),
-        place,
-        "all the angles are the same",
-        "move the sensor between readings",
-    )
+    same = np.ptp(angle) <= 1e-12 * np.max(np.abs(angle))
+    refuse_if(same, place, "all the angles are the same", "move the sensor between readings")
     refuse_if(
         np.ptp(volts) == 0.0, place, "all the volts are the same", "check the sensor's connection"
     )
     spread = np.zeros_like(angle) if volts_sd is None else volts_sd
-    negative = (spread < 0.0) | (angle_sd < 0.0)
-    # Without any, all weigh the same; with some, a point without would outweigh the rest.
-    unweighted = (spread == 0.0) & (angle_sd == 0.0)
-    none_given = volts_sd is None and not angle_sd.any()
+    usable = (spread >= 0.0) & (angle_sd >= 0.0) & np.isfinite(spread + angle_sd)
     refuse_if(
-        negative.any() or not np.isfinite(spread + angle_sd).all(),
-        place,
-        "a standard deviation is negative or not finite",
-        "correct it",
+        not usable.all(), place, "a standard deviation is negative or not finite", "correct it"
     )
+    # Without any, all weigh the same; with some, a point without would outweigh the rest.
     refuse_if(
-        unweighted.any() and not none_given,
+        (volts_sd is not None or angle_sd.any()) and np.any((spread == 0.0) & (angle_sd == 0.0)),
         place,
         "a point has no error, neither in volts nor in angle",
         "give its volts_sd",

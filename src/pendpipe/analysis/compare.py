@@ -11,9 +11,11 @@ lengthening), and how well a decay's shape is told: Eq. 14 beside a pure exponen
 of tails.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,8 +28,7 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 
 
-@dataclass(frozen=True)
-class Surroundings:
+class Surroundings(NamedTuple):
     """The sphere and the fluid of one record, SI units."""
 
     radius_m: float
@@ -66,127 +67,100 @@ class SharedErrors:
     temperature_c: float = 20.0
 
 
-@dataclass(frozen=True)
-class ViscousLosses:
-    """Records in a fluid, in columns of shape (n,).
-
-    Parameters
-    ----------
-    records
-        Their names.
-    frequency_hz, moment_of_inertia_kg_m2
-        f and I, with the added mass.
-    rate_per_s, rate_sd_per_s
-        The viscous part of b and its own error.
-    relative_inertia_sd
-        Relative error of I, as far as it is the record's own.
-    hysteretic_rate_per_s
-        The part of b that Eq. 17 took off.
-    rate_per_inverse_k
-        Change of `rate_per_s` with 1/k.
-    radius_m, distance_m, viscosity_pa_s, density_kg_per_m3
-        Sphere and fluid.
-    """
-
-    records: tuple[str, ...]
-    frequency_hz: FloatArray
-    moment_of_inertia_kg_m2: FloatArray
-    rate_per_s: FloatArray
-    rate_sd_per_s: FloatArray
-    relative_inertia_sd: FloatArray
-    hysteretic_rate_per_s: FloatArray
-    rate_per_inverse_k: FloatArray
-    radius_m: FloatArray
-    distance_m: FloatArray
-    viscosity_pa_s: FloatArray
-    density_kg_per_m3: FloatArray
-
-    @property
-    def angular_frequency_per_s(self) -> FloatArray:
-        """Return 2 pi f."""
-        return 2.0 * np.pi * self.frequency_hz
-
-    @property
-    def drag_sd_per_s(self) -> FloatArray:
-        """Own error of the drag, as one of the rate: the drag is 2 I b_v."""
-        return np.hypot(self.rate_sd_per_s, self.relative_inertia_sd * self.rate_per_s)
-
-    @property
-    def radius_over_depth(self) -> FloatArray:
-        """Return a/delta of Eq. 2."""
-        return self.radius_m / physics.penetration_depth(
-            self.angular_frequency_per_s, self.viscosity_pa_s, self.density_kg_per_m3
-        )
-
-    def quality_factor_theory(self, history_coefficient: float = 1.0) -> FloatArray:
-        """Eq. 16 with each record's own I and omega; C_H = 0 for the steady Stokes law."""
-        return physics.viscous_quality_factor(
-            self.moment_of_inertia_kg_m2,
-            self.angular_frequency_per_s,
-            self.radius_m,
-            self.distance_m,
-            self.viscosity_pa_s,
-            self.density_kg_per_m3,
-            history_coefficient,
-        )
-
-    def drag_over_theory(self, history_coefficient: float = 1.0) -> FloatArray:
-        """Drag measured over that of Eq. 2: Q_v of Eq. 16 over Q_v measured, ``Q b_v/(pi f)``.
-
-        Made from the rate, since a rate's error is symmetric and its inverse's is not.
-        """
-        theory = self.quality_factor_theory(history_coefficient)
-        return theory * self.rate_per_s / (np.pi * self.frequency_hz)
+Columns = dict[str, Any]
+"""Records in columns by name, each an array of shape (records,)."""
 
 
 def viscous_losses(
     records: Sequence[SeparatedRecord], surroundings: Mapping[str, Surroundings]
-) -> ViscousLosses:
-    """Collect the records whose surroundings and moment of inertia are known, by frequency."""
-    rows = []
-    for split in records:
-        around, inertia = (
-            surroundings.get(split.measured.record),
-            split.measured.moment_of_inertia,
-        )
-        if around is None or inertia is None:
-            continue
-        rows.append(
-            (
-                split.measured.frequency.value,
-                inertia.value,
-                split.viscous_rate.value,
-                split.viscous_rate_sd_own,
-                inertia.sd / inertia.value,
-                split.measured.linear.value - split.viscous_rate.value,
-                split.viscous_rate_per_inverse_k,
-                around.radius_m,
-                around.distance_m,
-                around.viscosity_pa_s,
-                around.density_kg_per_m3,
-                split.measured.record,
-            )
-        )
-    rows.sort(key=lambda row: row[0])
-    columns = np.array([row[:-1] for row in rows], dtype=np.float64).reshape(len(rows), 11).T
-    return ViscousLosses(tuple(row[-1] for row in rows), *columns)
+) -> Columns:
+    """Collect the records whose surroundings and moment of inertia are known, by frequency.
+
+    Returns
+    -------
+    Columns
+        ``record``, ``branch``, ``frequency_hz``, ``angular_frequency_per_s``,
+        ``moment_of_inertia_kg_m2`` (with the added mass) and ``relative_inertia_sd`` (as far as
+        it is the record's own), ``rate_per_s`` (the viscous part of b) and ``rate_sd_per_s``
+        (its own error), ``hysteretic_rate_per_s`` (the part of b that Eq. 17 took off),
+        ``rate_per_inverse_k`` (change of the rate with 1/k), and those of `Surroundings`.
+    """
+    rows = [
+        {
+            "record": split.measured.record,
+            "branch": split.measured.branch,
+            "frequency_hz": split.measured.frequency.value,
+            "angular_frequency_per_s": 2.0 * np.pi * split.measured.frequency.value,
+            "moment_of_inertia_kg_m2": inertia.value,
+            "rate_per_s": split.viscous_rate.value,
+            "rate_sd_per_s": split.viscous_rate_sd_own,
+            "relative_inertia_sd": inertia.sd / inertia.value,
+            "hysteretic_rate_per_s": split.measured.linear.value - split.viscous_rate.value,
+            "rate_per_inverse_k": split.viscous_rate_per_inverse_k,
+            **around._asdict(),
+        }
+        for split in records
+        if (around := surroundings.get(split.measured.record)) is not None
+        and (inertia := split.measured.moment_of_inertia) is not None
+    ]
+    refuse_if(
+        not rows,
+        "comparison",
+        "no record swings in a fluid with a known sphere",
+        "add a geometry",
+    )
+    rows.sort(key=itemgetter("frequency_hz"))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def shifts(losses: ViscousLosses, errors: SharedErrors, sds: float) -> dict[str, ViscousLosses]:
+def _columns(losses: Columns, *names: str) -> tuple[FloatArray, ...]:
+    return tuple(losses[name] for name in names)
+
+
+def quality_factor_theory(losses: Columns, history_coefficient: float = 1.0) -> FloatArray:
+    """Eq. 16 with each record's own I and omega; C_H = 0 for the steady Stokes law."""
+    radius, distance, viscosity, density = _columns(losses, *Surroundings._fields)
+    return physics.viscous_quality_factor(
+        losses["moment_of_inertia_kg_m2"],
+        losses["angular_frequency_per_s"],
+        radius,
+        distance,
+        viscosity,
+        density,
+        history_coefficient,
+    )
+
+
+def drag_sd_per_s(losses: Columns) -> FloatArray:
+    """Own error of the drag, as one of the rate: the drag is 2 I b_v."""
+    rate, sd, relative = _columns(losses, "rate_per_s", "rate_sd_per_s", "relative_inertia_sd")
+    return np.hypot(sd, relative * rate)
+
+
+def radius_over_depth(losses: Columns) -> FloatArray:
+    """Return a/delta of Eq. 2."""
+    radius, *around = _columns(
+        losses, "radius_m", "angular_frequency_per_s", "viscosity_pa_s", "density_kg_per_m3"
+    )
+    return np.asarray(radius / physics.penetration_depth(*around))
+
+
+def shifted(losses: Columns, errors: SharedErrors, sds: float) -> dict[str, Columns]:
     """Return the losses as they would be, were each shared quantity in turn off by some sds."""
-    moved = sds * errors.inverse_k * losses.rate_per_inverse_k
+    from_k = sds * errors.inverse_k * losses["rate_per_inverse_k"]
     now, then = errors.temperature_c, errors.temperature_c + sds * errors.temperature_k
     thinner = physics.water_viscosity(then) / physics.water_viscosity(now)
     lighter = physics.water_density(then) / physics.water_density(now)
-    inertia, viscosity = losses.moment_of_inertia_kg_m2, losses.viscosity_pa_s
-    density = losses.density_kg_per_m3
-    changed: dict[str, dict[str, Any]] = {
-        HYSTERESIS: {
-            "rate_per_s": losses.rate_per_s + moved,
-            "hysteretic_rate_per_s": losses.hysteretic_rate_per_s - moved,
+    inertia, viscosity, density = _columns(
+        losses, "moment_of_inertia_kg_m2", "viscosity_pa_s", "density_kg_per_m3"
+    )
+    changed: dict[str, Columns] = {
+        "hysteretic coefficient": {
+            "rate_per_s": losses["rate_per_s"] + from_k,
+            "hysteretic_rate_per_s": losses["hysteretic_rate_per_s"] - from_k,
         },
-        "sphere's radius": {"radius_m": losses.radius_m + sds * errors.radius_m},
-        "distance to the axis": {"distance_m": losses.distance_m + sds * errors.distance_m},
+        "sphere's radius": {"radius_m": losses["radius_m"] + sds * errors.radius_m},
+        "distance to the axis": {"distance_m": losses["distance_m"] + sds * errors.distance_m},
         "moment of inertia": {
             "moment_of_inertia_kg_m2": inertia * (1.0 + sds * errors.relative_inertia)
         },
@@ -197,22 +171,21 @@ def shifts(losses: ViscousLosses, errors: SharedErrors, sds: float) -> dict[str,
             "density_kg_per_m3": density * lighter,
         },
     }
-    return {source: replace(losses, **columns) for source, columns in changed.items()}
+    return {source: losses | columns for source, columns in changed.items()}
 
 
-HYSTERESIS: Final = "hysteretic coefficient"
+Ends = tuple[dict[str, Columns], dict[str, Columns]]
+"""The losses `shifted` by one standard deviation up and down."""
 
 
 def shared_effects(
-    quantity: Callable[[ViscousLosses], FloatArray | float],
-    losses: ViscousLosses,
-    errors: SharedErrors,
+    quantity: Callable[[Columns], FloatArray | float], ends: Ends
 ) -> dict[str, FloatArray]:
     """Change of a quantity for one standard deviation of each shared source."""
-    below = shifts(losses, errors, -1.0)
+    up, down = ends
     return {
-        source: np.asarray(quantity(above) - np.asarray(quantity(below[source]))) / 2.0
-        for source, above in shifts(losses, errors, 1.0).items()
+        source: np.asarray(quantity(up[source]) - np.asarray(quantity(down[source]))) / 2.0
+        for source in up
     }
 
 
@@ -255,24 +228,22 @@ class Line(NamedTuple):
         x, y = self.regressor / self.sd, self.response / self.sd
         return float(np.sum(x * y) / np.sum(x * x))
 
+    def off(self, slope: float) -> FloatArray:
+        """What a slope leaves of the response."""
+        return self.response - slope * self.regressor
 
-def fit_line(
-    losses: ViscousLosses, errors: SharedErrors, line_of: Callable[[ViscousLosses], Line]
-) -> SharedEstimate:
+
+def fit_line(losses: Columns, ends: Ends, line_of: Callable[[Columns], Line]) -> SharedEstimate:
     """Fit the slope with the records' own weights; follow the shared errors into it."""
     line = line_of(losses)
     value = line.slope()
-    effects = shared_effects(lambda moved: line_of(moved).slope(), losses, errors)
+    effects = shared_effects(lambda moved: line_of(moved).slope(), ends)
     shared = {source: float(effect) for source, effect in effects.items()}
     sd_own = float(np.sum((line.regressor / line.sd) ** 2) ** -0.5)
     sd_common = float(np.sqrt(sum(effect**2 for effect in shared.values())))
-
-    def residual(moved: ViscousLosses) -> FloatArray:
-        return line_of(moved).response - value * line_of(moved).regressor
-
-    spread = shared_effects(residual, losses, errors)
     # The records are judged about their own best line, found with the same covariance.
-    chi2 = chi_square(residual(losses), line.sd, spread, line.regressor)
+    spread = shared_effects(lambda moved: line_of(moved).off(value), ends)
+    chi2 = chi_square(line.off(value), line.sd, spread, line.regressor)
     dof = len(line.sd) - 1
     return SharedEstimate(
         estimate=Estimate(value, float(np.hypot(sd_own, sd_common)), ""),
@@ -346,8 +317,8 @@ class Exponent:
     records: tuple[str, ...]
 
 
-def fit_exponent(branch: ViscousLosses, errors: SharedErrors) -> Exponent | None:
-    """Fit Eq. 11's exponent to a branch.
+def fit_exponent(branch: Columns, inverse_k_sd: float) -> Exponent | None:
+    """Fit Eq. 11's exponent to a branch, where 1/k has an error.
 
     Returns
     -------
@@ -355,72 +326,61 @@ def fit_exponent(branch: ViscousLosses, errors: SharedErrors) -> Exponent | None
         ``None`` with fewer than two records, with a single frequency, or where a viscous
         rate is not positive (there is no logarithm).
     """
-    count = len(branch.records)
-    if count < 2 or np.any(branch.rate_per_s <= 0.0) or np.ptp(branch.frequency_hz) <= 0.0:
+    frequency, names = branch["frequency_hz"], branch["record"].tolist()
+    count = len(names)
+    if count < 2 or np.any(branch["rate_per_s"] <= 0.0) or np.ptp(frequency) <= 0.0:
         return None
-    slope, own, common = _derivative(branch, errors, 1)
-    nan = float("nan")
-    bend, bend_own, bend_common = _derivative(branch, errors, 2) if count > 2 else (nan, nan, nan)
-    logs = np.log(branch.frequency_hz)
-    steps = np.diff(logs)
-    local = np.diff(_log_quality(branch)) / np.where(steps > 0.0, steps, nan)
+    slope, own, common = _derivative(branch, inverse_k_sd, 1)
+    bend, bend_sd = math.nan, math.nan
+    if count > 2:
+        bend, *sds = _derivative(branch, inverse_k_sd, 2)
+        bend_sd = math.hypot(*sds)
+    steps = np.diff(np.log(frequency))
+    local = np.diff(_log_quality(branch)) / np.where(steps > 0.0, steps, np.nan)
+    ranges = []
+    for low in range(MOST_LEFT_OUT + 1):
+        for high in range(count - MOST_LEFT_OUT, count + 1):
+            enough = high - low >= min(FEWEST_IN_A_RANGE, count)
+            if enough and np.ptp(frequency[low:high]) > 0.0:
+                part, *sds = _derivative(_chosen(branch, slice(low, high)), inverse_k_sd, 1)
+                ranges.append(RangeSlope(names[low], names[high - 1], part, math.hypot(*sds)))
     return Exponent(
-        exponent=Estimate(slope, float(np.hypot(own, common)), ""),
+        exponent=Estimate(slope, math.hypot(own, common), ""),
         sd_own=own,
         sd_common=common,
-        curvature=Estimate(bend, float(np.hypot(bend_own, bend_common)), ""),
+        curvature=Estimate(bend, bend_sd, ""),
         local_slopes=tuple(local.tolist()),
-        ranges=_ranges(branch, errors),
-        records=branch.records,
+        ranges=tuple(ranges),
+        records=tuple(names),
     )
 
 
-def _ranges(branch: ViscousLosses, errors: SharedErrors) -> tuple[RangeSlope, ...]:
-    """The slope with up to two records left out at each end; none at a single frequency."""
-    count = len(branch.records)
-    parts = []
-    for low in range(MOST_LEFT_OUT + 1):
-        for high in range(count - MOST_LEFT_OUT, count + 1):
-            part = _part(branch, low, high)
-            if high - low < min(FEWEST_IN_A_RANGE, count) or np.ptp(part.frequency_hz) <= 0.0:
-                continue
-            slope, own, common = _derivative(part, errors, 1)
-            parts.append(
-                RangeSlope(
-                    branch.records[low],
-                    branch.records[high - 1],
-                    slope,
-                    float(np.hypot(own, common)),
-                )
-            )
-    return tuple(parts)
+def _chosen(losses: Columns, rows: slice | BoolArray) -> Columns:
+    return {name: column[rows] for name, column in losses.items()}
 
 
-def _derivative(
-    branch: ViscousLosses, errors: SharedErrors, order: int
-) -> tuple[float, float, float]:
+def _derivative(branch: Columns, inverse_k_sd: float, order: int) -> tuple[float, float, float]:
     """Derivative of ln Q_v by ln f from a least-squares polynomial: value, own sd, common sd."""
-    logs = np.log(branch.frequency_hz)
+    logs = np.log(branch["frequency_hz"])
     powers = np.vander(logs - np.mean(logs), order + 1, increasing=True)
     # The derivative is a sum of the ln Q_v with these weights; 2 for the parabola's u^2.
     weights = order * np.linalg.pinv(powers)[order]
-    value = float(weights @ _log_quality(branch))
-    own = float(np.sqrt(np.sum((weights * branch.rate_sd_per_s / branch.rate_per_s) ** 2)))
-    ends = [_log_quality(shifts(branch, errors, sds)[HYSTERESIS]) for sds in (1.0, -1.0)]
-    return value, own, float(abs(weights @ (ends[0] - ends[1])) / 2.0)
-
-
-def _log_quality(branch: ViscousLosses) -> FloatArray:
-    """Return ln Q_v; where an error of k leaves no loss at all, the smallest that counts."""
-    rate = np.maximum(branch.rate_per_s, 1e-3 * branch.rate_sd_per_s + 1e-300)
-    return np.asarray(np.log(np.pi * branch.frequency_hz / rate))
-
-
-def _part(branch: ViscousLosses, low: int, high: int) -> ViscousLosses:
-    """The records from `low` up to and without `high`."""
-    return ViscousLosses(
-        **{name: column[low:high] for name, column in vars(branch).items()},
+    rate, rate_sd = _columns(branch, "rate_per_s", "rate_sd_per_s")
+    ends = [_log_quality(branch, moved) for moved in (inverse_k_sd, -inverse_k_sd)]
+    return (
+        float(weights @ _log_quality(branch)),
+        float(np.sqrt(np.sum((weights * rate_sd / rate) ** 2))),
+        float(abs(weights @ (ends[0] - ends[1])) / 2.0),
     )
+
+
+def _log_quality(branch: Columns, moved: float = 0.0) -> FloatArray:
+    """Return ln Q_v with 1/k moved; where that leaves no loss at all, the smallest that counts."""
+    frequency, rate, sd, per_inverse = _columns(
+        branch, "frequency_hz", "rate_per_s", "rate_sd_per_s", "rate_per_inverse_k"
+    )
+    smallest = 1e-3 * sd + 1e-300
+    return np.asarray(np.log(np.pi * frequency / np.maximum(rate + moved * per_inverse, smallest)))
 
 
 @dataclass(frozen=True)
@@ -453,14 +413,12 @@ class Comparison:
 
     Parameters
     ----------
-    losses
-        The records that were compared, by frequency; the arrays below follow their order.
-    quality_factor_theory, quality_factor_theory_sd
-        Eq. 16 for each record, and its error from what is shared (k has no part in it).
-    quality_factor_steady, radius_over_depth
-        The steady Stokes law's Q, and a/delta.
-    drag_over_theory
-        Q_v of Eq. 16 over Q_v measured.
+    table
+        The columns of `viscous_losses`; ``quality_factor_theory`` of Eq. 16 and
+        ``quality_factor_theory_sd``, its error from what is shared (k has no part in it);
+        ``quality_factor_steady`` of the steady Stokes law; ``radius_over_depth``, a/delta;
+        ``drag_over_theory``, Q_v of Eq. 16 over Q_v measured; and ``quality_factor_limit`` of
+        Eq. 16 and hysteresis together.
     theory_factor
         Inverse-variance mean of that (weights from the records' own errors).
     history_coefficient
@@ -475,12 +433,7 @@ class Comparison:
         Relative error of `theory_factor` by source, the records' own first.
     """
 
-    losses: ViscousLosses
-    quality_factor_theory: FloatArray
-    quality_factor_theory_sd: FloatArray
-    quality_factor_steady: FloatArray
-    radius_over_depth: FloatArray
-    drag_over_theory: FloatArray
+    table: Columns
     theory_factor: SharedEstimate
     history_coefficient: SharedEstimate
     exponents: dict[str, Exponent]
@@ -511,35 +464,36 @@ def compare(
         If no record can be compared.
     """
     losses = viscous_losses(records, surroundings)
-    refuse_if(
-        not losses.records,
-        "comparison",
-        "no record swings in a fluid with a known sphere",
-        "add a geometry",
+    ends = shifted(losses, errors, 1.0), shifted(losses, errors, -1.0)
+    factor = fit_line(losses, ends, _drag_over_theory)
+    checks = tuple(
+        check_model(losses, ends, history=history, hysteresis=hysteresis)
+        for history in (True, False)
+        for hysteresis in (True, False)
     )
-    factor = theory_factor(losses, errors)
-    steady = losses.drag_over_theory(0.0)
-    theory = losses.quality_factor_theory()
-    effects = shared_effects(ViscousLosses.quality_factor_theory, losses, errors)
+    variances = [effect**2 for effect in shared_effects(quality_factor_theory, ends).values()]
+    table = losses | {
+        "quality_factor_theory": quality_factor_theory(losses),
+        "quality_factor_theory_sd": np.sqrt(sum(variances)),
+        "quality_factor_steady": quality_factor_theory(losses, 0.0),
+        "radius_over_depth": radius_over_depth(losses),
+        "drag_over_theory": _drag_over_theory(losses).response,
+        "quality_factor_limit": checks[0].quality_factor_limit,
+    }
+    # Of the drag measured over that of the steady law, less 1.
+    excess = 100.0 * _excess_over_steady(losses).response
+    fitted = {
+        str(name): fit_exponent(_chosen(losses, losses["branch"] == name), errors.inverse_k)
+        for name in np.unique(losses["branch"])
+        if name
+    }
     return Comparison(
-        losses=losses,
-        quality_factor_theory=theory,
-        quality_factor_theory_sd=np.sqrt(sum(effect**2 for effect in effects.values())),
-        quality_factor_steady=losses.quality_factor_theory(0.0),
-        radius_over_depth=losses.radius_over_depth,
-        drag_over_theory=losses.drag_over_theory(),
+        table=table,
         theory_factor=factor,
-        history_coefficient=history_coefficient(losses, errors),
-        exponents=_exponents(records, surroundings, errors),
-        steady_stokes_percent=(
-            100.0 * float(np.min(steady) - 1.0),
-            100.0 * float(np.max(steady) - 1.0),
-        ),
-        checks=tuple(
-            check_model(losses, errors, history=history, hysteresis=hysteresis)
-            for history in (True, False)
-            for hysteresis in (True, False)
-        ),
+        history_coefficient=fit_line(losses, ends, _excess_over_steady),
+        exponents={name: found for name, found in fitted.items() if found is not None},
+        steady_stokes_percent=(float(np.min(excess)), float(np.max(excess))),
+        checks=checks,
         budget={"the records themselves": factor.sd_own / abs(factor.estimate.value)}
         | {
             source: abs(effect / factor.estimate.value)
@@ -549,72 +503,47 @@ def compare(
     )
 
 
-def theory_factor(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
-    """Drag measured over Eq. 2: the inverse-variance mean of Q_v(Eq. 16)/Q_v measured."""
-    return fit_line(losses, errors, _drag_over_theory)
-
-
-def history_coefficient(losses: ViscousLosses, errors: SharedErrors) -> SharedEstimate:
-    """Fit C_H of ``drag = 6 pi eta a (1 + C_H a/delta) v`` by weighted least squares.
-
-    The measured drag over the steady one, less 1, is C_H a/delta.
-    """
-    return fit_line(losses, errors, _excess_over_steady)
-
-
-def check_model(
-    losses: ViscousLosses, errors: SharedErrors, *, history: bool, hysteresis: bool
-) -> ModelCheck:
+def check_model(losses: Columns, ends: Ends, *, history: bool, hysteresis: bool) -> ModelCheck:
     """Compare the measured limits of Q with a theory that has or lacks two of its terms."""
 
-    def predicted(moved: ViscousLosses) -> FloatArray:
-        viscous = np.pi * moved.frequency_hz / moved.quality_factor_theory(float(history))
-        return viscous + hysteresis * moved.hysteretic_rate_per_s
+    def rates(moved: Columns) -> tuple[FloatArray, FloatArray]:
+        """The whole exponential loss: measured, and predicted."""
+        frequency, viscous, other = _columns(
+            moved, "frequency_hz", "rate_per_s", "hysteretic_rate_per_s"
+        )
+        predicted = np.pi * frequency / quality_factor_theory(moved, float(history))
+        return viscous + other, predicted + hysteresis * other
 
-    def excess(moved: ViscousLosses) -> FloatArray:
-        return moved.rate_per_s + moved.hysteretic_rate_per_s - predicted(moved)
-
-    effects = shared_effects(excess, losses, errors)
-    rate = predicted(losses)
+    effects = shared_effects(lambda moved: np.subtract(*rates(moved)), ends)
+    measured, predicted = rates(losses)
     return ModelCheck(
         history=history,
         hysteresis=hysteresis,
-        quality_factor_limit=np.pi * losses.frequency_hz / rate,
-        ratio=(losses.rate_per_s + losses.hysteretic_rate_per_s) / rate,
-        chi2=chi_square(excess(losses), losses.drag_sd_per_s, effects),
-        degrees_of_freedom=len(rate),
+        quality_factor_limit=np.pi * losses["frequency_hz"] / predicted,
+        ratio=measured / predicted,
+        chi2=chi_square(measured - predicted, drag_sd_per_s(losses), effects),
+        degrees_of_freedom=len(measured),
     )
 
 
-def _drag_over_theory(losses: ViscousLosses) -> Line:
-    per_rate = losses.quality_factor_theory() / (np.pi * losses.frequency_hz)
-    return Line(
-        np.ones_like(per_rate), per_rate * losses.rate_per_s, per_rate * losses.drag_sd_per_s
-    )
+def _drag_over_theory(losses: Columns, history_coefficient: float = 1.0) -> Line:
+    """Drag measured over that of Eq. 2: Q_v of Eq. 16 over Q_v measured, ``Q b_v/(pi f)``.
+
+    Made from the rate, since a rate's error is symmetric and its inverse's is not. The line
+    through one is its inverse-variance mean.
+    """
+    frequency, rate = _columns(losses, "frequency_hz", "rate_per_s")
+    per_rate = quality_factor_theory(losses, history_coefficient) / (np.pi * frequency)
+    return Line(np.ones_like(per_rate), per_rate * rate, per_rate * drag_sd_per_s(losses))
 
 
-def _excess_over_steady(losses: ViscousLosses) -> Line:
-    per_rate = losses.quality_factor_theory(0.0) / (np.pi * losses.frequency_hz)
-    return Line(
-        losses.radius_over_depth,
-        per_rate * losses.rate_per_s - 1.0,
-        per_rate * losses.drag_sd_per_s,
-    )
+def _excess_over_steady(losses: Columns) -> Line:
+    """The measured drag over the steady one, less 1: C_H a/delta, for C_H of Eq. 2.
 
-
-def _exponents(
-    records: Sequence[SeparatedRecord],
-    surroundings: dict[str, Surroundings],
-    errors: SharedErrors,
-) -> dict[str, Exponent]:
-    """Eq. 11 for each branch of two or more records."""
-    found = {}
-    for branch in sorted({split.measured.branch for split in records} - {""}):
-        members = [split for split in records if split.measured.branch == branch]
-        exponent = fit_exponent(viscous_losses(members, surroundings), errors)
-        if exponent is not None:
-            found[branch] = exponent
-    return found
+    That is ``drag = 6 pi eta a (1 + C_H a/delta) v``.
+    """
+    line = _drag_over_theory(losses, 0.0)
+    return line._replace(regressor=radius_over_depth(losses), response=line.response - 1.0)
 
 
 class TheoryCurve(NamedTuple):

@@ -80,17 +80,15 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """List ports, serve a device, or record."""
     if arguments.list:
-        return _list(arguments.port)
+        _list(arguments.port)
+        return
+    kinds = {"serve": _serve, "caliper": _caliper, "campaign": _stage}
+    work = next((each for name, each in kinds.items() if getattr(arguments, name)), _record)
     with _signals_end_like_ctrl_c():
-        if arguments.serve:
-            return _serve(arguments)
-        if arguments.campaign:
-            return _stage(arguments)
-        refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
-        return _record(arguments)
+        work(arguments)
 
 
 @contextmanager
@@ -118,8 +116,9 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
             signal.signal(number, old)
 
 
-def _record(arguments: argparse.Namespace) -> int:
+def _record(arguments: argparse.Namespace) -> None:
     """Record, or write what an earlier call has recorded and could not write."""
+    refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
     from pendpipe.acquisition import attempts
     from pendpipe.formats.writing import check_name, write
 
@@ -159,26 +158,27 @@ def _record(arguments: argparse.Namespace) -> int:
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
     print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
-    return 0
 
 
-def _stage(arguments: argparse.Namespace) -> int:
-    """Acquire one record of a campaign, or its caliper run."""
-    campaign = load(arguments.campaign)
-    if arguments.caliper:
-        from pendpipe.configuration.jobs import caliper_source
-        from pendpipe.manifest import job
-        from pendpipe.stages.acquire import run_caliper
+def _caliper(arguments: argparse.Namespace) -> None:
+    """Acquire the caliper run of a campaign."""
+    from pendpipe.configuration.jobs import caliper_source
+    from pendpipe.manifest import job
+    from pendpipe.stages.acquire import run_caliper
 
-        refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
-        out, source = Path(arguments.out), caliper_source(campaign)
-        sources = [source] if source else []
-        with job(out.parent, "caliper", sources=sources, outputs=[out]):
-            run_caliper(campaign, out)
-        return 0
+    refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
+    campaign, out = load(arguments.campaign), Path(arguments.out)
+    source = caliper_source(campaign)
+    with job(out.parent, "caliper", sources=[source] if source else [], outputs=[out]):
+        run_caliper(campaign, out)
+
+
+def _stage(arguments: argparse.Namespace) -> None:
+    """Acquire one record of a campaign."""
     from pendpipe.stages.acquire import acquire_record
     from pendpipe.stages.refusal import run_stage
 
+    campaign = load(arguments.campaign)
     record = campaign.record(arguments.record)
     folder = Path(campaign.configuration.results, record.record)
     out = Path(arguments.out) if arguments.out else folder / "recording.csv"
@@ -192,7 +192,7 @@ def _stage(arguments: argparse.Namespace) -> int:
         raise InputError(
             f"record {record.record}", "it comes from no instrument", "leave out --anew"
         )
-    return run_stage(
+    run_stage(
         "acquire",
         record.record,
         lambda: acquire_record(
@@ -251,7 +251,7 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         )
 
 
-def _serve(arguments: argparse.Namespace) -> int:
+def _serve(arguments: argparse.Namespace) -> None:
     """Be a simulated instrument for other programs until the end."""
     from pendpipe.acquisition.devices.simulated import SimulatedDevice
     from pendpipe.acquisition.simulated import example_signal
@@ -269,7 +269,6 @@ def _serve(arguments: argparse.Namespace) -> int:
         with suppress(KeyboardInterrupt):
             while device.failure is None:
                 time.sleep(0.05)
-    return 0
 
 
 def _clock_scale(arguments: argparse.Namespace) -> float:
@@ -283,7 +282,7 @@ def _clock_scale(arguments: argparse.Namespace) -> float:
     return scale
 
 
-def _list(port: str | None) -> int:
+def _list(port: str | None) -> None:
     """Print the ports; ask the device on one of them who it is."""
     from serial.tools.list_ports import comports
 
@@ -293,7 +292,7 @@ def _list(port: str | None) -> int:
         identity = identify(port)
         extra = f", firmware {identity.firmware}" if identity.firmware else ""
         print(f"{port}: {identity.model}{extra}")
-        return 0
+        return
     lines = []
     for entry in sorted(comports(), key=lambda entry: entry.device):
         shown = entry.description
@@ -306,4 +305,3 @@ def _list(port: str | None) -> int:
         lines.append(f"{entry.device}: {shown}")
     lines += without_port()
     print("\n".join(lines or [no_ports()]))
-    return 0

@@ -8,18 +8,18 @@ With --record (the workflow's way) FILE is a recording instead, and the result s
 constant holds for it.
 """
 
-from __future__ import annotations
-
 import argparse
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
+import numpy as np
+
+from pendpipe import manifest
 from pendpipe.arguments import SHARED, Flags, print_answer, shared, under
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.calibrate import Calibration
-
+from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import read_json, write_json
+from pendpipe.recording import Recording, read_plain
+from pendpipe.stages.refusal import run_stage
 
 _OWN: Final[Flags] = {
     "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"},
@@ -43,89 +43,84 @@ _OF_A_RECORD: Final = shared("--record", "--refused") | {
 ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Calibrate a sensor, or pick the constant of a record."""
+    out: Path | None = arguments.out
     if arguments.record is not None:
-        return _record(arguments)
-    from pendpipe import manifest
+        refuse_if(out is None, "--out", "it is missing", "give the file for the record's constant")
+        run_stage(
+            "calibrate",
+            arguments.record,
+            lambda: _of_record(arguments),
+            outputs=[arguments.out],
+            refused=arguments.refused,
+            inputs=[arguments.file, arguments.sensor],
+        )
+    elif out is not None and (out.parent / manifest.FOLDER).is_dir():
+        # The campaign's caliper run, in its folder of results.
+        with manifest.job(out.parent, "sensor", inputs=[arguments.file], outputs=[out]):
+            _sensor(arguments)
+    else:
+        _sensor(arguments)
 
-    if arguments.out is None or not (arguments.out.parent / manifest.FOLDER).is_dir():
-        return _sensor(arguments)
-    # The campaign's caliper run, in its folder of results.
-    out: Path = arguments.out
-    with manifest.job(out.parent, "sensor", inputs=[arguments.file], outputs=[out]):
-        return _sensor(arguments)
 
-
-def _sensor(arguments: argparse.Namespace) -> int:
+def _sensor(arguments: argparse.Namespace) -> None:
     """Fit, print and write a sensor's line."""
     from pendpipe.analysis.calibrate import calibrate, read_caliper_table
-    from pendpipe.files import write_json
 
     table = read_caliper_table(
         arguments.file,
         arm_m=arguments.arm_m,
+        arm_sd_m=arguments.arm_sd_m,
         displacement_sd_m=arguments.displacement_sd_m,
         delimiter=arguments.delimiter,
         decimal=arguments.decimal,
     )
-    relative_sd = arguments.arm_sd_m / arguments.arm_m if table.by_displacement else 0.0
-    calibration = calibrate(
-        table.angle_rad,
-        table.volts,
-        volts_sd=table.volts_sd,
-        angle_sd_rad=table.angle_sd_rad,
-        relative_scale_sd=relative_sd,
-        place=str(arguments.file),
-    )
-    print_answer(arguments, calibration.as_json(), _statement(calibration))
+    calibration = calibrate(**table)
+    print_answer(arguments, calibration.as_json(), str(calibration))
     if arguments.out:
         write_json(arguments.out, calibration.as_json())
-    return 0
 
 
-def _statement(calibration: Calibration) -> str:
-    """Say the result in a few lines."""
-    constant, offset = calibration.volts_per_radian, calibration.offset
-    low, high = calibration.angle_rad.min(), calibration.angle_rad.max()
-    misfit = calibration.chi2_p_value
-    linear = "linearity        not tested: it takes five points at four angles"
-    if curve := calibration.linearity:
-        verdict = "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
-        linear = (
-            f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
-            f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
-        )
-    lines = (
-        f"volts_per_radian {constant.value:.7g} +- {constant.sd:.2g} V/rad",
-        f"offset           {offset.value:.5g} +- {offset.sd:.2g} V",
-        f"points           {len(calibration.volts)}, from {low:.4g} to {high:.4g} rad",
-        f"residual sd      {calibration.residual_sd_volts:.3g} V",
-        *([f"lack of fit      p = {misfit:.3g}"] if math.isfinite(misfit) else []),
-        linear,
-    )
-    return "\n".join(lines)
+def _of_record(arguments: argparse.Namespace) -> None:
+    """Write the sensor constant of one record with its standard deviation.
 
-
-def _record(arguments: argparse.Namespace) -> int:
-    """Pick the constant that holds for one record of a campaign."""
-    from pendpipe.errors import refuse_if
-    from pendpipe.stages.calibrate import calibrate_record
-    from pendpipe.stages.refusal import run_stage
-
-    refuse_if(
-        arguments.out is None, "--out", "it is missing", "give the file for the record's constant"
-    )
-    return run_stage(
-        "calibrate",
-        arguments.record,
-        lambda: calibrate_record(
+    The record's own constant (from the table) comes before the one in the recording's
+    metadata, and that before the campaign's caliper run. A recording in radians or
+    metres needs none: ``"volts_per_radian": null``.
+    """
+    recording = read_plain(arguments.file)
+    content: dict[str, Any] = {"schema_version": 1, "volts_per_radian": None, "warnings": []}
+    given = arguments.volts_per_radian
+    own = given if given is not None else recording.number("volts_per_radian", arguments.file)
+    if recording.quantity != "volts":
+        content["from"] = f"recorded in {recording.unit}"
+    elif own is not None:
+        content["from"] = "the table of records" if given is not None else "the recording"
+        content["volts_per_radian"] = {"value": own, "sd": 0.0, "unit": "V/rad"}
+        content["warnings"].append("the sensor constant is given without an uncertainty")
+    elif arguments.sensor is not None:
+        result = read_json(arguments.sensor)
+        content["from"] = "the caliper run"
+        content["volts_per_radian"] = result["volts_per_radian"]
+        content["warnings"] += _range_warnings(recording, result)
+    else:
+        raise InputError(
             arguments.file,
-            arguments.out,
-            sensor=arguments.sensor,
-            given=arguments.volts_per_radian,
-        ),
-        outputs=[arguments.out],
-        refused=arguments.refused,
-        inputs=[arguments.file, arguments.sensor],
+            "the readings are volts and no sensor constant is known",
+            "give volts_per_radian in the table of records, or a calibration",
+        )
+    write_json(arguments.out, content)
+
+
+def _range_warnings(recording: Recording, result: dict[str, Any]) -> list[str]:
+    """Say when a record goes beyond what the caliper run has tested."""
+    tested = max(abs(float(point["angle_rad"])) for point in result["points"])
+    volts = recording.values[recording.usable]
+    largest = float(np.max(np.abs(volts - np.median(volts))))
+    reached = largest / abs(float(result["volts_per_radian"]["value"]))
+    warning = (
+        f"the record reaches {reached:.3g} rad, the calibration was tested to {tested:.3g} rad:"
+        " linearity beyond is assumed"
     )
+    return [warning] if reached > 1.05 * tested else []

@@ -11,19 +11,19 @@ differ from the law by more than noise. red: they contradict each other; then th
 printed instead of the law, and the exit status is 2 unless --accept is given.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from pendpipe import api
+from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
 from pendpipe.errors import InputError, refuse_if
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit import FitResult
-
+from pendpipe.files import write_json
 
 _OWN: Final[Flags] = {
     "--out": {"metavar": "JSON", "help": "the result; - is standard output"},
@@ -64,7 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _table(arguments)
     arguments.file = arguments.files[0]
     if arguments.record is not None or arguments.refused is not None:
-        return _stage(arguments)
+        _stage(arguments)
+        return 0
     figure: Path | None = arguments.figure
     # A form that nobody can draw is refused before the file is written.
     refuse_if(
@@ -90,12 +91,12 @@ def run(arguments: argparse.Namespace) -> int:
     return _status(arguments, result)
 
 
-def _stage(arguments: argparse.Namespace) -> int:
+def _stage(arguments: argparse.Namespace) -> None:
     """Fit one record of a campaign; a red light stands in the result and stops nothing."""
     from pendpipe.stages.refusal import run_stage
 
     refuse_if(not arguments.out, "--out", "a record's fit needs a file", "give --out fit.json")
-    return run_stage(
+    run_stage(
         "fit",
         arguments.record,
         lambda: _write(arguments, _fit(arguments)),
@@ -106,12 +107,6 @@ def _stage(arguments: argparse.Namespace) -> int:
 
 
 def _fit(arguments: argparse.Namespace) -> FitResult:
-    from dataclasses import replace
-
-    from pendpipe import api
-    from pendpipe.analysis.fit.fixed import parse_fixed
-    from pendpipe.analysis.turning_points import read_turning_points
-
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
@@ -137,8 +132,6 @@ def _fit(arguments: argparse.Namespace) -> FitResult:
 
 
 def _write(arguments: argparse.Namespace, result: FitResult) -> None:
-    from pendpipe.files import write_json
-
     write_json(Path(arguments.out), result.to_dict())
     for warning in result.warnings:
         print(f"{arguments.file}: {warning}", file=sys.stderr)

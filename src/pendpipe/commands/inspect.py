@@ -1,23 +1,16 @@
 """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
 
-from __future__ import annotations
-
 import argparse
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from pendpipe.arguments import FILE, print_answer, read_options, shared
-
-if TYPE_CHECKING:
-    from pendpipe.formats import Inspection
-
+from pendpipe.formats import Inspection, inspect
 
 ARGUMENTS: Final = FILE | shared("--json")
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Inspect and print."""
-    from pendpipe.formats import inspect
-
     found = inspect(arguments.file, read_options(arguments))
     print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))
 
@@ -29,7 +22,6 @@ def _lines(file: str, found: Inspection) -> list[str]:
         ("read", f"{found.chosen}, in {found.unit or 'no known unit'}"),
         ("hangs at", f"{found.level:.6g} {found.unit}"),
     ]
-    known_step = found.resolution is not None
     facts = [
         ("format", found.format),
         *(
@@ -39,7 +31,7 @@ def _lines(file: str, found: Inspection) -> list[str]:
         *(read if found.chosen else []),
         ("samples", f"{found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"),
         ("span", f"{found.duration_s:.6g} s"),
-        ("step", f"{found.resolution:.6g} {found.unit}" if known_step else "none found"),
+        ("step", f"{found.resolution:.6g} {found.unit}" if found.resolution else "none found"),
         ("clipped", f"{found.clipped_samples} sample(s)"),
         *(("gap", f"{gap.missing_s:.6g} s after sample {gap.after_sample}") for gap in found.gaps),
         *(

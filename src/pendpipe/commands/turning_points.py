@@ -10,7 +10,10 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from pendpipe.analysis.free_decay import measure_recording
+from pendpipe.analysis.turning_points import write_turning_points
 from pendpipe.arguments import FILE, read_motion, shared
+from pendpipe.stages.refusal import run_stage
 
 ARGUMENTS: Final = (
     FILE
@@ -19,11 +22,9 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> None:
     """Measure and write."""
-    from pendpipe.stages.refusal import run_stage
-
-    return run_stage(
+    run_stage(
         "turning-points",
         arguments.record,
         lambda: _measure(arguments),
@@ -34,9 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _measure(arguments: argparse.Namespace) -> None:
-    from pendpipe.analysis.free_decay import measure_recording
-    from pendpipe.analysis.turning_points import write_turning_points
-
     recording, provenance = read_motion(arguments)
     points, _ = measure_recording(recording, arguments.file, provenance)
     write_turning_points(arguments.out, points)

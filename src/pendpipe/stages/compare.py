@@ -172,7 +172,7 @@ def _record(
     content["misfit"] = asdict(amplitude_misfit(points))
     if split is not None:
         content |= _separated(split)
-    return content | _theory(campaign, result, split, found, spread.get(row.record))
+    return content | _theory(campaign, result, found, spread.get(row.record))
 
 
 def _separated(split: SeparatedRecord) -> dict[str, Any]:
@@ -189,7 +189,6 @@ def _separated(split: SeparatedRecord) -> dict[str, Any]:
 def _theory(
     campaign: Campaign,
     result: RecordResult,
-    split: SeparatedRecord | None,
     found: Comparison | None,
     spread: InertiaSds | None,
 ) -> dict[str, Any]:
@@ -215,19 +214,18 @@ def _theory(
     if "a_over_delta" not in theory:
         return content
     content |= {name: theory[name] for name in ("a_over_delta", "lengthening")}
-    if found is None or split is None or result.record.record not in found.losses.records:
+    names = [] if found is None else found.table["record"].tolist()
+    if found is None or result.record.record not in names:
         return content
-    index = found.losses.records.index(result.record.record)
-    together = next(check for check in found.checks if check.history and check.hysteresis)
+    index = names.index(result.record.record)
+    row = {name: column[index].item() for name, column in found.table.items()}
     return content | {
         "quality_factor_viscous_theory": Estimate(
-            float(found.quality_factor_theory[index]),
-            float(found.quality_factor_theory_sd[index]),
-            "",
+            row["quality_factor_theory"], row["quality_factor_theory_sd"], ""
         ).as_json(),
-        "quality_factor_viscous_steady": float(found.quality_factor_steady[index]),
-        "quality_factor_limit_theory": float(together.quality_factor_limit[index]),
-        "drag_over_theory": float(found.drag_over_theory[index]),
+        "quality_factor_viscous_steady": row["quality_factor_steady"],
+        "quality_factor_limit_theory": row["quality_factor_limit"],
+        "drag_over_theory": row["drag_over_theory"],
     }
 
 

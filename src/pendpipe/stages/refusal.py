@@ -27,7 +27,7 @@ def run_stage(
     refused: Path | None,
     inputs: Iterable[Path | None] = (),
     sources: Iterable[Path] = (),
-) -> int:
+) -> None:
     """Run one stage of one record; if the record can't be used, refuse it.
 
     Parameters
@@ -54,16 +54,16 @@ def run_stage(
         If there is no room for the outputs, say. Nor does that.
     """
     if record is None:
-        return _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
+        _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
+        return
     if refused is not None:
         check([refused])
     home = outputs[0].parent
     given = [path for path in inputs if path is not None]
     with job(home, stage, inputs=given, sources=sources, outputs=outputs) as running:
-        status = _work_or_refuse(stage, record, work, outputs, refused, sources)
+        _work_or_refuse(stage, record, work, outputs, refused, sources)
         if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
             running.extras.append(refused)
-    return status
 
 
 def _work_or_refuse(
@@ -73,15 +73,15 @@ def _work_or_refuse(
     outputs: Sequence[Path],
     refused: Path | None,
     sources: Iterable[Path],
-) -> int:
+) -> None:
     if refused is None:
         work()
-        return 0
+        return
     earlier = reason_of(refused, before=stage)
     if earlier is not None:
         _write_stubs(outputs, earlier)
         print(f"pendpipe: {record} was refused before: {earlier}", file=sys.stderr)
-        return 0
+        return
     refused.unlink(missing_ok=True)
     try:
         work()
@@ -94,7 +94,6 @@ def _work_or_refuse(
         )
         _write_stubs(outputs, reason)
         print(f"pendpipe: {record} is refused: {error}", file=sys.stderr)
-    return 0
 
 
 def within_results(error: InputError, refused: Path | None, sources: Iterable[Path] = ()) -> str:
