@@ -11,11 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.analysis.turning_points.loops import (
-    count_half_cycles,
-    find_extremes,
-    smooth_times,
-)
+from pendpipe.analysis.half_cycles import find_extremes
+from pendpipe.analysis.turning_points.find import count_half_cycles, smooth_times
 from pendpipe.analysis.turning_points.measure import (
     BLOCK,
     HARMONICS,

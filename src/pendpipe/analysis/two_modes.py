@@ -76,14 +76,14 @@ def two_modes(
     if len(amplitude) < _FEWEST:
         return None
     found = _fitted(time, values, amplitude, width, slow, 2)
-    if found is None or not _explained(found.residual, values):
+    if found is None or not _explained(found[-1], values):
         return None
     rates, size, design, residual = found
     if may_be_one:
         one = _fitted(time, values, amplitude, width, slow, 1)
         thirds = [np.array_split(each, _THIRDS) for each in (residual, values)]
         still = _STILL * float(np.var(values))
-        if one and not _explained(residual, one.residual):
+        if one and not _explained(residual, one[-1]):
             return None
         if not all(
             _explained(*third) for third in zip(*thirds, strict=True) if np.var(third[1]) > still
@@ -111,19 +111,18 @@ def _explained(residual: FloatArray, values: FloatArray) -> bool:
     return bool(np.var(residual) < (1.0 - _EXPLAINED) * np.var(values))
 
 
-class _Fitted(NamedTuple):
-    """Complex rates and sizes (k,), the derivatives of the readings, and what is left (n,)."""
-
-    rates: AnyArray
-    size: AnyArray
-    design: FloatArray
-    residual: FloatArray
-
-
 def _fitted(
     time: FloatArray, values: FloatArray, amplitude: AnyArray, width: float, slow: float, count: int
-) -> _Fitted | None:
-    """Fit some modes and a level; None where one of them does not beat with the motion."""
+) -> tuple[AnyArray, AnyArray, FloatArray, FloatArray] | None:
+    """Fit some modes and a level; None where one of them does not beat with the motion.
+
+    Returns
+    -------
+    rates, size
+        Complex, shape (k,).
+    design, residual
+        The derivatives of the readings, and what is left of these, shape (n,).
+    """
     rows = np.lib.stride_tricks.sliding_window_view(amplitude, len(amplitude) // 2 + 1)
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
@@ -140,7 +139,7 @@ def _fitted(
         rates = rates + change[:count] + 1j * change[count:]
         if not np.all(np.abs(rates - 1j * slow) < _APART * slow):
             return None
-    return _Fitted(rates, size, design, residual)
+    return rates, size, design, residual
 
 
 def _slow_amplitude(

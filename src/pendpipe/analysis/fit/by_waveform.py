@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -162,7 +162,6 @@ class Waveform:
     split: Mapping[str, float]
     step: float = 0.0
     restoring: Restoring = "linear"
-    _last: dict[bytes, FloatArray] = field(default_factory=dict, compare=False, repr=False)
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
@@ -178,12 +177,8 @@ class Waveform:
         return law, Release(time, angle, offset)
 
     def residual(self, value: FloatArray) -> FloatArray:
-        """Readings less model, shape (n,); the last is kept, for it is asked for again."""
-        key = value.tobytes()
-        if key not in self._last:
-            self._last.clear()
-            self._last[key] = self.values - sample(*self.model(value), self.time_s)
-        return self._last[key]
+        """Readings less model, shape (n,)."""
+        return self.values - sample(*self.model(value), self.time_s)
 
     def predict_remaining(
         self, value: FloatArray, trial: FloatArray, quadratic: Quadratic, promised: float
@@ -224,12 +219,10 @@ class Waveform:
     def _summed(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix by the engine's parameters."""
         chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
-        residual = np.empty(len(self.values))
-        for first in range(0, len(residual), _PIECE):
+        for first in range(0, len(self.values), _PIECE):
             piece = slice(first, first + _PIECE)
             angle, jacobian = sample_with_jacobian(*self.model(value), self.time_s[piece])
-            np.subtract(self.values[piece], angle, out=residual[piece])
-            left, weight = residual[piece], self.noise_rms**-2
+            left, weight = self.values[piece] - angle, self.noise_rms**-2
             if self.step == 0.0:
                 chi2 += weight * float(left @ left)
                 gradient += weight * (jacobian.T @ left)
@@ -239,8 +232,6 @@ class Waveform:
                 chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
                 gradient += jacobian.T @ score
                 normal += jacobian.T @ (jacobian * weights[:, None])
-        self._last.clear()
-        self._last[value.tobytes()] = residual
         return Quadratic(chi2, gradient, normal)
 
     def change(self, value: FloatArray) -> FloatArray:

@@ -5,6 +5,8 @@ neighbours, and the half cycles followed into the tail. Then the level under the
 which of them are kept, and their errors.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,10 +14,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
 from pendpipe.analysis.turning_points.long_records import BLOCK, in_blocks
-from pendpipe.analysis.turning_points.loops import count_half_cycles, find_extremes, smooth_times
 from pendpipe.analysis.turning_points.measure import (
     HARMONICS,
     Measured,
@@ -28,6 +30,7 @@ from pendpipe.analysis.turning_points.measure import (
 from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
@@ -100,6 +103,130 @@ def _level(value: FloatArray) -> float:
     if len(value) < 3:
         return float(np.mean(value))
     return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
+
+
+@kernel
+def solve_in_place(matrix: Matrix, right: FloatArray, size: int) -> None:
+    """Solve a small positive definite system; `right` becomes the solution."""
+    for p in range(size):
+        for q in range(p + 1, size):
+            factor = matrix[q, p] / matrix[p, p]
+            for r in range(p, size):
+                matrix[q, r] -= factor * matrix[p, r]
+            right[q] -= factor * right[p]
+    for p in range(size - 1, -1, -1):
+        for q in range(p + 1, size):
+            right[p] -= matrix[p, q] * right[q]
+        right[p] /= matrix[p, p]
+
+
+def smooth_times(
+    number: IntArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Smooth the times of turning points over as many neighbours as it takes.
+
+    A weighted local parabola in the number of the half cycle; the window grows until the
+    weights sum to `wanted` (the inverse variance that is good enough), between 2 and 40
+    neighbours to each side.
+
+    Returns
+    -------
+    centre_s, half_period_s
+        Smoothed time and slope at each number in `at`.
+    """
+    centre, slope = np.empty(len(at)), np.empty(len(at))
+    room = np.empty((3, 3)), np.empty(3), np.empty(3)
+    _smooth_times(number, time_s, weight, wanted, at, centre, slope, *room)
+    return centre, slope
+
+
+@kernel
+def _smooth_times(
+    number: IntArray,
+    time_s: FloatArray,
+    weight: FloatArray,
+    wanted: float,
+    at: IntArray,
+    centre: FloatArray,
+    slope: FloatArray,
+    normal: Matrix,
+    right: FloatArray,
+    power: FloatArray,
+) -> None:
+    """Fill `centre` and `slope`; the last three are room to work in."""
+    last = number.size - 1
+    middle = 0
+    for k in range(at.size):
+        while middle > 0 and number[middle - 1] >= at[k]:
+            middle -= 1
+        while middle <= last and number[middle] < at[k]:
+            middle += 1
+        lo, hi = max(middle - 2, 0), min(middle + 2, last)
+        lo, hi = max(min(lo, hi - 3), 0), min(max(hi, lo + 3), last)
+        total = 0.0
+        for j in range(lo, hi + 1):
+            total += weight[j]
+        while total < wanted and hi - lo < 80 and (lo > 0 or hi < last):
+            if lo > 0:
+                lo -= 1
+                total += weight[lo]
+            if hi < last:
+                hi += 1
+                total += weight[hi]
+        size = 3 if hi - lo >= 4 else 2
+        normal[:, :] = 0.0
+        right[:] = 0.0
+        power[0] = 1.0
+        for j in range(lo, hi + 1):
+            u = float(number[j] - at[k])
+            for p in range(1, size):
+                power[p] = power[p - 1] * u
+            for p in range(size):
+                right[p] += weight[j] * power[p] * (time_s[j] - time_s[lo])
+                for q in range(size):
+                    normal[p, q] += weight[j] * power[p] * power[q]
+        solve_in_place(normal, right, size)
+        centre[k] = time_s[lo] + right[0]
+        slope[k] = right[1]
+
+
+@kernel
+def count_half_cycles(
+    time_s: FloatArray, sign: IntArray, gap_before: IntArray, period: float, number: IntArray
+) -> int:
+    """Number the extremes, counting those that a gap in the data has swallowed.
+
+    Parameters
+    ----------
+    time_s, sign
+        Of each extreme; `sign` is +1 for a maximum.
+    gap_before
+        1 where samples are missing between an extreme and the one before it.
+    period
+        Half period at first.
+    number
+        To be filled: the number of each half cycle from 0.
+
+    Returns
+    -------
+    int
+        How many extremes from the start hang together (an interval of three half cycles
+        without a gap ends the motion).
+    """
+    number[0] = 0
+    for k in range(1, time_s.size):
+        interval = time_s[k] - time_s[k - 1]
+        odd = sign[k] != sign[k - 1]
+        whole = round(interval / period)
+        if (whole % 2 == 1) != odd:
+            whole += 1 if interval / period > whole else -1
+        whole = max(whole, 1 if odd else 2)
+        if whole > 2 and gap_before[k] == 0:
+            return k
+        number[k] = number[k - 1] + whole
+        if whole == 1:
+            period += 0.3 * (interval - period)
+    return time_s.size
 
 
 _PHASE_WANTED: Final = 0.01
