@@ -191,12 +191,35 @@ def thinned(
     interval = float(np.median(time_s[1::every] - time_s[:-1:every]))
     if interval > 0.5 * step:
         return time_s, _without_wild(values, math.pi * interval / half_period_s)
-    # The grid hangs on the clock, not on the first sample: rest before changes nothing.
-    cells = np.floor(time_s / step)
-    starts = np.flatnonzero(np.diff(cells, prepend=np.nan))
-    readings = np.diff(starts, append=len(cells))
-    middle = _median3(values)
-    return np.add.reduceat(time_s, starts) / readings, np.add.reduceat(middle, starts) / readings
+    # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
+    thin_time, thin_values = np.empty(len(values)), np.empty(len(values))
+    count = _thin(time_s, values, step, thin_time, thin_values)
+    return thin_time[:count].copy(), thin_values[:count].copy()
+
+
+@kernel
+def _thin(
+    time_s: FloatArray,
+    values: FloatArray,
+    step: float,
+    thin_time: FloatArray,
+    thin_values: FloatArray,
+) -> int:
+    """Write the means of times, and of medians of three, in cells of a grid; return how many."""
+    count, readings, cell, last = 0, 0, 0, values.size - 1
+    when, total = 0.0, 0.0
+    for i in range(values.size):
+        x = values[i]
+        if 0 < i < last:
+            before, after = values[i - 1], values[i + 1]
+            x = max(min(before, x), min(max(before, x), after))
+        here = math.floor(time_s[i] / step)
+        if i > 0 and here != cell:
+            thin_time[count], thin_values[count] = when / readings, total / readings
+            count, readings, when, total = count + 1, 0, 0.0, 0.0
+        cell, readings, when, total = here, readings + 1, when + time_s[i], total + x
+    thin_time[count], thin_values[count] = when / readings, total / readings
+    return count + 1
 
 
 def _without_wild(values: FloatArray, turn: float) -> FloatArray:
