@@ -31,7 +31,7 @@ from benchmarks.known_physics import RECORDINGS
 from benchmarks.null_families import wilson
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points.samples import prepare
-from pendpipe.diagnosis.forensics import slips, tracking
+from pendpipe.diagnosis.forensics import corrections
 from pendpipe.diagnosis.result import Confirmation
 from pendpipe.recording import Recording
 
@@ -143,8 +143,8 @@ def counting(*, whole: bool, wanders: bool, at_edges: bool) -> Callable[[Swing, 
 def level_test(recording: Recording, _: float, __: float) -> Confirmation | None:
     """Whether steps of the level between half swings are whole counts."""
     samples = prepare(recording, "found")
-    count = slips.count_of(samples)
-    return slips.steps_of_the_level(samples, count) if count else None
+    count = corrections.count_of(samples)
+    return corrections.steps_of_the_level(samples, count) if count else None
 
 
 COUNTS: Final = Kind(
@@ -185,7 +185,7 @@ def drifting(swing: Swing, _: float) -> Recording:
 
 def time_test(recording: Recording, at_s: float, period_s: float) -> Confirmation:
     """Whether angle and velocity step by one and the same time."""
-    return slips.confirmed(prepare(recording, "found"), at_s, period_s)
+    return corrections.loss_confirmed(prepare(recording, "found"), at_s, period_s)
 
 
 TIME: Final = Kind(
@@ -257,10 +257,10 @@ def stretched(swing: Swing, _: float) -> Recording:
 def mark_test(recording: Recording, _: float, period_s: float) -> Confirmation | None:
     """Whether angle and distance scatter together."""
     samples = prepare(recording, "found")
-    along = tracking.wander(samples)
+    along = corrections.wander(samples)
     if along is None:
         return None
-    return tracking.confirmed(samples, along, tracking.rows_of(samples, period_s))
+    return corrections.wander_confirmed(samples, along, corrections.rows_of(samples, period_s))
 
 
 MARK: Final = Kind(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pendpipe.diagnosis.forensics import TESTS, Finding
+from pendpipe.diagnosis.forensics import TESTS
+from pendpipe.diagnosis.result import Finding
 
 from .decays import Fitted
 

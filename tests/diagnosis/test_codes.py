@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics import TESTS, Finding
+from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.codes import spacing_of, with_true_step
 from pendpipe.diagnosis.forensics.converter import worst_comb
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Recording
 

@@ -13,12 +13,13 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import Forensics
-from pendpipe.diagnosis.forensics import TESTS, Finding, find_lost_samples
+from pendpipe.diagnosis.forensics import TESTS
+from pendpipe.diagnosis.forensics.corrections import LostSamples, find_lost_samples
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
-from pendpipe.diagnosis.forensics.slips import LostSamples
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.state import State
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.catalogue.restoring import cubic_stiffness
@@ -341,7 +342,9 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     """After a loss longer than the motion there is nothing to compare: the record stays."""
     fit, data, noise = null_fit()
     late = LostSamples(float(data.time_s[-20]), 10**9, 1e9)
-    monkeypatch.setattr("pendpipe.diagnosis.faults.find_lost_samples", lambda *_: [late])
+    monkeypatch.setattr(
+        "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [late]
+    )
     state = State(fit, data, noise, [], fit.value, fit.value)
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
     Forensics(samples, 0.01).before(state, silent)

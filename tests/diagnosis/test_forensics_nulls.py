@@ -10,8 +10,9 @@ import pytest
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics import TESTS, find_lost_samples
+from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.colour import level_note
+from pendpipe.diagnosis.forensics.corrections import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
 from pendpipe.diagnosis.state import settled
 

@@ -10,7 +10,7 @@ import pytest
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.slips import confirmed
+from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.result import Confirmation
 
 OMEGA, LOSS, AT = 5.3, 0.006, 31.0
@@ -24,7 +24,7 @@ def swing(time_s: FloatArray) -> FloatArray:
 
 def second_test(angle: FloatArray, seed: int) -> Confirmation:
     noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(angle))
-    return confirmed(Samples(STAMPS, angle + noise, "rad", None, 2e-4), AT + 0.02, PERIOD_S)
+    return loss_confirmed(Samples(STAMPS, angle + noise, "rad", None, 2e-4), AT + 0.02, PERIOD_S)
 
 
 @pytest.mark.parametrize("lost_s", [0.03, -0.05, 0.07])
@@ -45,4 +45,4 @@ def test_neither_a_knock_nor_an_offset_nor_nothing_is_a_jump_of_the_clock() -> N
 
 def test_too_few_readings_say_nothing() -> None:
     samples = Samples(STAMPS[::20], swing(STAMPS[::20]), "rad", None, 1e-4)
-    assert confirmed(samples, AT, PERIOD_S).p_value == 1.0
+    assert loss_confirmed(samples, AT, PERIOD_S).p_value == 1.0

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.progressive_window import fit_in_growing_window
+from pendpipe.diagnosis.refine import fit_in_growing_window
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model

@@ -20,8 +20,7 @@ from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.cycles import small_swings
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.location import beat_of
-from pendpipe.diagnosis.progressive_window import fit_in_growing_window
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
 from pendpipe.diagnosis.state import first_noise
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics import slips
+from pendpipe.diagnosis.forensics import corrections
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Finding
@@ -121,7 +121,7 @@ def found(name: str, samples: Samples) -> tuple[Data, Finding]:
         time_noise=samples.counts,
         noise_rms=samples.noise_rms,
     )
-    return slips.find(name, data, fit_of(data), samples)
+    return corrections.find_slips(name, data, fit_of(data), samples)
 
 
 def clocked(swing: Swing, rows: IntArray, sizes: FloatArray, seed: int) -> Samples:

@@ -10,7 +10,7 @@ from scipy.stats import kstest
 
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.tracking import confirmed, rows_of, wander
+from pendpipe.diagnosis.forensics.corrections import rows_of, wander, wander_confirmed
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.formats import read
 from pendpipe.recording import Recording, read_plain, write_plain
@@ -60,7 +60,7 @@ def test_errors_of_their_own_in_both_coordinates_are_no_wander(tmp_path: Path) -
         samples = prepare(seen(tmp_path, *(own + slow)), "video")
         along = wander(samples)
         assert along is not None
-        values.append(confirmed(samples, along, rows_of(samples, 1.9)).p_value)
+        values.append(wander_confirmed(samples, along, rows_of(samples, 1.9)).p_value)
     assert kstest(values, "uniform").pvalue > 0.01
 
 

@@ -10,8 +10,8 @@ import pytest
 from pendpipe.effects.baseline import TIME as TIME_S
 from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.effect import STRAIGHT_S
 from pendpipe.effects.model import Model
-from pendpipe.effects.scan import STRAIGHT_S
 
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times

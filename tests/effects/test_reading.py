@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.scan import STRAIGHT_S
+from pendpipe.effects.effect import STRAIGHT_S
 
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times

@@ -18,7 +18,7 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.evidence import Rival
-from pendpipe.diagnosis.forensics import TESTS, Test, find_lost_samples, slips, tracking
+from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
@@ -89,12 +89,11 @@ class Forensics:
     def after(self, state: State, progress: Progress) -> None:
         """Make the tests that need a clean residual: a misfit could look like any fault."""
         clean = not is_gross(state.fit, state.data)
-        tests: tuple[str, ...]
+        # Dead bits show in the codes themselves, whatever the model.
+        dead = self.samples.promised_step is not None
+        tests: tuple[str, ...] = ("coarse-quantisation",) if dead else ()
         if clean and state.fit.chi2 <= _CLEAN_CHI2 * state.data.used:
             tests = _TESTED_AFTER
-        else:
-            # Dead bits show in the codes themselves, whatever the model.
-            tests = ("coarse-quantisation",) if self.samples.promised_step is not None else ()
         known = [fault.finding.identifier for fault in state.faults]
         for name in [name for name in tests if name not in known]:
             self._examine(name, state, progress)
@@ -181,7 +180,7 @@ class Forensics:
         """Correct the times of the readings after lost samples."""
         data = state.data
         interval = data.interval_s / data.fold
-        lost = find_lost_samples(data, state.fit)
+        lost = corrections.find_lost_samples(data, state.fit)
         if not lost:
             return
         time = data.time_s.copy()
@@ -207,9 +206,9 @@ class Forensics:
         """Take the wander of a tracked mark from the readings: more with each better model."""
         if loses_phase(state.fit):
             return
-        known = [f for f in state.faults if f.finding.identifier == tracking.TRACKING_NOISE]
+        known = [f for f in state.faults if f.finding.identifier == corrections.TRACKING_NOISE]
         taken = known[0].finding.parameters["kappa"].value if known else 0.0
-        corrected, finding = tracking.find(state.data, state.fit, self._recorded, taken)
+        corrected, finding = corrections.find_wander(state.data, state.fit, self._recorded, taken)
         kappa = finding.parameters.get("kappa")
         if kappa is None or abs(kappa.value - taken) < kappa.sd:
             return
@@ -229,7 +228,7 @@ class Forensics:
                 or any(fault.finding.identifier == name for fault in state.faults)
             ):
                 continue
-            corrected, finding = slips.find(name, state.data, state.fit, self.samples)
+            corrected, finding = corrections.find_slips(name, state.data, state.fit, self.samples)
             if self._correct(state, corrected, finding):
                 progress(finding.summary)
 

@@ -16,8 +16,7 @@ from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
 from pendpipe.diagnosis.chance import CATALOGUE_SHARE
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
-from pendpipe.diagnosis.progressive_window import fit_in_growing_window
-from pendpipe.diagnosis.refine import Fit, best_fit, better
+from pendpipe.diagnosis.refine import Fit, best_fit, better, fit_in_growing_window
 from pendpipe.diagnosis.refits import LOST_PHASE_RAD
 from pendpipe.diagnosis.scores import Candidate, build_bank, whitened
 from pendpipe.diagnosis.state import State, Step

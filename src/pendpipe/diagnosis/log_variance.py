@@ -137,6 +137,7 @@ def _at_strengths(squares: Squares, smooth: Sequence[Smooth], strengths: Sequenc
     noise = squares.known
     may_be_line = noise & (np.arange(len(value)) >= squares.lines_from)
     number, total = _binned(noise, value, starts)
+    share = squares.independent
     middle = math.log(max(float(total.sum()) / max(float(number.sum()), 1.0), 1e-300))
     # A start that single lines don't move: the mean of ln P in each bin is 1.27 too low.
     logs = np.add.reduceat(np.where(noise, np.log(value) - middle + 1.27, 0.0), starts)
@@ -150,13 +151,11 @@ def _at_strengths(squares: Squares, smooth: Sequence[Smooth], strengths: Sequenc
         changed = not np.array_equal(clean, noise)
         noise = clean
         number, total = _binned(noise, value, starts)
-        share = squares.independent
         at, root = _maximised(columns, share * number, share * total / math.exp(middle), at)
         if not changed:
             break
     log = columns @ at
-    cost = float(np.sum(number * log + total / np.exp(log + middle))) * squares.independent
-    cost += float(number.sum()) * squares.independent * middle
+    cost = share * float(np.sum(number * (log + middle) + total / np.exp(log + middle)))
     cost += float(np.sum(np.log(value[lines]))) + np.count_nonzero(lines) * _NOT_NOISE
     charge = float(at @ at) + 2.0 * float(np.sum(np.log(np.diag(root))))
     return _Found(log + middle, np.linalg.solve(root, columns.T).T, cost + charge, charge)

@@ -15,8 +15,7 @@ from pendpipe.diagnosis.detect import Detection, Lead
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, equivalent, ranked
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.progressive_window import fit_in_growing_window
-from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, better, pulled
+from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, better, fit_in_growing_window, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import finer_shape
 from pendpipe.dynamics.any_law import NoMotionError

@@ -80,15 +80,14 @@ class Location:
 
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""
-
-        def pair(interval: tuple[float, float] | None) -> list[float] | None:
-            return None if interval is None else [float(end) for end in interval]
-
+        intervals = {
+            "time_s": self.time_s,
+            "amplitude_rad": self.amplitude_rad,
+            "phase_rad": self.phase_rad,
+        }
         return {
             "summary": self.summary,
-            "time_s": pair(self.time_s),
-            "amplitude_rad": pair(self.amplitude_rad),
-            "phase_rad": pair(self.phase_rad),
+            **{name: ends and [float(end) for end in ends] for name, ends in intervals.items()},
             "frequency_hz": list(self.frequency_hz),
             "harmonics": list(self.harmonics),
             "adc_codes": list(self.adc_codes),

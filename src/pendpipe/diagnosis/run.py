@@ -17,9 +17,9 @@ from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
-from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note
+from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.refine import Fit
@@ -340,7 +340,7 @@ def _checked(effect: FoundEffect, found: Search, samples: Samples) -> FoundEffec
         return effect
     when, period_s = effect.location.time_s, found.improved.at.span.period_s
     at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
-    return replace(effect, confirmed=slips.confirmed(samples, at, period_s))
+    return replace(effect, confirmed=loss_confirmed(samples, at, period_s))
 
 
 def _small_swings(law: Fit, found: Search) -> SmallSwings | None:

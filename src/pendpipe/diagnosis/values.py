@@ -119,11 +119,10 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     gradient = fit.jacobian.T @ fit.residual / fit.error_scale**2
     wanted = [index for index in (A, B, C) if index in fit.free]
     found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
-    if len(fit.variance) == 0:
-        return dict(zip(wanted, found, strict=True))
+    variance = fit.variance if len(fit.variance) else np.zeros(len(fit.value))
     wider = {}
     for index, ends in zip(wanted, found, strict=True):
-        value, more = fit.value[index], math.sqrt(CHI2_95 * fit.variance[index])
+        value, more = fit.value[index], math.sqrt(CHI2_95 * variance[index])
         least = float(value - math.hypot(value - ends[0], more))
         most = float(value + math.hypot(ends[1] - value, more))
         wider[index] = max(least, float(low[index])), min(most, float(high[index]))

@@ -18,8 +18,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.sampling import Sampled
-from pendpipe.effects.effect import Effect, How, Pendulum, Span, subclass
-from pendpipe.effects.scan import phase_since_reversal
+from pendpipe.effects.effect import Effect, How, Pendulum, Span, phase_since_reversal, subclass
 
 
 class Curve(Effect):

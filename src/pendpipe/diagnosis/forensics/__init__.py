@@ -16,7 +16,6 @@ from pendpipe.diagnosis.forensics import (
     glitches,
     sampling_times,
 )
-from pendpipe.diagnosis.forensics.slips import LostSamples, find_lost_samples
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding
@@ -34,12 +33,3 @@ TESTS: Final[dict[str, Test]] = {
     "broadband-drive": colour.find_random_torque,
 }
 """In order: readings masked by one test are not used by those after it."""
-
-
-__all__ = [
-    "TESTS",
-    "Finding",
-    "LostSamples",
-    "Test",
-    "find_lost_samples",
-]

@@ -137,10 +137,9 @@ def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     if data.used < 100 or fit.max_phase_error_rad > _LARGEST_PHASE_ERROR:
         return nothing("broadband-drive")
     amplitude, phase, per_kick = _fluctuations(data, fit, noise)
-    if min(len(amplitude.weight), len(phase.weight)) < 5:
-        return nothing("broadband-drive")
-    if not (_may_walk(amplitude) and _may_walk(phase)):
-        # A missing term of the law of motion, or a tone: not a random walk.
+    few = min(len(amplitude.weight), len(phase.weight)) < 5
+    # A missing term of the law of motion, or a tone, is not a random walk.
+    if few or not (_may_walk(amplitude) and _may_walk(phase)):
         return nothing("broadband-drive")
     p_value = max(amplitude.chance, phase.chance) ** 2
     both = Shapes(
@@ -166,20 +165,21 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
     basis = tangent_basis(fit)
     residual = np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1])
     residual -= basis @ (basis.T @ residual)
-    found = []
-    for quadrature, scale in (
+    quadratures = (
         (sampled.amplitude * sampled.cosine * growth, grown),
         (sampled.amplitude * sampled.sine, there),
-    ):
-        columns = after * quadrature[:, None] / scale
-        tall = np.zeros((len(time) + 1, _KICKS))
-        tall[:-1] = noise.whiten(columns)
-        tall -= basis @ (basis.T @ tall)
-        found.append(_shapes(tall, residual))
-    return found[0], found[1], spacing / (4.0 * sampled.motion.angular_frequency**2)
+    )
+    amplitude, phase = (
+        _shapes(noise.whiten(after * quadrature[:, None] / scale), basis, residual)
+        for quadrature, scale in quadratures
+    )
+    return amplitude, phase, spacing / (4.0 * sampled.motion.angular_frequency**2)
 
 
-def _shapes(columns: FloatArray, residual: FloatArray) -> Shapes:
+def _shapes(whitened: FloatArray, basis: FloatArray, residual: FloatArray) -> Shapes:
+    # The last row is the prior's.
+    columns = np.pad(whitened, ((0, 1), (0, 0)))
+    columns -= basis @ (basis.T @ columns)
     weight, vectors = np.linalg.eigh(columns.T @ columns)
     keep = weight > _SMALLEST_EIGENVALUE * weight[-1]
     weight, vectors = weight[keep][::-1], vectors[:, keep][:, ::-1]

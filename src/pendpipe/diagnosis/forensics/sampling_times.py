@@ -119,8 +119,6 @@ def regular_clock(time_s: FloatArray) -> tuple[FloatArray, float] | None:
     """
     intervals = np.diff(time_s)
     usual = float(np.median(intervals))
-    if usual <= 0.0:
-        return None
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(intervals / usual), 1.0))])
     for _ in range(2):
         slope, start = np.polyfit(number, time_s, 1)

@@ -172,8 +172,6 @@ def tail_of_squares(total: float, weight: FloatArray) -> float:
     curvature = 2.0 * float(np.sum((weight / left) ** 2))
     w = math.copysign(math.sqrt(max(2.0 * (tilt * total - cumulant), 0.0)), tilt)
     v = tilt * math.sqrt(curvature)
-    if abs(w) < 1e-6 or v / w <= 0.0:
-        return 0.5
     return float(ndtr(-w - math.log(v / w) / w))
 
 

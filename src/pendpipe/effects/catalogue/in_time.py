@@ -9,27 +9,25 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.effect import (
+    INSTANT,
+    RELAXATION,
     Effect,
     Kick,
     Parameter,
     Pendulum,
-    Span,
-    enters,
-    subclass,
-    without_template,
-)
-from pendpipe.effects.scan import (
-    INSTANT,
-    RELAXATION,
     Relaxing,
+    Span,
     Sudden,
     between,
     elapsed,
+    enters,
     relaxed,
     rows,
     since_release,
     smooth_step,
+    subclass,
     unusual_drift,
+    without_template,
 )
 
 

@@ -8,9 +8,12 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.half_derivative import half_derivative
-from pendpipe.effects.effect import Parameter, Pendulum, Span, enters
-from pendpipe.effects.scan import (
+from pendpipe.effects.effect import (
+    Parameter,
+    Pendulum,
+    Span,
     between,
+    enters,
     half_cycle_of_release,
     phase_since_reversal,
     rows,

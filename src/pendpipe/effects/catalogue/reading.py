@@ -8,18 +8,23 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.sampling import Sampled
 from pendpipe.effects.catalogue.in_time import SteadyTone, tone_at, tried_frequencies
-from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, without_template
-from pendpipe.effects.scan import (
+from pendpipe.effects.effect import (
     INSTANT,
     RELAXATION,
+    Effect,
+    Parameter,
+    Pendulum,
     Relaxing,
+    Span,
     Sudden,
     between,
     elapsed,
+    enters,
     reading_step,
     relaxed,
     rows,
     unusual_drift,
+    without_template,
 )
 
 

@@ -1,12 +1,15 @@
-"""Whole units that are lost, or gained: samples of a clock, counts of an encoder.
+"""What is corrected in the readings: lost samples, slips of whole units, a mark that wanders.
 
 Samples that were lost without a trace in the time stamps are tested before any fit: one of them
 changes chi^2 more than most physics.
 
-Slips come time and again. They are a staircase in what is left of the readings: of the level in
-counts Q, or of the time in sampling intervals dt, which moves a reading by v dt. No motion of the
-pendulum does that. So whatever varies slowly is fitted beside the steps (level, amplitude, phase
-and harmonics, over ten cycles), their sizes are free, and that they come out *whole* is the test.
+Slips come time and again: an encoder loses whole counts, a clock misses whole samples. They are a
+staircase in what is left of the readings: of the level in counts Q, or of the time in sampling
+intervals dt, which moves a reading by v dt. No motion of the pendulum does that. So whatever varies
+slowly is fitted beside the steps (level, amplitude, phase and harmonics, over ten cycles), their
+sizes are free, and that they come out *whole* is the test.
+
+Of a tracked mark what its wander does to the distance from the pivot it does to the angle.
 """
 
 from __future__ import annotations
@@ -57,6 +60,12 @@ _CHOICE: Final = 6.0
 _FEWEST: Final = 4
 _NEIGHBOURS: Final = 11
 _IN_A_HALF_SWING: Final = 12
+TRACKING_NOISE: Final = "tracking-noise"
+_SMOOTH: Final = 5
+"""Degree in the angle of what the camera's geometry makes of the distance from the pivot."""
+_OF_A_THIRD: Final = 5
+"""Degree in time that follows the motion over a third of a period: to 1e-4 of it."""
+_FEWEST_ROWS: Final = 9
 
 
 class LostSamples(NamedTuple):
@@ -162,7 +171,7 @@ def _instant(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray, cycle:
     return float(data.time_s[rows[min(best, len(rows) - 1)]])
 
 
-def confirmed(samples: Samples, about_s: float, period_s: float) -> Confirmation:
+def loss_confirmed(samples: Samples, about_s: float, period_s: float) -> Confirmation:
     """Test without the model whether angle and velocity step by one and the same time.
 
     What follows a loss of time lies on the same path, farther along. A knock changes the velocity
@@ -263,7 +272,7 @@ class Slips(NamedTuple):
         return np.cumsum(steps)
 
 
-def find_slips(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False) -> Slips | None:
+def whole_steps(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False) -> Slips | None:
     """Find steps of whole units; None where there are too few.
 
     Parameters
@@ -368,7 +377,7 @@ def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray, *, within: bo
     return None
 
 
-def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Finding]:
+def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Finding]:
     """Test for slips, and correct them.
 
     Returns
@@ -383,7 +392,7 @@ def find(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data, Findi
     unit = data.interval_s / data.fold if clock else count_of(samples)
     possible = data.uniform and not data.time_noise if clock else unit > 0.0
     change = fit.at.sampled.velocity if clock else np.ones(len(data))
-    slips = find_slips(data, fit, unit * change, within=clock) if possible else None
+    slips = whole_steps(data, fit, unit * change, within=clock) if possible else None
     if slips is None:
         return data, nothing(name)
     stairs = unit * slips.staircase(len(data))
@@ -471,3 +480,92 @@ def _middle_step(samples: Samples, ends: list[int]) -> float:
     columns = np.column_stack([*waves, np.cos(3.0 * phase)]).astype(np.float64)
     fitted = np.linalg.lstsq(columns, values, rcond=None)[0]
     return float(fitted[2] - fitted[1])
+
+
+def wander(samples: Samples) -> FloatArray | None:
+    """Return what the distance is more than a smooth function of the angle, over the distance."""
+    if samples.radius_excess is None or samples.unit != "rad":
+        return None
+    smooth = np.polynomial.Polynomial.fit(samples.values, samples.radius_excess, _SMOOTH)
+    return np.asarray(samples.radius_excess - smooth(samples.values))
+
+
+def rows_of(samples: Samples, period_s: float) -> int:
+    """Return the rows within a third of a period, an odd number."""
+    interval = float(np.median(np.diff(samples.time_s)))
+    return max(_FEWEST_ROWS, 2 * int(period_s / (6.0 * interval)) + 1)
+
+
+def wander_confirmed(samples: Samples, along: FloatArray, rows: int) -> Confirmation:
+    """Test whether angle and distance scatter together within a third of a period, without a model.
+
+    What polynomials in time leave of them is uncorrelated where the errors of the two coordinates
+    are. The variance of a correlation of n values is ``sum of rho_1(k) rho_2(k)/n`` over all lags
+    k (Bartlett 1935).
+    """
+    from scipy.signal import savgol_filter
+
+    both = np.array(
+        [each - savgol_filter(each, rows, _OF_A_THIRD) for each in (samples.values, along)]
+    )
+    both /= np.linalg.norm(both, axis=1)[:, None]
+    together = float(both[0] @ both[1])
+    lags = [(both[:, k:] * both[:, :-k]).sum(axis=1).prod() for k in range(1, 2 * rows)]
+    sd = math.sqrt(max(1.0 + 2.0 * sum(lags), 1.0) / len(along))
+    return Confirmation(
+        "angle and distance scatter together within a third of a period (correlation"
+        f" {together:.2f} ± {sd:.2f})",
+        math.erfc(abs(together) / (sd * math.sqrt(2.0))),
+    )
+
+
+def find_wander(data: Data, fit: Fit, samples: Samples, taken: float) -> tuple[Data, Finding]:
+    """Test for a wander that both coordinates show, and correct the angles in proportion.
+
+    Parameters
+    ----------
+    data, fit
+        The readings, and a model of them.
+    samples
+        As they were recorded.
+    taken
+        The kappa that the readings are corrected for.
+
+    Returns
+    -------
+    Data
+        The readings without the wander.
+    Finding
+        Its p-value is that of the test without the model; ``kappa`` is the change of the angle
+        with the relative distance.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    along, rows = wander(samples), rows_of(samples, fit.at.span.period_s)
+    if along is None or not np.any(along) or len(along) < rows:
+        return data, nothing(TRACKING_NOISE)
+    sure = wander_confirmed(samples, along, rows)
+    # The mean over as many rows: what is faster is mostly another error in each coordinate.
+    slow = uniform_filter1d(along, rows, mode="nearest")
+    seen = np.interp(data.time_s, samples.time_s, slow) * data.weight
+    left = data.residual(fit.at.reading) * data.weight
+    square = float(seen @ seen)
+    kappa = float(left @ seen) / square
+    # Neighbouring readings wander together: so many of them are one.
+    memory = max(1.0, square / max(float(np.sum(np.diff(seen) ** 2)), 1e-300))
+    rest = left - kappa * seen
+    sd = math.sqrt(memory * float(rest @ rest) / max(data.used, 1) / square)
+    whole, rms = taken + kappa, math.sqrt(square / data.used)
+    finding = Finding(
+        TRACKING_NOISE,
+        sure.p_value,
+        parameters={
+            "kappa": Estimate(whole, sd, "rad"),
+            "rms": Estimate(rms, rms / math.sqrt(2.0 * data.used / memory), ""),
+        },
+        location=Location((float(data.time_s[0]), float(data.time_s[-1]))),
+        summary="the tracked mark wanders: the distance from the pivot, which a string keeps,"
+        " changes with the angle's errors",
+        confirmed=sure,
+    )
+    return replace(data, values=data.values - kappa * seen), finding
