@@ -130,8 +130,7 @@ def _predicted(
         known = data.masked(out | ~used)
         part = replace(noise, weight=known.weight)
         try:
-            value = refine(fit.model, known, part, fit.value, held=held, rounds=6).value
-            predicted = fit.model.reading(value)
+            predicted = refine(fit.model, known, part, fit.value, held=held, rounds=6).at.reading
         except NoMotionError:
             predicted = fit.at.reading
         # A curve may diverge where blocks are missing: limit the error to that of no prediction.

@@ -220,6 +220,9 @@ def diagnose_several(
         unit=found.data.unit,
         remainder=found.remainder,
     )
+    # It is about one recording.
+    text = text.replace("his recording alone cannot", "hey cannot even together")
+    text = text.replace("this recording", "them").replace("of the record (", "of the records (")
     diagnosis = Diagnosis(
         baseline,
         before.model(),
@@ -231,7 +234,7 @@ def diagnose_several(
         held,
         after.model().residual_rms_rad,
         found.unexplained,
-        " ".join((after.opening(), _of_several(text), *after.closing(differing, events, told))),
+        " ".join((after.opening(), text, *after.closing(differing, events, told))),
         warnings=tuple(
             f"{name}: {line}"
             for name, outcome in zip(names, outcomes, strict=True)
@@ -242,12 +245,6 @@ def diagnose_several(
     )
     content = {**diagnosis.to_dict(), "recordings": told}
     return JointOutcome(content, effects, tuple(outcomes))
-
-
-def _of_several(text: str) -> str:
-    """Return a statement about one recording as one about several."""
-    text = text.replace("his recording alone cannot", "hey cannot even together")
-    return text.replace("this recording", "them").replace("of the record (", "of the records (")
 
 
 class _TestedAlone(Forensics):

@@ -120,7 +120,8 @@ def statement(
         )
         return " ".join([nothing, *(f"{_capital(said)}." for said in noise), *stamps])
     times = before.residual_rms_rad / noise_rms
-    named = [effect for effect in effects if _has_a_name(effect)]
+    # The others only describe.
+    named = [each for each in effects if each.kind != "unnamed" and each.probability > DOUBTFUL]
     text = [
         f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
         f" {compact(before.residual_rms_rad, unit)} rms, {_factor(times)} times the noise of"
@@ -138,11 +139,6 @@ def statement(
 
 _CONFIRMED: Final = 0.01
 """p-value of a second test below which it confirms."""
-
-
-def _has_a_name(effect: FoundEffect) -> bool:
-    """Whether the effect's name deserves a sentence of its own."""
-    return effect.kind != "unnamed" and effect.probability > DOUBTFUL
 
 
 def _effect(effect: FoundEffect) -> str:

@@ -155,7 +155,11 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
         parts = [unwrapped(one, part.at) for one, part in zip(data.each(), at.parts, strict=True)]
         return np.concatenate([part for part, _ in parts]), max(slip for _, slip in parts)
     difference = data.residual(at.reading)
-    if _in_phase(data, at, difference):
+    # Where all residuals are small, no cycle's phase can differ, but for whole turns.
+    small = np.max(np.abs(difference) * data.weight) <= _SMALL_RESIDUAL * np.min(
+        at.sampled.amplitude
+    )
+    if small and abs(_turned(data, at)) < math.pi:
         return difference, 0.0
     log_ratio, phase, centre = alignment(data, at, difference)
     slip = float(np.max(np.abs(phase), initial=0.0))
@@ -169,14 +173,6 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     omega = sampled.motion.angular_frequency
     linear = sampled.angle * by_log + sampled.velocity / omega * by_phase
     return difference + sampled.angle - moved + linear, slip
-
-
-def _in_phase(data: Data, at: Evaluated, difference: FloatArray) -> bool:
-    """Whether all residuals are too small for a phase difference in any cycle."""
-    sampled = at.sampled
-    if np.max(np.abs(difference) * data.weight) > _SMALL_RESIDUAL * np.min(sampled.amplitude):
-        return False
-    return abs(_turned(data, at)) < math.pi
 
 
 def _turned(data: Data, at: Evaluated) -> float:

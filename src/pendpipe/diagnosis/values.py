@@ -33,7 +33,11 @@ def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     The amplitude is the model's at the first turning point in the readings, the phase that at the
     first reading.
     """
-    early, dress, found = _early(fit), units(unit), constants_of(fit, unit)
+    dress, found, time = units(unit), constants_of(fit, unit), fit.model.time_s
+    # A model of the first few cycles suffices for the derivatives.
+    last = max(time[0], float(fit.value[TIME])) + _FIRST_CYCLES * fit.at.span.period_s
+    count = max(int(np.searchsorted(time, last)), _FEWEST_READINGS)
+    early = fit.model.at_times(time[:count])
 
     def numbers(value: FloatArray) -> FloatArray:
         return _numbers(early, early.evaluate(early.settled(value)))
@@ -63,13 +67,6 @@ def constants_of(fit: Fit, unit: str) -> dict[str, Estimate]:
 def _sds(fit: Fit) -> FloatArray:
     """Return the standard deviations of all values; zero for those held."""
     return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance()), 0.0)))
-
-
-def _early(fit: Fit) -> Model:
-    """Return the model of the first few cycles, which suffices for the derivatives."""
-    time = fit.model.time_s
-    last = max(time[0], float(fit.value[TIME])) + _FIRST_CYCLES * fit.at.span.period_s
-    return fit.model.at_times(time[: max(int(np.searchsorted(time, last)), _FEWEST_READINGS)])
 
 
 def _numbers(model: Model, at: Evaluated) -> FloatArray:

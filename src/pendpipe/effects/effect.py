@@ -47,11 +47,6 @@ class Kick(NamedTuple):
     log_amplitude: float = 0.0
     """Change of ln r at unchanged phase."""
 
-    @property
-    def acts(self) -> bool:
-        """Whether it changes anything."""
-        return bool(self.angle or self.velocity or self.log_amplitude)
-
 
 @dataclass(frozen=True)
 class Pendulum(Eq8):
@@ -73,11 +68,6 @@ class Pendulum(Eq8):
     def linear(self) -> float:
         """The sum b = b_h + b_v, 1/s."""
         return self.hysteretic + self.viscous
-
-    @property
-    def fluid_acceleration(self) -> float:
-        """f_q of Eq. 8, 1/rad: pi a/(2 omega)."""
-        return 0.5 * math.pi * self.quadratic / self.angular_frequency
 
     def acceleration(self, motion: Motion | Sampled) -> FloatArray:
         """Return x'' + omega^2 x of Eq. 8 at the nodes, rad/s^2."""

@@ -50,27 +50,23 @@ class Evaluated:
     """Of a `pendpipe.effects.stack.Stack`: its recordings."""
 
     @cached_property
-    def _start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Change of ln r and of t by ln r at the start: at the nodes, and at the readings."""
         by_log, by_time = self.tangent.of_start()
         at_readings = self.sampled.at_nodes(np.stack([by_log, by_time]))
         return by_log, by_time, at_readings[0], at_readings[1]
 
-    def by_start(self) -> FloatArray:
-        """Change of the readings by ln r at the start."""
-        _, _, by_log, by_time = self._start
-        return np.asarray(self.sampled.angle * by_log - self.sampled.velocity * by_time)
-
     def after_kicks(self, kicks: Sequence[Kick | None]) -> FloatArray:
         """Change of the readings by each of several small kicks, shape (kicks, n)."""
         change = np.zeros((len(kicks), len(self.reading)))
-        acting = {row: kick for row, kick in enumerate(kicks) if kick is not None and kick.acts}
+        # What jumps stands behind the instant.
+        acting = {row: kick for row, kick in enumerate(kicks) if kick is not None and any(kick[1:])}
         if not acting:
             return change
         instants = np.array([kick.time_s for kick in acting.values()])
         there = sample_motion(self.tangent.motion, instants)
         log, late = kick_sizes(there, list(acting.values()), there)
-        node_log, node_time, by_log, by_time = self._start
+        node_log, node_time, by_log, by_time = self.start
         then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
         scale = log / then_log
         first = np.searchsorted(self.sampled.time_s, instants, side="right")
@@ -345,7 +341,9 @@ class Model:
     def read(self, sampled: Sampled, value: FloatArray) -> FloatArray:
         """What the sensor makes of the sampled motion, shape (n,)."""
         pendulum = self.pendulum(value)
-        left = self._averaging(value)
+        # What a mean over `fold` neighbouring readings leaves of the fundamental.
+        half = 0.5 * float(value[OMEGA]) * self.interval_s / self.fold
+        left = math.sin(self.fold * half) / (self.fold * math.sin(half))
         reading = np.asarray(value[OFFSET] + left * sampled.angle)
         if self.fold > 1:
             # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
@@ -354,13 +352,6 @@ class Model:
         return self._added(
             reading, value, lambda effect, own: effect.reading(sampled, pendulum, own)
         )
-
-    def _averaging(self, value: FloatArray) -> float:
-        """What a mean over `fold` neighbouring readings leaves of the fundamental."""
-        if self.fold == 1:
-            return 1.0
-        half = 0.5 * float(value[OMEGA]) * self.interval_s / self.fold
-        return math.sin(self.fold * half) / (self.fold * math.sin(half))
 
     def reading(self, value: FloatArray) -> FloatArray:
         """Return the readings alone, shape (n,)."""
@@ -436,24 +427,20 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
         *tangent.of_force(np.stack([_by_loss(model, value, at, index) for index in losses]))
     ).T
     columns[:, OMEGA] = _by_omega(model, value, at)
-    columns[:, START] = at.by_start() / value[START]
+    _, _, by_log, by_time = at.start
+    columns[:, START] = (sampled.angle * by_log - sampled.velocity * by_time) / value[START]
     columns[:, TIME] = -sampled.velocity
     columns[:, OFFSET] = 1.0
     for effect, place in model.places():
         if isinstance(effect, Curve):
-            columns[:, place] = _by_coefficients(effect, at, pendulum).T
+            # It is linear in its values.
+            small = effect.small(at.span)
+            changes = [(np.zeros(effect.count), row) for row in small * np.eye(effect.count)]
+            columns[:, place] = responses(effect, changes, at, pendulum).T / small
             continue
         for index in range(effect.count):
             columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
     return columns
-
-
-def _by_coefficients(curve: Curve, at: Evaluated, pendulum: Pendulum) -> FloatArray:
-    """Derivatives by a curve's values, shape (values, n): it is linear in them."""
-    small = curve.small(at.span)
-    none = np.zeros(curve.count)
-    one_each = [(none, row) for row in small * np.eye(curve.count)]
-    return responses(curve, one_each, at, pendulum) / small
 
 
 def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Tests for faults of the measurement without a smooth signature in time, a file for each.
+"""Tests for faults of the measurement without a smooth signature in time.
 
 Every test is a function ``find(data, fit, noise, samples) -> Finding``.
 """

@@ -282,9 +282,13 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     first, last = np.searchsorted(samples.time_s, data.time_s[[0, -1]] + [-1e-9, 1e-9]).tolist()
     index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
     when, values = samples.time_s[index], samples.values[index]
+    # The model by polynomials through six neighbouring means.
+    start = np.clip(np.searchsorted(data.time_s, when) - 3, 0, len(data) - 6)
+    weights = lagrange(data.time_s, start, when)
+    near = np.stack([reading[start + point] for point in range(len(weights))])
     return Raw(
         values,
-        values - _between(data.time_s, reading, when),
+        values - np.sum(weights * near, axis=0),
         np.interp(when, data.time_s, sampled.phase),
         np.interp(when, data.time_s, data.weight) > 0.99,
     )
@@ -314,11 +318,3 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     position = lattice.position((raw.values - error)[good])
     datum = None if raw.datum is None else raw.datum[good]
     return Coded(lattice, lattice.code[good], position, blur, ratio, datum)
-
-
-def _between(time: FloatArray, values: FloatArray, when: FloatArray) -> FloatArray:
-    """Interpolate by polynomials through six neighbouring values."""
-    first = np.clip(np.searchsorted(time, when) - 3, 0, len(time) - 6)
-    weights = lagrange(time, first, when)
-    near = np.stack([values[first + point] for point in range(len(weights))])
-    return np.asarray(np.sum(weights * near, axis=0))

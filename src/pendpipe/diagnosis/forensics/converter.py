@@ -104,16 +104,12 @@ def _end(raw: Raw, step: float, side: Side, memory: float) -> End:
     before = noise_before_rounding(local, step) if step else local.rms
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
     near = raw.used & (true > limit - 6.0 * local.rms - 3.0 * step)
-    p_value = _largest(limit + 0.5 * step - true[near], spread[near], _common(before, step))
+    # Of the true angle, due to rounding: common to the readings of one code.
+    steps = min((before / step) ** 2, 30.0) if step else 30.0
+    common = _SHARED_ERROR * step * math.exp(-2.0 * math.pi**2 * steps)
+    p_value = _largest(limit + 0.5 * step - true[near], spread[near], common)
     beyond = np.maximum(true[at] - limit - 0.5 * step, 0.0) / spread[at]
     return End(side, sign * limit, p_value, float(beyond @ beyond))
-
-
-def _common(before: float, step: float) -> float:
-    """Error of the true angle due to rounding, common to readings of one code."""
-    if not step:
-        return 0.0
-    return _SHARED_ERROR * step * math.exp(-2.0 * math.pi**2 * min((before / step) ** 2, 30.0))
 
 
 def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
@@ -239,15 +235,16 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         return nothing("missing-codes")
     expected = _expectations(coded)
     comb, (bit, part, by_bit) = worst_comb(coded.code, expected), _stuck_bits(coded, expected)
-    counts = _single_codes(coded.code, expected)
+    codes = int(coded.code.min()) - 1 + np.arange(expected.shape[1])
+    # All but those at the ends.
+    counts = Counts.of(codes, coded.code - codes[0], expected).chosen(slice(2, -2))
     chance = np.minimum(counts.chance * len(counts.code), 1.0)
     by_code = float(chance.min(initial=1.0))
     p_value = min(1.0, 3.0 * min(by_code, by_bit, comb.p_value))
     if p_value > 0.01:
         return Finding("missing-codes", p_value, summary="codes occur as often as expected")
     if comb.p_value < min(by_code, by_bit):
-        codes = np.arange(int(coded.code.min()), int(coded.code.max()) + 1)
-        codes = codes[codes % comb.period == comb.residue.code]
+        codes = codes[1:-1][codes[1:-1] % comb.period == comb.residue.code]
         lead = f"every {comb.period}th code (from {codes[0]}"
         found = _rare(data, coded, codes, comb.residue, lead)
         more = {"period": Estimate(float(comb.period), 0.0, "")}
@@ -299,13 +296,6 @@ def _expectations(coded: Coded) -> FloatArray:
     return np.stack(
         [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
     )
-
-
-def _single_codes(code: IntArray, expected: FloatArray) -> Counts:
-    """Return the numbers of each code but those at the ends."""
-    first = int(code.min()) - 1
-    codes = first + np.arange(expected.shape[1])
-    return Counts.of(codes, code - first, expected).chosen(slice(2, -2))
 
 
 def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:

@@ -85,7 +85,8 @@ def drag_form(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
     """
     speed = pendulum.angular_frequency * motion.amplitude
     swapped = speed**2 - 1.5 * motion.velocity**2
-    return np.asarray(size * pendulum.fluid_acceleration * motion.direction * swapped)
+    fluid = 0.5 * math.pi * pendulum.quadratic / pendulum.angular_frequency
+    return np.asarray(size * fluid * motion.direction * swapped)
 
 
 SPEED: Final = 0.1
