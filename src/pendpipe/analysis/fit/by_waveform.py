@@ -205,23 +205,14 @@ class Waveform:
         model, release = self.model(value)
         if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
             return refused
-        try:
-            summed = self._summed(value)
-        except ValueError:
-            # Overdamped: far from anything that turns.
-            return refused
-        change, off = self.change(value), float(value[SHARE]) - PRIOR_SHARE
-        gradient, normal = change.T @ summed.gradient, change.T @ summed.normal @ change
-        gradient[SHARE] -= PRIOR_INVERSE * off
-        normal[SHARE, SHARE] += PRIOR_INVERSE
-        return Quadratic(summed.chi2 + PRIOR_INVERSE * off**2, gradient, normal)
-
-    def _summed(self, value: FloatArray) -> Quadratic:
-        """chi^2, gradient and normal matrix by the engine's parameters."""
         chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
         for first in range(0, len(self.values), _PIECE):
             piece = slice(first, first + _PIECE)
-            angle, jacobian = sample_with_jacobian(*self.model(value), self.time_s[piece])
+            try:
+                angle, jacobian = sample_with_jacobian(model, release, self.time_s[piece])
+            except ValueError:
+                # Overdamped: far from anything that turns.
+                return refused
             left, weight = self.values[piece] - angle, self.noise_rms**-2
             if self.step == 0.0:
                 chi2 += weight * float(left @ left)
@@ -232,7 +223,12 @@ class Waveform:
                 chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
                 gradient += jacobian.T @ score
                 normal += jacobian.T @ (jacobian * weights[:, None])
-        return Quadratic(chi2, gradient, normal)
+        # From the engine's parameters to ours; and the prior.
+        change, off = self.change(value), float(value[SHARE]) - PRIOR_SHARE
+        gradient, normal = change.T @ gradient, change.T @ normal @ change
+        gradient[SHARE] -= PRIOR_INVERSE * off
+        normal[SHARE, SHARE] += PRIOR_INVERSE
+        return Quadratic(chi2 + PRIOR_INVERSE * off**2, gradient, normal)
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""
@@ -361,7 +357,7 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     """
     a, b, c, _, omega, _, time, _ = start.value.tolist()
     half_period = math.pi / omega
-    first = time if start.before == 0 else samples.time_s[0]
+    first = time + 0.05 * half_period if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
     y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
@@ -369,8 +365,6 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
         last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
     least = float(points.time_s[min(3, len(points) - 1)])
     begin = int(np.searchsorted(samples.time_s, first))
-    if start.before == 0:
-        begin = int(np.searchsorted(samples.time_s, first + 0.05 * half_period))
     return slice(begin, int(np.searchsorted(samples.time_s, max(last, least), side="right")))
 
 
