@@ -679,23 +679,26 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     columns *= weight[:, None]
     right = (part.time_s - part.time_s[0]) * weight
 
-    def fitted(design: FloatArray, kept: IntArray | slice = slice(None)) -> tuple[float, float]:
-        """The coefficient, and the sum of squares."""
+    def eta(design: FloatArray, kept: IntArray | slice = slice(None)) -> float:
         values = np.linalg.lstsq(design[kept], right[kept], rcond=1e-13)[0]
-        square = float(np.sum((right[kept] - design[kept] @ values) ** 2))
-        return float(values[1] / values[0]), square
+        return float(values[1] / values[0])
 
-    value, count = fitted(columns)[0], len(part)
+    def square(design: FloatArray) -> float:
+        rest = right - design @ np.linalg.lstsq(design, right, rcond=1e-13)[0]
+        return float(rest @ rest)
+
+    value, count = eta(columns), len(part)
     blocks = min(_BLOCKS, count // 3)
-    place, without = np.arange(count), []
+    # Each part of the decay is left out in turn, the phase beyond it free.
+    freer, place, without = np.column_stack([columns, weight]), np.arange(count), []
     for low, high in pairwise(np.linspace(0, count, blocks + 1).astype(int).tolist()):
-        beyond = np.column_stack([columns, weight * (place >= high)])
-        without.append(fitted(beyond, np.flatnonzero((place < low) | (place >= high)))[0])
+        freer[:, 4] = weight * (place >= high)
+        without.append(eta(freer, np.flatnonzero((place < low) | (place >= high))))
     scatter = math.sqrt((blocks - 1) * float(np.var(without)))
-    slower = np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
-    drift = fitted(np.column_stack([columns, weight * slower]))[0] - value
-    linear, bent = columns[:, [0, 2, 3]], columns[:, [0, 2, 3]]
+    freer[:, 4] = weight * np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
+    drift = eta(freer) - value
+    bent = columns[:, [0, 2, 3]]
+    linear = square(bent)
     bent[:, 0] += columns[:, 1]
-    least = fitted(linear)[1]
-    removed = 1.0 - fitted(bent)[1] / least if least > 0.0 else 0.0
+    removed = 1.0 - square(bent) / linear if linear > 0.0 else 0.0
     return Coefficient(value, math.hypot(scatter, drift), scatter, removed)
