@@ -18,13 +18,13 @@ BALL = Sphere(0.3, 0.02, 0.7, submerged=True)
 def test_the_history_term_divides_q_by_one_and_a_over_delta() -> None:
     curve = theory_curve([ROD, BALL], *WATER)
     assert curve is not None
-    delta = np.sqrt(2.0 * 1.0e-3 / (998.0 * 2.0 * np.pi * curve.frequency_hz))
-    assert curve.radius_over_depth == pytest.approx(BALL.radius_m / delta)
-    ratio = curve.quality_factor_steady / curve.quality_factor_viscous
-    assert ratio == pytest.approx(1.0 + curve.radius_over_depth)
+    delta = np.sqrt(2.0 * 1.0e-3 / (998.0 * 2.0 * np.pi * curve["frequency_hz"]))
+    assert curve["a_over_delta"] == pytest.approx(BALL.radius_m / delta)
+    ratio = curve["quality_factor_viscous_steady"] / curve["quality_factor_viscous_theory"]
+    assert ratio == pytest.approx(1.0 + curve["a_over_delta"])
     # Added mass and buoyancy both lengthen the period, and together more.
-    parts = curve.lengthening.buoyancy, curve.lengthening.added_mass
-    assert 0.0 < max(parts) < curve.lengthening.both
+    parts = curve["lengthening_buoyancy"], curve["lengthening_added_mass"]
+    assert 0.0 < max(parts) < curve["lengthening_both"]
 
 
 def test_without_a_submerged_sphere_there_is_no_theory() -> None:

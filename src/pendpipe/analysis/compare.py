@@ -546,32 +546,13 @@ def _excess_over_steady(losses: Columns) -> Line:
     return line._replace(regressor=radius_over_depth(losses), response=line.response - 1.0)
 
 
-class TheoryCurve(NamedTuple):
-    """Theory along a branch; each an array of shape (n,)."""
-
-    frequency_hz: FloatArray
-    moment_of_inertia_kg_m2: FloatArray
-    quality_factor_viscous: FloatArray
-    quality_factor_steady: FloatArray
-    radius_over_depth: FloatArray
-    lengthening: physics.Lengthening
-
-
-def submerged_sphere(parts: Sequence[physics.Part]) -> physics.Sphere | None:
-    """The sphere that swings in the fluid, where there is one."""
-    for part in parts:
-        if isinstance(part, physics.Sphere) and part.submerged:
-            return part
-    return None
-
-
 def theory_curve(
     parts: Sequence[physics.Part],
     fluid: physics.Fluid,
     gravity_m_per_s2: float,
     *,
     plain_added_mass: bool = False,
-) -> TheoryCurve | None:
+) -> dict[str, FloatArray] | None:
     """Theory of a pendulum, or of many: the parts' positions may be arrays.
 
     Parameters
@@ -583,13 +564,14 @@ def theory_curve(
 
     Returns
     -------
-    TheoryCurve
-        With Eq. 16's Q_v (C_H = 1) and the steady Stokes law's (C_H = 0); ``None`` where
-        nothing is submerged.
+    dict
+        Columns of shape (n,) under the names of comparison.json, with Eq. 16's Q_v (C_H = 1) and
+        the steady Stokes law's (C_H = 0); ``None`` where nothing is submerged.
     """
-    sphere = submerged_sphere(parts)
-    if sphere is None:
+    spheres = [part for part in parts if isinstance(part, physics.Sphere) and part.submerged]
+    if not spheres:
         return None
+    sphere = spheres[0]
     moving = physics.swing(parts, fluid, gravity_m_per_s2, plain_added_mass=plain_added_mass)
     density, viscosity = fluid
     oscillating, steady = (
@@ -605,19 +587,20 @@ def theory_curve(
         for history in (1.0, 0.0)
     )
     depth = physics.penetration_depth(moving.angular_frequency_per_s, viscosity, density)
-    return TheoryCurve(
-        frequency_hz=np.atleast_1d(moving.frequency_hz),
-        moment_of_inertia_kg_m2=np.atleast_1d(moving.moment_of_inertia_kg_m2),
-        quality_factor_viscous=np.atleast_1d(oscillating),
-        quality_factor_steady=np.atleast_1d(steady),
-        radius_over_depth=np.atleast_1d(np.divide(sphere.radius_m, depth)),
-        lengthening=physics.period_lengthening(
-            parts,
-            fluid,
-            gravity_m_per_s2,
-            plain_added_mass=plain_added_mass,
-        ),
+    longer = physics.period_lengthening(
+        parts, fluid, gravity_m_per_s2, plain_added_mass=plain_added_mass
     )
+    columns = {
+        "frequency_hz": moving.frequency_hz,
+        "moment_of_inertia_kg_m2": moving.moment_of_inertia_kg_m2,
+        "quality_factor_viscous_theory": oscillating,
+        "quality_factor_viscous_steady": steady,
+        "a_over_delta": np.divide(sphere.radius_m, depth),
+        "lengthening_buoyancy": longer.buoyancy,
+        "lengthening_added_mass": longer.added_mass,
+        "lengthening_both": longer.both,
+    }
+    return {name: np.atleast_1d(column) for name, column in columns.items()}
 
 
 FEWEST_IN_A_TAIL = 8

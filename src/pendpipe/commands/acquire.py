@@ -188,9 +188,12 @@ def _stage(arguments: argparse.Namespace) -> None:
         # again. Whatever refused an earlier recording has to judge this one anew.
         out.with_name("refused.json").unlink(missing_ok=True)
         refused = None
-    elif arguments.anew:
-        raise InputError(
-            f"record {record.record}", "it comes from no instrument", "leave out --anew"
+    else:
+        refuse_if(
+            arguments.anew,
+            f"record {record.record}",
+            "it comes from no instrument",
+            "leave out --anew",
         )
     run_stage(
         "acquire",

@@ -9,21 +9,23 @@ Several FILEs are recordings of one pendulum: physics shared, start and noise ea
 (docs/several.md).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
+from pendpipe.diagnosis import Outcome, diagnose_decay, diagnose_recording
+from pendpipe.diagnosis.result import FILE_NAME, not_analysable
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import distinct_names, make_folder, write_json, write_whole
-
-if TYPE_CHECKING:
-    from pendpipe.diagnosis import Outcome
-    from pendpipe.recording import Recording
+from pendpipe.manifest import check, job
+from pendpipe.process import keep_memory
+from pendpipe.recording import Recording
+from pendpipe.stages.refusal import reason_of, within_results
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
@@ -89,9 +91,6 @@ ARGUMENTS: Final = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, write the result, and print the answer."""
-    from pendpipe.analysis.fit.fixed import parse_fixed
-    from pendpipe.process import keep_memory
-
     if len(arguments.files) > 1:
         keep_memory()
         return _diagnose_several(arguments)
@@ -110,9 +109,6 @@ def run(arguments: argparse.Namespace) -> int:
         make_folder(arguments.out)
     if arguments.record is None:
         return _diagnose(arguments, fixed)
-    from pendpipe.diagnosis.result import FILE_NAME
-    from pendpipe.manifest import check, job
-
     check([arguments.refused] if arguments.refused is not None else [])
     read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
     inputs = [path for path in read if path is not None]
@@ -134,8 +130,6 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
     The fit runs beside the diagnosis, so its refusal does not count. Nor does a diagnosis refuse
     a record: what can't be diagnosed may still have been fitted.
     """
-    from pendpipe.stages.refusal import reason_of, within_results
-
     earlier = arguments.refused and reason_of(arguments.refused, before="fit")
     if earlier:
         return _not_analysable(arguments, earlier, {})
@@ -201,9 +195,6 @@ def _diagnose_several(arguments: argparse.Namespace) -> int:
 
 def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -> Outcome:
     """Diagnose a recording, with the turning points of an earlier stage if given."""
-    from pendpipe.analysis.turning_points import read_turning_points
-    from pendpipe.diagnosis import diagnose_decay, diagnose_recording
-
     more |= {
         "baseline": arguments.baseline,
         "seed": arguments.seed,
@@ -248,8 +239,6 @@ def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
 
 def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
-    from pendpipe.diagnosis.result import FILE_NAME, not_analysable
-
     content = not_analysable(arguments.baseline, reason, provenance)
     if arguments.out is not None:
         _remove_figures(arguments.out)

@@ -36,7 +36,7 @@ from pendpipe.figures.style import (
     branch,
     figure_with_residuals,
     key_above,
-    new_figure,
+    panels,
     placeholder,
     plain_numbers,
     save,
@@ -293,7 +293,7 @@ _SHIFTS_PERCENT: Final = (1, 2, 5, 10, 20, 40, 60, 70, 80)
 def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
     """Draw the relative lengthening of the period against frequency, cause by cause."""
     names = branches(comparison)
-    figure, axes = new_figure(3.8)
+    figure, axes = panels(3.8)
     for name in names:
         marker = branch(name).marker
         for cause, (_, colour, dashes) in CAUSES.items():
@@ -348,7 +348,7 @@ def _keys(axes: Any, names: list[str]) -> None:
 def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     """Draw log10 Q_v against frequency: Eq. 16, steady Stokes flow, and what was measured."""
     names = branches(comparison)
-    figure, axes = new_figure(4.0)
+    figure, axes = panels(4.0)
     for name in names:
         look = branch(name)
         frequency, steady = curve(comparison, name, "quality_factor_viscous_steady")
@@ -521,7 +521,7 @@ def _ratio(axes: Axes, comparison: Mapping[str, Any], name: str) -> None:
 @styled
 def draw_fig10(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q with Eq. 16 alone, in red, beside the full theory."""
-    figure, axes = new_figure(4.1)
+    figure, axes = panels(4.1)
     draw_measured(axes, comparison)
     for name in branches(comparison):
         frequency, full = curve(comparison, name, "quality_factor_limit_theory")
@@ -562,10 +562,9 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
     """
     if not tail or len(tail) < 2:
         raise NothingToDrawError("there are no fits to tails")
-    figure = Figure(figsize=(WIDTH_IN, 5.0), layout="constrained")
-    panels = figure.subplots(3, 1, sharex=True)
+    figure, drawn = panels(5.0, 3, sharex=True)
     start = np.array([fit["start_s"] for fit in tail], dtype=np.float64)
-    for panel, name in zip(panels, "abc", strict=True):
+    for panel, name in zip(drawn, "abc", strict=True):
         values = np.array([number(fit[name]) for fit in tail])
         errors = np.array([error(fit[name]) for fit in tail])
         factor, unit = _scale(name, values)
@@ -589,10 +588,10 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
         )
         panel.set_ylabel(f"${name}$ ({unit})")
         panel.set_ylim(*(factor * end for end in _window(values, errors)))
-    panels[-1].set_xlabel("Start of the fitted part (s)")
-    _amplitudes_on_top(panels[0], tail, start)
-    key_above(panels[0], 2, lift=1.28)
-    figure.align_ylabels(panels)
+    drawn[-1].set_xlabel("Start of the fitted part (s)")
+    _amplitudes_on_top(drawn[0], tail, start)
+    key_above(drawn[0], 2, lift=1.28)
+    figure.align_ylabels(drawn)
     return figure
 
 

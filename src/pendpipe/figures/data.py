@@ -14,7 +14,7 @@ from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, turning_points
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_json, without_folders
 from pendpipe.manifest import check
 
@@ -183,11 +183,9 @@ def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str
     InputError
         If there is no such file, or it holds something else.
     """
-    if not path.is_file():
-        raise InputError(path, "there is no such file", remedy)
-    content = read_json(path)
-    if not isinstance(content, dict):
-        raise InputError(path, "this is no JSON object", "make it again")
+    refuse_if(not path.is_file(), path, "there is no such file", remedy)
+    content: dict[str, Any] = read_json(path)
+    refuse_if(not isinstance(content, dict), path, "this is no JSON object", "make it again")
     return content
 
 
@@ -207,8 +205,8 @@ def read_compared(campaign: Path, comparison: Path) -> tuple[dict[str, Any], Pat
     configuration = read_content(campaign)
     check([comparison])
     content = read_content(comparison, "run pendpipe compare first")
-    if "records" not in content:
-        raise InputError(comparison, "it has no records", "make it again with pendpipe compare")
+    again = "make it again with pendpipe compare"
+    refuse_if("records" not in content, comparison, "it has no records", again)
     return configuration, Path(str(configuration.get("results") or "results")), content
 
 

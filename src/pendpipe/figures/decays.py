@@ -21,11 +21,10 @@ from pendpipe.figures.style import (
     INK,
     PALE,
     VERMILION,
-    WIDTH_IN,
     band,
     figure_with_residuals,
     key_above,
-    new_figure,
+    panels,
     plain_numbers,
     plain_text,
     points,
@@ -107,7 +106,7 @@ def draw_fig08(decay: Decay) -> Figure:
     quality, half_width = quality_with_band(decay, elapsed)
     moment = decay.points.time_s[0] + elapsed
 
-    figure, axes = new_figure(3.6)
+    figure, axes = panels(3.6)
     band(axes, moment, quality, half_width, label="95 % band")
     axes.plot(
         moment, quality, color=BLUE, label=f"fitted law, {decay.law_name.replace('14', '15')}"
@@ -228,6 +227,9 @@ def _measured_quality(axes: Axes, x: FloatArray, value: FloatArray, sd: FloatArr
     points(axes, x, value, sd, 3.5, label=label, **look)
 
 
+_MARGINS: Final = {"top": 0.872, "bottom": 0.105, "hspace": 0.09}
+
+
 @styled
 def draw_decay(decay: Decay) -> Figure:
     """Draw the amplitudes of the turning points against time, and data minus fit."""
@@ -237,7 +239,7 @@ def draw_decay(decay: Decay) -> Figure:
     elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
     unit = decay.points.unit
     factor, shown_unit = axis_unit(y, unit)
-    figure, upper, lower = figure_with_residuals(4.2, constrained=False, residual_share=0.5)
+    figure, upper, lower = figure_with_residuals(4.2, residual_share=0.5, margins=_MARGINS)
     points(
         upper, time, factor * y, factor * sd, label=f"{len(y)} turning points", **_as_pixels(decay)
     )
@@ -329,8 +331,8 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     """
     unit = decay.points.unit
     factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
-    figure = Figure(figsize=(WIDTH_IN, 6.6), layout="constrained")
-    upper, rest, quality = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.3, 0.7, 1.0]})
+    heights = {"height_ratios": [1.3, 0.7, 1.0]}
+    figure, (upper, rest, quality) = panels(6.6, 3, gridspec_kw=heights)
     time, values = _thinned(recording.time_s[recording.usable], recording.values[recording.usable])
     upper.plot(time, factor * values, color=BLUE, linewidth=0.5, alpha=0.6, label="readings")
     _fitted(upper, decay, factor)

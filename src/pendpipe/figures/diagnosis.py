@@ -31,10 +31,9 @@ from pendpipe.figures.style import (
     GREY,
     INK,
     VERMILION,
-    WIDTH_IN,
     band,
-    framed,
     key_above,
+    panels,
     plain_numbers,
     points,
     quantity_of,
@@ -130,8 +129,8 @@ _CYCLES: Final = 4.0
 @styled
 def draw_decay(content: Shown) -> Figure:
     """Draw the amplitude's decay, the last cycles, and the residuals against time."""
-    data, figure = content.data, Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
-    decay, end, rest = figure.subplots(3, 1)
+    data = content.data
+    figure, (decay, end, rest) = panels(5.4, 3)
     values = np.where(data.weight > 0.0, data.values, np.nan)
     factor, unit = axis_unit(values, data.unit)
     # The last cycles are where a wrong model is most out of phase.
@@ -179,8 +178,8 @@ def draw_residual_map(content: Shown) -> Figure:
     right = 0.845 - _CHARACTER * max(max(map(len, labels)) - 3, 0)
     margins = {"bottom": 0.46 / height, "top": 1.0 - 0.28 / height, "hspace": 0.28}
     margins |= {"left": 0.105, "right": right}
-    figure, panels = framed(height, margins, len(maps), sharex=True, squeeze=False)
-    rows, time = panels[:, 0], content.data.time_s
+    figure, drawn = panels(height, len(maps), margins, sharex=True, squeeze=False)
+    rows, time = drawn[:, 0], content.data.time_s
     for axes, (name, fit), values in zip(rows, content.models, maps, strict=True):
         image = axes.imshow(
             values,
@@ -253,7 +252,7 @@ def draw_residual_spectrum(content: Shown) -> Figure:
     frequency, level = spectra[0][0], noise_level(content, spectra[0][0])
     highest = float(max(np.max(density) for _, density in spectra))
     factor, unit = prefixed(highest, content.data.unit)
-    figure, axes = framed(3.3, {"bottom": 0.14, "top": 0.8})
+    figure, axes = panels(3.3, margins={"bottom": 0.14, "top": 0.8})
     looks = zip(content.models, spectra, COLOURS, (1.3, 0.8), strict=False)
     for (name, _), (_, density), colour, width in looks:
         axes.plot(frequency, factor * density, color=colour, linewidth=width, label=name)
@@ -346,7 +345,7 @@ def draw_damping(content: Shown) -> Figure:
     measured, omega = content.measured, float(content.baseline.value[OMEGA])
     margins = {"bottom": 0.11, "top": 0.885, "hspace": 0.1}
     rows = {"sharex": True, "gridspec_kw": {"height_ratios": [1.0, 0.8]}}
-    figure, (upper, lower) = framed(4.2, margins, 2, **rows)
+    figure, (upper, lower) = panels(4.2, 2, margins, **rows)
     curves = _models(content)
     quality_sd = 2.0 * measured.loss_sd / omega
     expected = 2.0 * curves[0][3].loss / omega
@@ -375,7 +374,7 @@ def draw_frequency(content: Shown) -> Figure:
     origin = float(content.baseline.value[OMEGA]) / (2.0 * math.pi)
     shift_sd = measured.frequency_sd_hz / origin
     power, factor = _power(np.concatenate([measured.frequency_hz / origin - 1.0, shift_sd]))
-    figure, axes = framed(3.2, {"bottom": 0.145, "top": 0.84})
+    figure, axes = panels(3.2, margins={"bottom": 0.145, "top": 0.84})
     _against_amplitude(
         axes,
         content,
@@ -441,17 +440,17 @@ def draw_curve(content: Shown) -> Figure:
     rows = sum(1 + ("local_exponent" in (effect.curve or {})) for effect in unnamed)
     height = 2.7 * rows
     margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
-    figure, drawn = framed(height, margins, rows, squeeze=False)
-    panels = iter(drawn[:, 0])
+    figure, drawn = panels(height, rows, margins, squeeze=False)
+    below = iter(drawn[:, 0])
     for effect in unnamed:
-        panel, curve = next(panels), effect.curve or {}
+        panel, curve = next(below), effect.curve or {}
         at, argument = _scaled(curve["at"], curve["argument"])
         _curve(panel, at, curve)
         panel.set(xlabel=argument, xmargin=0.01)
         if not panel.get_legend():
             panel.set_title(effect.name[:1].upper() + effect.name[1:])
         if "local_exponent" in curve:
-            panel = next(panels)
+            panel = next(below)
             _exponent(panel, at, curve)
             panel.set(xlabel=argument, xmargin=0.01)
     return figure
@@ -524,7 +523,7 @@ def draw_codes(content: Shown) -> Figure:
     given, _ = np.histogram(codes, edges)
     wanted, _ = np.histogram(expected, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    figure, axes = framed(3.0, {"bottom": 0.15, "top": 0.86})
+    figure, axes = panels(3.0, margins={"bottom": 0.15, "top": 0.86})
     axes.bar(middle, given, width=group, color=BLUE, linewidth=0.0, label="readings")
     axes.step(middle, wanted, where="mid", color=INK, linewidth=0.9, label="expected")
     for code in marked[:200]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pendpipe import physics
-from pendpipe.analysis.compare import TheoryCurve, theory_curve
+from pendpipe.analysis.compare import theory_curve
 from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design, design_of
@@ -120,7 +120,12 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
         "restoring_torque_n_m_per_rad": float(built.swing.restoring_torque_n_m_per_rad),
     }
     curve = _theory(campaign, built.parts, built.fluid)
-    return content | (_as_numbers(curve) if curve else {})
+    if curve is None:
+        return content
+    numbers = {name: float(values[0]) for name, values in curve.items()}
+    names = ("quality_factor_viscous_theory", "quality_factor_viscous_steady", "a_over_delta")
+    longer = {name: numbers[f"lengthening_{name}"] for name in ("buoyancy", "added_mass", "both")}
+    return content | {name: numbers[name] for name in names} | {"lengthening": longer}
 
 
 def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | None:
@@ -137,13 +142,13 @@ def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | N
     fluid = fluid_at(campaign.configuration.fluids[records[0].fluid], records[0].temperature_c)
     curve = _theory(campaign, parts, fluid)
     assert curve is not None
-    order = np.argsort(curve.frequency_hz)
-    return {name: np.asarray(values)[order].tolist() for name, values in _columns(curve).items()}
+    order = np.argsort(curve["frequency_hz"])
+    return {name: values[order].tolist() for name, values in curve.items()}
 
 
 def _theory(
     campaign: Campaign, parts: Sequence[physics.Part], fluid: physics.Fluid
-) -> TheoryCurve | None:
+) -> dict[str, FloatArray] | None:
     apparatus = campaign.configuration.apparatus
     assert apparatus is not None
     plain = apparatus.added_mass == "plain"
@@ -159,31 +164,4 @@ def _moved(geometries: Sequence[Geometry]) -> dict[str, FloatArray]:
             way, np.arange(len(geometries)), [place.weights_m[name] for place in geometries]
         )
         for name in sorted(names)
-    }
-
-
-def _columns(curve: TheoryCurve) -> dict[str, FloatArray]:
-    """The curve's columns under the names of comparison.json."""
-    return {
-        "frequency_hz": curve.frequency_hz,
-        "moment_of_inertia_kg_m2": curve.moment_of_inertia_kg_m2,
-        "quality_factor_viscous_theory": curve.quality_factor_viscous,
-        "quality_factor_viscous_steady": curve.quality_factor_steady,
-        "a_over_delta": curve.radius_over_depth,
-        "lengthening_buoyancy": np.atleast_1d(curve.lengthening.buoyancy),
-        "lengthening_added_mass": np.atleast_1d(curve.lengthening.added_mass),
-        "lengthening_both": np.atleast_1d(curve.lengthening.both),
-    }
-
-
-def _as_numbers(curve: TheoryCurve) -> dict[str, Any]:
-    """One pendulum's theory as numbers, the lengthening as a group."""
-    numbers = {name: float(values[0]) for name, values in _columns(curve).items()}
-    return {
-        "quality_factor_viscous_theory": numbers["quality_factor_viscous_theory"],
-        "quality_factor_viscous_steady": numbers["quality_factor_viscous_steady"],
-        "a_over_delta": numbers["a_over_delta"],
-        "lengthening": {
-            name: numbers[f"lengthening_{name}"] for name in ("buoyancy", "added_mass", "both")
-        },
     }
