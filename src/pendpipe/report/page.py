@@ -19,9 +19,9 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pendpipe.analysis.fit.result import read_fit
-from pendpipe.figures.data import number, used
+from pendpipe.figures.data import error, number, used
 from pendpipe.files import read_json, without_folders
-from pendpipe.quantities import compact
+from pendpipe.quantities import compact, with_error
 from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
 from pendpipe.report.headline import headline
 from pendpipe.report.tables import (
@@ -29,8 +29,10 @@ from pendpipe.report.tables import (
     STATES,
     Column,
     Health,
-    joint_rows,
-    of_campaign,
+    budget_rows,
+    exponent_tables,
+    findings,
+    grouped_warnings,
     table_of_records,
 )
 from pendpipe.templates import render as fill_template
@@ -99,7 +101,6 @@ def render(
         columns=columns,
         diagnosed=diagnoses(folder, names, room),
         together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
-        joint=joint_rows(comparison),
         asked=asked,
         proof=proven,
         records=lines,
@@ -112,12 +113,17 @@ def render(
         outside=outside,
         glossary=GLOSSARY,
         number=number,
+        error=error,
+        with_error=with_error,
         compact=compact,
         without_folders=without_folders,
         provenance=comparison.get("provenance") or {},
         downloads=_downloads(columns, lines, summary),
         **own_files(),
-        **of_campaign(comparison),
+        findings=findings(comparison),
+        exponents=exponent_tables(comparison),
+        budget=budget_rows(comparison),
+        warned=grouped_warnings(entries),
     )
 
 

@@ -1,13 +1,13 @@
 """One recording on one page: its fit, its figure and, where asked, its diagnosis."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
 
 from pendpipe.analysis.fit.result import (
     LOSSES,
     WITHOUT_LAW,
+    FitResult,
     qualities,
     quotable,
     rate_with_error,
@@ -15,14 +15,9 @@ from pendpipe.analysis.fit.result import (
     small_period,
 )
 from pendpipe.quantities import compact, with_error
+from pendpipe.recording import Recording
 from pendpipe.report.page import inline_svg, own_files
 from pendpipe.templates import render as fill_template
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from pendpipe.analysis.fit.result import FitResult
-    from pendpipe.recording import Recording
 
 LIGHTS = {"green": ("good", "✓"), "amber": ("look", "!"), "red": ("bad", "✗")}
 """Colour class and symbol of a light: colour never carries a meaning alone."""

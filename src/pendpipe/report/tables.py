@@ -231,17 +231,6 @@ def _known(quantity: Any) -> bool:
 Comparison = Mapping[str, Any]
 
 
-def of_campaign(comparison: Comparison) -> dict[str, Any]:
-    """What the page says beside its numbers, by the template's names."""
-    return {
-        "findings": findings(comparison),
-        "exponents": exponent_tables(comparison),
-        "budget": budget_rows(comparison),
-        "checks": check_rows(comparison),
-        "warned": grouped_warnings(comparison["records"]),
-    }
-
-
 def findings(comparison: Comparison) -> list[str]:
     """A sentence or two for each thing that the campaign can tell."""
     text = fill_template(
@@ -307,40 +296,3 @@ def budget_rows(comparison: Comparison) -> list[tuple[str, str, float]]:
         for part in parts
     ]
     return sorted(rows, key=lambda row: -row[2])
-
-
-def check_rows(comparison: Comparison) -> list[tuple[str, str, str, str]]:
-    """With and without the history term and the hysteresis: theory over measurement, chi^2."""
-    rows = []
-    for check in comparison.get("checks") or []:
-        ratio = [value for value in check.get("ratio") or [] if value is not None]
-        chi2 = float(f"{number(check.get('chi2')):.2g}")
-        rows.append(
-            (
-                "with" if check["history"] else "left out",
-                "with" if check["hysteresis"] else "left out",
-                f"{min(ratio):.3g} to {max(ratio):.3g}" if ratio else "–",
-                f"{with_error(chi2, None)} / {check['dof']}" if math.isfinite(chi2) else "–",
-            )
-        )
-    return rows
-
-
-def joint_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """The numbers of the joint fits beside those of the paper's route."""
-    joint = comparison.get("joint")
-    if not joint:
-        return []
-    names = {
-        "hysteretic_coefficient": ("Hysteretic coefficient k", "hysteretic_coefficient"),
-        "drag_factor": ("Drag over Eq. 16", "theory_factor"),
-        "history_coefficient": ("History coefficient C_H", "history_coefficient"),
-        "added_mass_coefficient": ("Added mass over the displaced fluid", ""),
-    }
-    routes = [joint["with_benchmark"], joint["without_benchmark"] or {}]
-    rows = []
-    for name, (words, paper) in names.items():
-        found = [*(route.get(name) for route in routes), comparison.get(paper)]
-        texts = (with_error(number(x), error(x), x.get("unit", "")) if x else "" for x in found)
-        rows.append((words, *texts))
-    return rows
