@@ -202,7 +202,7 @@ def test_effects_vanish_at_size_zero() -> None:
     plain = predict(design, (), np.zeros(len(design.nuisances)))
     for one in candidates(design):
         with_it = predict(design, (one,), np.zeros(len(design.nuisances) + 1))
-        assert with_it == pytest.approx(plain, rel=1e-14), one.key
+        assert with_it == pytest.approx(plain, rel=1e-14), one
 
 
 def test_every_effect_changes_some_record() -> None:
@@ -210,7 +210,7 @@ def test_every_effect_changes_some_record() -> None:
     fit = joint_fit(design, data(design))
     assert set(CATALOGUE) == {one.effect.identifier for one in candidates(design)}
     for one in candidates(design):
-        assert np.linalg.norm(fit.derivative(one)) > 1.0, one.key
+        assert np.linalg.norm(fit.derivative(one)) > 1.0, one
 
 
 def test_a_branch_is_a_shape() -> None:

@@ -1,3 +1,6 @@
+CALIPER = CAMPAIGN.configuration.calibration
+
+
 rule caliper:
     output:
         table=f"{RESULTS}/calibration/caliper.csv",
@@ -9,7 +12,8 @@ rule caliper:
     resources:
         configuration=CONFIGURATION,
     params:
-        arm=jobs.caliper_arm(CAMPAIGN),
+        arm=option("arm-m", CALIPER and CALIPER.arm_m),
+        error=option("displacement-sd-m", CALIPER and CALIPER.displacement_sd_m),
         depends=jobs.caliper(CAMPAIGN),
         repaired=repaired("calibration", "caliper", "sensor"),
         code=code_version("pendpipe.stages.acquire")
@@ -18,7 +22,7 @@ rule caliper:
         "the sensor against a caliper"
     shell:
         "pendpipe acquire --campaign {resources.configuration:q} --caliper --out {output.table:q} 2> {log:q}"
-        " && pendpipe calibrate {output.table:q} {params.arm} --out {output.sensor:q} >> {log:q} 2>&1"
+        " && pendpipe calibrate {output.table:q} {params.arm} {params.error} --out {output.sensor:q} >> {log:q} 2>&1"
 
 
 rule calibrate:
@@ -34,7 +38,9 @@ rule calibrate:
     params:
         refusal=refusal,
         sensor=lambda wildcards, input: option("sensor", input.sensor or None),
-        given=lambda wildcards: jobs.sensor_constant(CAMPAIGN, wildcards.record),
+        given=lambda wildcards: option(
+            "volts-per-radian", CAMPAIGN.record(wildcards.record).volts_per_radian
+        ),
         repaired=repaired("{record}", "calibrate"),
         code=code_version("pendpipe.commands.calibrate"),
     message:

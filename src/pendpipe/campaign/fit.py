@@ -30,12 +30,6 @@ class Candidate(NamedTuple):
     shape: Any = None
 
     @property
-    def key(self) -> str:
-        """What distinguishes it."""
-        words = self.shape if isinstance(self.shape, tuple) else (self.shape,)
-        return " ".join([self.effect.identifier, *(str(w) for w in words if w is not None)])
-
-    @property
     def bounds(self) -> tuple[float, float]:
         """Of its size, in units of what is expected beforehand."""
         low, high = self.effect.parameter.low, self.effect.parameter.high

@@ -102,25 +102,9 @@ def caliper_source(campaign: Campaign) -> Path | None:
     return None if run is None or run.source == "simulated" else Path(run.source)
 
 
-def caliper_arm(campaign: Campaign) -> str:
-    """The option that turns the caliper's displacements into angles."""
-    run = campaign.configuration.calibration
-    return (
-        ""
-        if run is None
-        else f"--arm-m {run.arm_m!r} --displacement-sd-m {run.displacement_sd_m!r}"
-    )
-
-
 def theory(campaign: Campaign) -> str:
     """Digest what the campaign's own stages take from the configuration."""
     content = campaign.configuration.model_dump(
         include={"title", "apparatus", "geometries", "fluids", "typical_record"}
     )
     return digest([content, [asdict(record) for record in campaign.records]])
-
-
-def sensor_constant(campaign: Campaign, record: str) -> str:
-    """The option that gives a record's own V/rad, where the table has one."""
-    given = campaign.record(record).volts_per_radian
-    return "" if given is None else f"--volts-per-radian {given!r}"

@@ -77,12 +77,36 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         A campaign with theory leaves a file for each of figures 3 to 10, with the reason
         in it where there was nothing to draw; one without leaves them out.
     """
+    draws: dict[str, Callable[[], Figure]] = {
+        "fig03": partial(draw_fig03, comparison.get("calibration")),
+        "fig04": partial(draw_fig04, comparison),
+        "fig07": partial(_typical_decay, comparison, folder),
+        "fig08": partial(_typical_quality, comparison, folder),
+        "tail": partial(draw_tail, comparison.get("tail")),
+    }
+    has_theory = bool(comparison.get("has_theory"))
+    if has_theory:
+        draws |= {
+            "fig05": partial(draw_fig05, comparison),
+            "fig06": partial(draw_fig06, comparison),
+            "fig09": partial(draw_fig09, comparison),
+            "fig10": partial(draw_fig10, comparison),
+            "causes": partial(draw_causes, folder / "campaign_diagnosis.json"),
+        }
     tasks = [
-        *(
-            partial(_figure, comparison, folder, out, name)
-            for name in _campaign_figures(comparison)
-        ),
-        *(partial(_decay, folder, entry) for entry in comparison["records"]),
+        partial(_drawn, name, draw, out / name, keep_place=has_theory and name.startswith("fig"))
+        for name, draw in sorted(draws.items())
+    ]
+    # (For the page: a record's drawing in pixels would take as long again.)
+    tasks += [
+        partial(
+            _drawn,
+            f"{entry['record']}, decay",
+            partial(_decay, folder, entry),
+            folder / entry["record"] / "figures" / "decay",
+            forms=("svg",),
+        )
+        for entry in comparison["records"]
     ]
     if processes < 2:
         parts = [task() for task in tasks]
@@ -95,40 +119,11 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
     )
 
 
-def _decay(folder: Path, entry: Entry) -> Drawn:
-    """Draw one record's decay (for the page: a drawing in pixels would take as long again)."""
-    name = f"{entry['record']}, decay"
+def _decay(folder: Path, entry: Entry) -> Figure:
+    """Draw one record's decay."""
     if entry.get("refused"):
-        return Drawn([], {name: "the record was refused"})
-    stem = folder / entry["record"] / "figures" / "decay"
-    return _drawn(name, lambda: draw_decay(read_decay(folder, entry)), stem, forms=("svg",))
-
-
-def _figure(comparison: Comparison, folder: Path, out: Path, name: str) -> Drawn:
-    """Draw one of figures 3 to 10, or the tail figure."""
-    keep_place = bool(comparison.get("has_theory")) and name.startswith("fig")
-    draw = _campaign_figures(comparison)[name]
-    return _drawn(name, lambda: draw(comparison, folder), out / name, keep_place=keep_place)
-
-
-def _campaign_figures(comparison: Comparison) -> dict[str, Callable[[Comparison, Path], Figure]]:
-    """The drawing of each figure from the comparison and the campaign's results, by name."""
-    figures: dict[str, Callable[[Comparison, Path], Figure]] = {
-        "fig03": lambda comparison, _: draw_fig03(comparison.get("calibration")),
-        "fig04": lambda comparison, _: draw_fig04(comparison),
-        "fig07": _typical_decay,
-        "fig08": lambda comparison, folder: draw_fig08(read_decay(folder, _typical(comparison))),
-        "tail": lambda comparison, _: draw_tail(comparison.get("tail")),
-    }
-    if comparison.get("has_theory"):
-        figures |= {
-            "fig05": lambda comparison, _: draw_fig05(comparison),
-            "fig06": lambda comparison, _: draw_fig06(comparison),
-            "fig09": lambda comparison, _: draw_fig09(comparison),
-            "fig10": lambda comparison, _: draw_fig10(comparison),
-            "causes": lambda _, folder: draw_causes(folder / "campaign_diagnosis.json"),
-        }
-    return dict(sorted(figures.items()))
+        raise NothingToDrawError("the record was refused")
+    return draw_decay(read_decay(folder, entry))
 
 
 def _typical(comparison: Comparison) -> Entry:
@@ -136,10 +131,10 @@ def _typical(comparison: Comparison) -> Entry:
     name = comparison.get("typical_record")
     if not name:
         raise NothingToDrawError("the configuration names no typical record")
-    for entry in used(comparison):
-        if entry["record"] == name:
-            return entry
-    raise NothingToDrawError(f"the typical record {name} was refused")
+    found = next((entry for entry in used(comparison) if entry["record"] == name), None)
+    if found is None:
+        raise NothingToDrawError(f"the typical record {name} was refused")
+    return found
 
 
 def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
@@ -150,6 +145,10 @@ def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
     except InputError as fault:
         raise NothingToDrawError(str(fault)) from None
     return draw_fig07(read_decay(folder, entry), recording, constant)
+
+
+def _typical_quality(comparison: Comparison, folder: Path) -> Figure:
+    return draw_fig08(read_decay(folder, _typical(comparison)))
 
 
 def _drawn(

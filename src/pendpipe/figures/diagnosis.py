@@ -230,15 +230,12 @@ def residual_map(content: Shown, fit: Fit) -> FloatArray:
     time = content.data.time_s
     turns = float(sampled.phase[-1] - sampled.phase[0]) / (2.0 * math.pi)
     columns = max(1, int(min(turns, _COLUMNS, len(time) / (_IN_A_CELL * PHASES))))
-    row = np.minimum((phase * PHASES).astype(np.int64), PHASES - 1)
     share = (time - time[0]) / (time[-1] - time[0])
-    column = np.minimum((share * columns).astype(np.int64), columns - 1)
-    cell = (row * columns + column)[known]
-    count = np.bincount(cell, minlength=PHASES * columns)
-    total = np.bincount(cell, weights=residual[known], minlength=PHASES * columns)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found = total / (np.sqrt(count) * content.noise.rms)
-    return np.where(count > 0, found, math.nan).reshape(PHASES, columns)
+    cells: dict[str, Any] = {"bins": (PHASES, columns), "range": ((0.0, 1.0), (0.0, 1.0))}
+    count, *_ = np.histogram2d(phase[known], share[known], **cells)
+    total, *_ = np.histogram2d(phase[known], share[known], weights=residual[known], **cells)
+    with np.errstate(invalid="ignore"):  # NaN where there is none
+        return np.asarray(total / (np.sqrt(count) * content.noise.rms))
 
 
 _BANDS: Final = 500
