@@ -88,17 +88,15 @@ def quality_of_rate(frequency_hz: float, rate: Estimate) -> Estimate:
     """
     if not rate.value > 0.0:
         return Estimate(nan, nan, "", (nan, nan))
-    value = pi * frequency_hz / rate.value
-    low, high = rate.bounds95
-    return Estimate(
-        value,
-        value * rate.sd / rate.value,
-        "",
-        (
-            pi * frequency_hz / high if isfinite(high) else 0.0,
-            pi * frequency_hz / low if low > 0 else inf,
-        ),
-    )
+    return over(pi * frequency_hz, rate)
+
+
+def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
+    """Divide a number by a positive estimate, with the interval that the estimate's gives."""
+    value = number / estimate.value
+    low, high = estimate.bounds95
+    ends = number / high if isfinite(high) else 0.0, number / low if low > 0.0 else inf
+    return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
 
 
 _ROUNDS = 50
@@ -172,12 +170,7 @@ def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
     exponent, chi2_free = _free_exponent(frequency, rate, sd, inverse)
     free = np.isfinite(exponent.value)
     return Benchmark(
-        coefficient=Estimate(
-            1.0 / inverse,
-            inverse_sd / inverse**2,
-            "s^2",
-            _inverted(inverse, inverse_sd),
-        ),
+        coefficient=over(1.0, Estimate(inverse, inverse_sd, "1/s^2"), "s^2"),
         inverse=inverse,
         inverse_sd=inverse_sd,
         chi2=chi2,
@@ -268,12 +261,6 @@ def _free_exponent(
     covariance = np.linalg.inv(design.T @ design)
     chi2 = float(np.sum(((rate - scale * shape) / sd) ** 2))
     return Estimate(exponent, float(np.sqrt(covariance[1, 1])), ""), chi2
-
-
-def _inverted(value: float, sd: float) -> tuple[float, float]:
-    """95 % interval of 1/x for a Gaussian x."""
-    half = 1.959963984540054 * sd
-    return 1.0 / (value + half), 1.0 / (value - half) if value > half else float("inf")
 
 
 def _widened(estimate: Estimate, relative_sd: float) -> Estimate:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendpipe.physics._floats import FloatArray
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 ComplexArray = npt.NDArray[np.complex128]
 Surface = Literal["film", "slip", "release"]
@@ -324,8 +325,6 @@ def _sloshing(
     sides: tuple[float, float, float], height_m: float, floor_m: float, angular_frequency: float
 ) -> float:
     """Return what the sloshing modes send back, per dipole; sides are L, W and e."""
-    from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
-
     length_m, width_m, off_centre_m = sides
     above = height_m - floor_m
     modes = np.arange(2 * int(_DECAY * max(length_m, width_m) / (2.0 * np.pi * above)) + 3)
@@ -365,8 +364,6 @@ def sloshing_frequency(length_m: float, depth_m: float, mode: int = 1) -> float:
     >>> [round(sloshing_frequency(0.23, depth), 2) for depth in (0.03, 0.05)]
     [1.15, 1.42]
     """
-    from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
-
     wave_number = mode * np.pi / length_m
     squared = STANDARD_GRAVITY_M_PER_S2 * wave_number * np.tanh(wave_number * depth_m)
     return float(np.sqrt(squared) / (2.0 * np.pi))

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.turning_points.measure import loss_rates
+from pendpipe.analysis.turning_points.measure import cosine_sine, loss_rates
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -91,10 +91,7 @@ def _fit_batch(
             return j
         last = lo + length if lo + length <= values.size else lo + number
         even, odd, rest = _products(values[lo:last], tables, level)
-        phase = (middle - at) * step
-        square = phase * phase
-        cosine = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
-        sine = phase * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)))
+        cosine, sine = cosine_sine((middle - at) * step)
         found[0, j] = even * cosine - odd * sine
         found[1, j] = even * sine + odd * cosine
         found[2, j] = rest
