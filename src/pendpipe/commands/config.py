@@ -2,8 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 from pendpipe.arguments import ALTERNATIVES, Flags
 from pendpipe.configuration.load import load_campaign, read_configuration
@@ -54,36 +53,4 @@ def manual() -> str:
         begin=BEGIN,
         end=END,
         models=models,
-        kind=_kind,
-        default=_default,
     )
-
-
-def _kind(entry: dict[str, Any]) -> str:
-    """The kind of a value in a reader's words."""
-    return " or ".join(dict.fromkeys(_kinds(entry)))
-
-
-def _kinds(entry: dict[str, Any]) -> Iterator[str]:
-    if "$ref" in entry:
-        yield entry["$ref"].rpartition("/")[2]
-    elif "enum" in entry:
-        yield ", ".join(f"`{value}`" for value in entry["enum"])
-    elif "anyOf" in entry:
-        for option in entry["anyOf"]:
-            yield from _kinds(option)
-    elif "additionalProperties" in entry:
-        yield "names, each with " + _kind(entry["additionalProperties"])
-    else:
-        yield {"null": "blank", "string": "text", "boolean": "true or false"}.get(
-            entry["type"], str(entry["type"])
-        )
-
-
-def _default(entry: dict[str, Any], required: bool) -> str:
-    if required:
-        return "needed"
-    default = entry.get("default")
-    if default is None or isinstance(default, dict):
-        return "blank" if default is None and "default" in entry else "see there"
-    return f"`{json.dumps(default)}`"

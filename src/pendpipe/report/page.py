@@ -7,11 +7,9 @@ import csv
 import hashlib
 import io
 import json
-import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 from typing import Any, Final
@@ -238,46 +236,17 @@ def diagnoses(folder: Path, names: list[str], room: Room) -> list[dict[str, Any]
             words = f"{CAPTIONS['residual_map'].shows} Record {name}."
             title = f"Residual of {name} before and after"
             figure = room.drawing(place / "residual_map.svg", anchor, title, words)
-        models = (content["baseline"], content["improved"])[: 2 if content["effects"] else 1]
-        parameters = content["baseline"]["parameters"] or {}
-        unit = str((parameters.get("amplitude") or {}).get("unit", "rad"))
-        noise, p_value = number(content["noise_rms_rad"]), number(content["p_value"])
         found.append(
             {
                 "name": name,
                 "anchor": anchor,
                 "light": VERDICTS[content["verdict"]],
-                "p_value": f"{p_value:.2g}" if math.isfinite(p_value) else "–",
-                "effects": [_effect(effect) for effect in content["effects"]],
-                "residual": _steps(models, "residual_rms_rad", partial(compact, unit=unit)),
-                "noise": compact(noise, unit) if math.isfinite(noise) else "–",
-                "chi2": _steps(models, "chi2_per_dof", _three_digits),
                 "statement": without_folders(str(content["statement"])),
                 "figure": figure,
+                "content": content,
             }
         )
     return found
-
-
-def _steps(models: Sequence[Mapping[str, Any]], name: str, printed: Callable[[float], str]) -> str:
-    """What is known of each model, one after the other."""
-    known = [value for model in models if math.isfinite(value := number(model[name]))]
-    return " → ".join(map(printed, known)) or "–"
-
-
-def _three_digits(value: float) -> str:
-    return f"{value:.3g}" if value < 1e4 else f"{value:.0f}"
-
-
-def _effect(effect: Mapping[str, Any]) -> str:
-    """An effect with its probability and what it can't be distinguished from."""
-    rest = ", ".join(
-        f"{other['id']} {100.0 * other['probability']:.0f} %"
-        for other in effect["indistinguishable_from"]
-    )
-    chance = number(effect["probability"])
-    own = f"{effect['id']} {100.0 * chance:.0f} %" if math.isfinite(chance) else str(effect["id"])
-    return f"{own} (or {rest})" if rest else own
 
 
 KEPT: Final = {
