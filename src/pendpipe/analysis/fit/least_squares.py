@@ -117,44 +117,6 @@ def _first_met(
     return met, max(float(share[met]), 0.0)
 
 
-def exchanged(
-    on: dict[int, float],
-    free: Sequence[int],
-    step: FloatArray,
-    normal: FloatArray,
-    gradient: FloatArray,
-    bounds: Bounds,
-) -> bool:
-    """Let go what leaves its bound by itself, or put at its bound what is farthest beyond it.
-
-    Parameters
-    ----------
-    on
-        What is at a bound, and where that is: changed.
-    free
-        What may be put at one.
-    step, normal, gradient, bounds
-        Of the problem; bounds of the step.
-
-    Returns
-    -------
-    bool
-        False where the step is the best.
-    """
-    slope = normal @ step - gradient
-    idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == bounds.lower[j])]
-    beyond = np.maximum(bounds.lower - step, step - bounds.upper) * np.sqrt(normal.diagonal())
-    worst = max(free, key=lambda j: float(beyond[j]), default=None)
-    if idle:
-        del on[idle[0]]
-    elif worst is not None and beyond[worst] > _BEYOND:
-        below = step[worst] < bounds.lower[worst]
-        on[worst] = float((bounds.lower if below else bounds.upper)[worst])
-    else:
-        return False
-    return True
-
-
 def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Solve a positive definite system whose parameters differ by many orders of size."""
     scale = 1.0 / np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
@@ -355,6 +317,15 @@ def _profiled_end(
         end = float(best[-1]) + math.copysign(math.sqrt(max(left * follow[-1], 0.0)), reach)
         end = min(max(end, low), high)
         step[free] = best + follow / follow[-1] * (end - best[-1])
-        if not exchanged(on, free[:-1], step, normal, gradient, room):
+        slope = normal @ step - gradient
+        idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == room.lower[j])]
+        beyond = np.maximum(room.lower - step, step - room.upper) * np.sqrt(normal.diagonal())
+        worst = max(free[:-1], key=lambda j: float(beyond[j]), default=index)
+        if idle:
+            del on[idle[0]]
+        elif worst != index and beyond[worst] > _BEYOND:
+            walls = room.lower if step[worst] < room.lower[worst] else room.upper
+            on[worst] = float(walls[worst])
+        else:
             break
     return float(value[index]) + end

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -186,24 +186,16 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     )
     try:
         table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
-        numbers = {key: float(metadata.pop(key)) for key in _NUMBERS}
-        cuts = tuple(_cut(value) for key, value in head if key == "cut")
+        numbers: dict[str, Any] = {key: float(metadata.pop(key)) for key in _NUMBERS}
+        told = (value.split(" ", 2) for key, value in head if key == "cut")
+        cuts = tuple(Cut(float(start_s), float(stop_s), reason) for start_s, stop_s, reason in told)
     except (KeyError, ValueError) as fault:
         raise InputError(place, f"it can't be read ({fault})", "make it again") from None
     metadata.pop("frequency_hz", None)
     return TurningPoints(
         table[:, 0].astype(np.int64),
-        table[:, 1].copy(),
-        table[:, 2].copy(),
-        table[:, 3].copy(),
-        table[:, 4].copy(),
-        table[:, 5].copy(),
-        level_sd_rad=numbers["level_sd_rad"],
-        level_coupling=numbers["level_coupling"],
-        noise_rms_rad=numbers["noise_rms_rad"],
-        step_rad=numbers["step_rad"],
-        start_s=numbers["start_s"],
-        stop_s=numbers["stop_s"],
+        *np.ascontiguousarray(table.T[1:]),
+        **numbers,
         samples=int(metadata.pop("samples", "0")),
         unit=metadata.pop("unit", "rad"),
         wanders=metadata.pop("level", "constant") == "wanders",
@@ -211,9 +203,3 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         metadata=metadata,
         notes=(*(value for key, value in head if key == "note"), *cut_short),
     )
-
-
-def _cut(text: str) -> Cut:
-    """Read one cut back."""
-    start, stop, reason = text.split(" ", 2)
-    return Cut(float(start), float(stop), reason)
