@@ -186,15 +186,15 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     )
     try:
         table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
+        columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
         numbers: dict[str, Any] = {key: float(metadata.pop(key)) for key in _NUMBERS}
         told = (value.split(" ", 2) for key, value in head if key == "cut")
         cuts = tuple(Cut(float(start_s), float(stop_s), reason) for start_s, stop_s, reason in told)
     except (KeyError, ValueError) as fault:
         raise InputError(place, f"it can't be read ({fault})", "make it again") from None
     metadata.pop("frequency_hz", None)
+    numbers |= columns | {"half_cycle": columns["half_cycle"].astype(np.int64)}
     return TurningPoints(
-        table[:, 0].astype(np.int64),
-        *np.ascontiguousarray(table.T[1:]),
         **numbers,
         samples=int(metadata.pop("samples", "0")),
         unit=metadata.pop("unit", "rad"),
