@@ -27,8 +27,6 @@ from pendpipe.report.tables import (
     STATES,
     Column,
     Health,
-    budget_rows,
-    exponent_tables,
     findings,
     grouped_warnings,
     table_of_records,
@@ -119,8 +117,6 @@ def render(
         downloads=_downloads(columns, lines, summary),
         **own_files(),
         findings=findings(comparison),
-        exponents=exponent_tables(comparison),
-        budget=budget_rows(comparison),
         warned=grouped_warnings(entries),
     )
 
