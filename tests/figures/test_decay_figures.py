@@ -21,8 +21,9 @@ from pendpipe.analysis.turning_points import (
 )
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.estimate import Estimate
-from pendpipe.figures.data import Decay, NothingToDrawError, read_decay
+from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.decays import (
+    Decay,
     draw_decay,
     draw_fig07,
     draw_fig08,
@@ -30,6 +31,7 @@ from pendpipe.figures.decays import (
     fit_exponential,
     local_quality,
     quality_with_band,
+    read_decay,
 )
 from pendpipe.recording import Recording, read_plain
 

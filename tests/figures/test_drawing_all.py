@@ -13,8 +13,7 @@ import pytest
 
 from pendpipe.cli import main
 from pendpipe.figures.campaign import draw_all, draw_fig03, draw_fig09
-from pendpipe.figures.data import read_decay
-from pendpipe.figures.decays import draw_decay
+from pendpipe.figures.decays import draw_decay, read_decay
 from pendpipe.figures.style import save
 from pendpipe.quantities import prefixed, with_error
 

@@ -31,8 +31,7 @@ def load_example() -> ModuleType:
 def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A finished campaign of 27 records with two figures drawn, and one record's decay."""
     from pendpipe.figures.campaign import draw_fig09, draw_tail
-    from pendpipe.figures.data import read_decay
-    from pendpipe.figures.decays import draw_decay
+    from pendpipe.figures.decays import draw_decay, read_decay
     from pendpipe.figures.style import save
 
     made = load_example().make_example(tmp_path_factory.mktemp("campaign"))

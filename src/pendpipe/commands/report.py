@@ -38,8 +38,8 @@ def run(arguments: argparse.Namespace) -> None:
     from pendpipe.figures.data import read_compared, read_content
     from pendpipe.files import write_whole
     from pendpipe.manifest import job
-    from pendpipe.report.headline import as_text, headline
     from pendpipe.report.page import page_files, render
+    from pendpipe.report.tables import as_text, headline
 
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     figures = arguments.figures or arguments.out.parent / "figures"

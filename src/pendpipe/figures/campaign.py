@@ -21,11 +21,10 @@ from pendpipe.figures.data import (
     error,
     number,
     of_branch,
-    read_decay,
     series,
     used,
 )
-from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08
+from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08, read_decay
 from pendpipe.figures.style import (
     BLUE,
     GREEN,
@@ -566,7 +565,7 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
     for panel, name in zip(drawn, "abc", strict=True):
         values = np.array([number(fit[name]) for fit in tail])
         errors = np.array([error(fit[name]) for fit in tail])
-        factor, unit = _scale(name, values)
+        factor, unit = axis_unit(values, _UNITS[name])
         # The whole record's value with its 95 % band, against the tails' error bars.
         panel.axhspan(
             factor * (values[0] - 1.96 * errors[0]),
@@ -592,12 +591,6 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
     key_above(drawn[0], 2, lift=1.28)
     figure.align_ylabels(drawn)
     return figure
-
-
-def _scale(name: str, values: FloatArray) -> tuple[float, str]:
-    """A prefix for c's rad/s; a and b are numbers of ordinary size, b in 1/ks would be odd."""
-    unit = _UNITS[name]
-    return axis_unit(values, unit) if name == "c" else (1.0, unit)
 
 
 def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:

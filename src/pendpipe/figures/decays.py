@@ -3,18 +3,25 @@
 Each draws the law that was fitted, and names it in its key.
 """
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
+from scipy.interpolate import make_interp_spline
 
-from pendpipe.analysis.fit.result import seen_qualities
+from pendpipe import physics
+from pendpipe.analysis.fit.result import FitResult, read_fit, seen_qualities
+from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
-from pendpipe.figures.data import Decay
+from pendpipe.dynamics import Release, turning_points
+from pendpipe.errors import InputError
+from pendpipe.figures.data import Entry, NothingToDrawError
 from pendpipe.figures.style import (
     BLUE,
     GREY,
@@ -31,8 +38,111 @@ from pendpipe.figures.style import (
     quantity_of,
     styled,
 )
+from pendpipe.files import without_folders
 from pendpipe.quantities import axis_unit, compact
 from pendpipe.recording import Recording
+
+
+@dataclass(frozen=True)
+class Decay:
+    """One record's turning points and fit.
+
+    Parameters
+    ----------
+    record
+        Its name.
+    points
+        The turning points, from the first that was fitted.
+    fit
+        The fit, whose time begins at the first of them.
+    """
+
+    record: str
+    points: TurningPoints
+    fit: FitResult
+
+    @property
+    def law_name(self) -> str:
+        """The fitted law's, for a key."""
+        return self.fit.equation.replace("the torque of ", "")
+
+    @property
+    def _too_high(self) -> float:
+        """By how much the turning points' level exceeds the one that the fit found."""
+        too_high = float(np.mean(self.points.level_rad)) - self.fit.value("offset")
+        return too_high if math.isfinite(too_high) else 0.0
+
+    @property
+    def level_rad(self) -> FloatArray:
+        """The fitted level, with the course of that of the turning points; shape (n,)."""
+        return self.points.level_rad - self._too_high
+
+    @property
+    def amplitude_rad(self) -> FloatArray:
+        """Angles without their alternating sign, about the level that the fit found.
+
+        A level too high by one lowers the signed angles by the table's ``level_coupling``.
+        """
+        # Signed, so that noise about zero stays noise about zero.
+        shift = self.points.level_coupling * self._too_high
+        return self.points.side * (self.points.angle_rad + shift)
+
+    @property
+    def elapsed_s(self) -> FloatArray:
+        """Time since the first turning point: the t of Eq. 14."""
+        return np.asarray(self.points.time_s - self.points.time_s[0])
+
+    @property
+    def residual_rad(self) -> FloatArray:
+        """Amplitudes less the fitted law's."""
+        return self.amplitude_rad - self.along(self.elapsed_s)[0]
+
+    def along(self, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Amplitude and Q of the law that was fitted, at times since the first turning point.
+
+        Where that is no Eq. 14 (Q: Eq. 15), the amplitudes y are those at which the motion of
+        Eq. 8 turns, and Q is pi/ln(y'/y) from one to the next on the same side.
+        """
+        start, *rates = (self.fit.value(name) for name in ("amplitude", "a", "b", "c"))
+        frequency = self.fit.value("frequency")
+        if self.fit.equation == "Eq. 14":
+            y = physics.amplitude(elapsed_s, start, *rates)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return y, physics.quality_factor(y, frequency, *rates)
+        until_s = float(elapsed_s[-1]) + 2.0 / frequency
+        turned = turning_points(self.fit.law, Release(0.0, start), until_s=until_s)
+        if len(turned.time_s) < 4:
+            raise NothingToDrawError("the fitted law stops within two cycles")
+        y = np.abs(turned.angle_rad)
+        quality = np.pi / np.log(y[:-2] / y[2:])
+        return (
+            np.interp(elapsed_s, turned.time_s, y),
+            make_interp_spline(turned.time_s[1:-1], quality, k=1)(elapsed_s),
+        )
+
+
+def read_decay(folder: Path, entry: Entry) -> Decay:
+    """Read a record's turning points and fit from its folder of the results.
+
+    Raises
+    ------
+    NothingToDrawError
+        If the files can't be used, as those of a refused record.
+    """
+    name = entry["record"]
+    try:
+        fit = read_fit(folder / name / "fit.json")
+        points = read_turning_points(folder / name / "turning_points.csv")
+    except InputError as fault:
+        raise NothingToDrawError(f"{name}: {without_folders(fault.problem)}") from None
+    # The fit counts its time from the first turning point that it kept.
+    low, high = entry.get("start_s", -math.inf), entry.get("stop_s", math.inf)
+    keep = (points.time_s >= low - 1e-9) & (points.time_s <= high + 1e-9)
+    if np.count_nonzero(keep) >= 3:
+        points = points.chosen(keep)
+    if len(points) < 3:
+        raise NothingToDrawError(f"{name} has fewer than three turning points")
+    return Decay(name, points, fit)
 
 
 @styled

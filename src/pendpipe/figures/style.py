@@ -129,11 +129,6 @@ def figure_with_residuals(
     return figure, upper, lower
 
 
-def remark(axes: Axes, text: str) -> None:
-    """Say in a line above a panel what its points tell."""
-    axes.set_title(text, fontsize=8.5, pad=3)
-
-
 def quantity_of(unit: str) -> str:
     """Name what has this unit, for an axis."""
     return {"rad": "Angle", "m": "Displacement"}.get(unit, "Reading")

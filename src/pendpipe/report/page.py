@@ -21,7 +21,6 @@ from pendpipe.figures.data import error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
 from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
-from pendpipe.report.headline import headline
 from pendpipe.report.tables import (
     CHI2_RANGE,
     STATES,
@@ -29,6 +28,7 @@ from pendpipe.report.tables import (
     Health,
     findings,
     grouped_warnings,
+    headline,
     table_of_records,
 )
 from pendpipe.templates import render as fill_template

@@ -168,8 +168,7 @@ class FitResult:
 
     def plot(self) -> Figure:
         """Draw the decay with its fit, what the fit leaves, and Q against amplitude."""
-        from pendpipe.figures.data import Decay
-        from pendpipe.figures.decays import draw_fit
+        from pendpipe.figures.decays import Decay, draw_fit
 
         if self.points is None or self.decay is None:
             raise InputError("plot", "the readings are not with this fit", "fit the recording anew")
