@@ -86,8 +86,8 @@ def read(
             decimal=decimal,
             delimiter=delimiter,
             volts_per_radian=volts_per_radian,
-            start_s=start,
-            stop_s=stop,
+            start=start,
+            stop=stop,
         ),
     )
 
@@ -162,10 +162,7 @@ def inspect(path: str | Path, **options: Any) -> Inspection:
     """
     from pendpipe.formats import inspect as inspect_file
 
-    names = {"start": "start_s", "stop": "stop_s"}
-    return inspect_file(
-        path, _options(**{names.get(name, name): value for name, value in options.items()})
-    )
+    return inspect_file(path, _options(**options))
 
 
 def find_free_decay(recording: Source) -> FreeDecay:
@@ -421,10 +418,11 @@ def _options(**given: Any) -> Any:
     """Turn the overrides into the readers' options; numbers of columns are words there."""
     from pendpipe.formats import ReadOptions
 
+    names = {"start": "start_s", "stop": "stop_s"}
     for name in ("channel", "column"):
         if isinstance(given.get(name), int):
             given[name] = str(given[name])
-    return ReadOptions(**given)
+    return ReadOptions(**{names.get(name, name): value for name, value in given.items()})
 
 
 def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:

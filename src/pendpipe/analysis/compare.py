@@ -606,39 +606,28 @@ def theory_curve(
 FEWEST_IN_A_TAIL = 8
 
 
-@dataclass(frozen=True)
-class Misfit:
-    """What two laws leave of the amplitudes, rms in rad (m)."""
+def amplitude_misfit(points: TurningPoints) -> dict[str, float]:
+    """Fit the amplitudes with and without a and c; the same points, the same weights.
 
-    amplitude_rms_rad: float
-    """By Eq. 14: a, b and c together."""
-    linear_damping_rms_rad: float
-    """By an exponential: b alone, the textbook's linear damping."""
-    half_cycles: int
-
-
-@dataclass(frozen=True)
-class Tail:
-    """a, b, c from the part of a record after `start_s`."""
-
-    start_s: float
-    amplitude_rad: float
-    a: Estimate
-    b: Estimate
-    c: Estimate
-
-
-def amplitude_misfit(points: TurningPoints) -> Misfit:
-    """Fit the amplitudes with and without a and c; the same points, the same weights."""
+    Returns
+    -------
+    dict
+        As in comparison.json: what Eq. 14 leaves of the amplitudes (a, b and c together), and
+        what an exponential does (b alone, the textbook's linear damping), rms in rad (m).
+    """
 
     def left_by(held: dict[str, float]) -> float:
         return float(np.sqrt(np.mean(fit_envelope(points, held).residual ** 2)))
 
-    return Misfit(left_by({}), left_by({"a": 0.0, "c": 0.0}), len(points))
+    return {
+        "amplitude_rms_rad": left_by({}),
+        "linear_damping_rms_rad": left_by({"a": 0.0, "c": 0.0}),
+        "half_cycles": len(points),
+    }
 
 
-def tail_fits(points: TurningPoints, count: int = 12) -> list[Tail]:
-    """Fit ever later parts of a record: the first is the whole of it.
+def tail_fits(points: TurningPoints, count: int = 12) -> list[dict[str, Any]]:
+    """Fit ever later parts of a record: the first is the whole of it. As in comparison.json.
 
     The starts are even in the logarithm of the amplitude; the last tail keeps eight
     turning points. A fit to the tail alone depends on where it begins, which the paper
@@ -654,16 +643,14 @@ def tail_fits(points: TurningPoints, count: int = 12) -> list[Tail]:
     return [tail for start in starts if (tail := _tail(points, place >= start))]
 
 
-def _tail(points: TurningPoints, kept: BoolArray) -> Tail | None:
+def _tail(points: TurningPoints, kept: BoolArray) -> dict[str, Any] | None:
     part = points.chosen(kept)
     try:
         found = fit_points(part).parameters
     except InputError:
         return None  # too little is left of it
-    return Tail(
-        start_s=float(part.time_s[0] - points.time_s[0]),
-        amplitude_rad=float(abs(part.angle_rad[0])),
-        a=found["a"],
-        b=found["b"],
-        c=found["c"],
-    )
+    return {
+        "start_s": float(part.time_s[0] - points.time_s[0]),
+        "amplitude_rad": float(abs(part.angle_rad[0])),
+        **{letter: found[letter].as_json() for letter in "abc"},
+    }

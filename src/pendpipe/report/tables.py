@@ -365,13 +365,14 @@ def _row(name: str, found: Any, key: str, truth: float | None = None) -> Row | N
     if not math.isfinite(value):
         return None
     unit = found.get("unit", "") if isinstance(found, Mapping) else ""
+    paper = NUMBERS.get(key, Printed(""))
     pull = f"{(value - truth) / sd:+.1f}".replace("-", "−") if truth is not None and sd else ""
     shown = "" if truth is None else with_error(float(truth), None, unit)
     return Row(
         name,
         with_error(value, sd, unit),
-        NUMBERS[key].text,
-        _percent(value, NUMBERS[key]),
+        paper.text,
+        _percent(value, paper),
         shown,
         pull,
     )
@@ -388,11 +389,8 @@ def _percent(value: float, printed: Printed) -> str:
 def _exponents(comparison: Comparison) -> Iterator[Row | None]:
     for branch, found in (comparison.get("viscous_exponents") or {}).items():
         key = f"exponent_{branch}"
-        if key in NUMBERS:
-            yield _row(f"Exponent x of Q_v ∝ fˣ, {branch} branch (Eq. 11)", found, key)
-        elif found:
-            name = f"Exponent x of Q_v ∝ fˣ, {branch}"
-            yield Row(name, with_error(number(found), error(found)))
+        of_paper = " branch (Eq. 11)" if key in NUMBERS else ""
+        yield _row(f"Exponent x of Q_v ∝ fˣ, {branch}{of_paper}", found, key)
 
 
 def _typical(comparison: Comparison) -> Iterator[Row | None]:

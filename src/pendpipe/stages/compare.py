@@ -71,18 +71,19 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     rows = [result.record for result in placed(campaign, results)]
     spread = inertia_sds(design_of(campaign, rows)) if rows else {}
     found = _comparison(campaign, separated, spread)
+    settings = campaign.configuration
     content = {
         "schema_version": 1,
-        "title": campaign.configuration.title,
-        "typical_record": campaign.configuration.typical_record,
-        "has_theory": campaign.configuration.apparatus is not None,
+        "title": settings.title,
+        "typical_record": settings.typical_record,
+        "has_theory": settings.apparatus is not None,
         "records": [_record(campaign, result, separated, found, spread) for result in results],
         "curves": _curves(campaign, separated),
         "hysteretic_coefficient": separated.benchmark,
         **_campaign_numbers(found),
         "joint": None if together is None else joint_values(*together),
         "tail": _tail(campaign, results),
-        "calibration": _calibration(campaign),
+        "calibration": read_json(sensor_file(campaign)) if settings.calibration else None,
         "provenance": stamp(campaign),
     }
     write_json(out, content)
@@ -169,7 +170,7 @@ def _record(
     content["volts_per_radian"] = result.calibration["volts_per_radian"]
     points = read_turning_points(campaign.folder / row.record / "turning_points.csv")
     content["start_s"], content["stop_s"] = float(points.time_s[0]), float(points.time_s[-1])
-    content["misfit"] = asdict(amplitude_misfit(points))
+    content["misfit"] = amplitude_misfit(points)
     if split is not None:
         content |= _separated(split)
     return content | _theory(campaign, result, found, spread.get(row.record))
@@ -302,21 +303,7 @@ def _tail(campaign: Campaign, results: list[RecordResult]) -> list[dict[str, Any
     usable = [result.record.record for result in results if result.refused is None]
     if name is None or name not in usable:
         return []
-    return [
-        {
-            "start_s": tail.start_s,
-            "amplitude_rad": tail.amplitude_rad,
-            **{letter: getattr(tail, letter).as_json() for letter in "abc"},
-        }
-        for tail in tail_fits(read_turning_points(campaign.folder / name / "turning_points.csv"))
-    ]
-
-
-def _calibration(campaign: Campaign) -> dict[str, Any] | None:
-    """The caliper run with its line and its test."""
-    if campaign.configuration.calibration is None:
-        return None
-    return dict(read_json(sensor_file(campaign)))
+    return tail_fits(read_turning_points(campaign.folder / name / "turning_points.csv"))
 
 
 NUMBERS: Final = (
