@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 from pendpipe.cli import main
+from pendpipe.figures.data import typical_record
 from pendpipe.report.page import BUDGET_BYTES, render
-from pendpipe.report.tables import as_text, headline, typical_record
+from pendpipe.report.tables import as_text, headline
 
 VOID = {"meta", "link", "br", "hr", "img", "input", "path", "use", "rect", "image", "line"}
 

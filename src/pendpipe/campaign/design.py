@@ -5,8 +5,6 @@ a weight is clamped, the zero that they share, masses, sphere, thermometer, scre
 The fit counts them in standard deviations from their configured values.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

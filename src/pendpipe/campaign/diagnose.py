@@ -1,7 +1,5 @@
 """What a campaign's model lacks: tested over the catalogue, refitted, named as a class."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

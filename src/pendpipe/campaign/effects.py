@@ -6,8 +6,6 @@ and for the `shape` where the effect has a discrete property (a branch, a mode's
 Patterns, fits and the statement follow from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature

@@ -3,8 +3,6 @@
 What these say of k, the drag and the added mass stands beside the numbers of the paper's route.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -165,10 +163,8 @@ class JointFit:
 
     def derivative(self, candidate: Candidate) -> FloatArray:
         """Change of the residuals with the size of one more effect, at none."""
-        wider, at = (*self.added, candidate), np.append(self.unknowns, 0.0)
-        step = np.zeros(len(at))
-        step[-1] = STEP
-        ends = _residuals(self.design, self.data, wider, at + np.array([[1.0], [0.0]]) * step)
+        at = np.stack([np.append(self.unknowns, size) for size in (STEP, 0.0)])
+        ends = _residuals(self.design, self.data, (*self.added, candidate), at)
         return np.asarray((ends[0] - ends[1]) / STEP)
 
 
@@ -199,9 +195,7 @@ def joint_fit(
     first = np.zeros(count + len(added))
     if start is not None:
         first[: len(start)] = start[: len(first)]
-    low, high = np.full(len(first), -np.inf), np.full(len(first), np.inf)
-    for number, one in enumerate(added):
-        low[count + number], high[count + number] = one.bounds
+    low, high = np.array([(-np.inf, np.inf)] * count + [one.bounds for one in added]).T
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         at = _least_squares(design, data, added, first, np.ones(len(first), dtype=np.bool_))
         outside = (at < low) | (at > high)
@@ -269,11 +263,9 @@ def _derivatives(
     design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> FloatArray:
     """Central differences of the residuals, all at once; shape (rows, unknowns)."""
-    steps = np.full(len(unknowns), STEP)
-    both = unknowns + np.concatenate([np.diag(steps), -np.diag(steps)])
-    moved = _residuals(design, data, added, both)
-    half = len(unknowns)
-    return np.asarray((moved[:half] - moved[half:]).T / (2.0 * steps))
+    steps = STEP * np.eye(len(unknowns))
+    ends = [_residuals(design, data, added, unknowns + each) for each in (steps, -steps)]
+    return np.asarray((ends[0] - ends[1]).T / (2.0 * STEP))
 
 
 def only(design: Design, data: Measured, keep: BoolArray) -> tuple[Design, Measured]:

@@ -1,7 +1,5 @@
 """Drag and added mass in a tank against how close its walls are, as smooth functions."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Final, Literal
 

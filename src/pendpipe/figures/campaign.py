@@ -22,6 +22,7 @@ from pendpipe.figures.data import (
     number,
     of_branch,
     series,
+    typical_record,
     used,
 )
 from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08, read_decay
@@ -127,13 +128,11 @@ def _decay(folder: Path, entry: Entry) -> Figure:
 
 def _typical(comparison: Comparison) -> Entry:
     """The record of figures 7 and 8."""
-    name = comparison.get("typical_record")
-    if not name:
-        raise NothingToDrawError("the configuration names no typical record")
-    found = next((entry for entry in used(comparison) if entry["record"] == name), None)
-    if found is None:
-        raise NothingToDrawError(f"the typical record {name} was refused")
-    return found
+    entry, name = typical_record(comparison), comparison.get("typical_record")
+    if entry is None:
+        refused = f"the typical record {name} was refused"
+        raise NothingToDrawError(refused if name else "the configuration names no typical record")
+    return entry
 
 
 def _typical_decay(comparison: Comparison, folder: Path) -> Figure:

@@ -46,6 +46,12 @@ def used(comparison: Mapping[str, Any]) -> list[Entry]:
     return [entry for entry in comparison["records"] if not entry.get("refused")]
 
 
+def typical_record(comparison: Mapping[str, Any]) -> Entry | None:
+    """The record of figures 7 and 8, unless it was refused."""
+    name = comparison.get("typical_record")
+    return next((entry for entry in used(comparison) if entry["record"] == name), None)
+
+
 def series(entries: Iterable[Entry], quantity: str) -> Series:
     """A quantity of the records against their frequency, by rising frequency.
 
@@ -84,10 +90,7 @@ def curve(comparison: Mapping[str, Any], branch: str, quantity: str) -> tuple[Fl
     columns = comparison["curves"][branch]
     if not columns.get(quantity):
         raise NothingToDrawError(f"there is no theory curve of {quantity.replace('_', ' ')}")
-    frequency = np.array(columns["frequency_hz"], dtype=np.float64)
-    values = np.array(columns[quantity], dtype=np.float64)
-    order = np.argsort(frequency)
-    return frequency[order], values[order]
+    return tuple(np.array(columns[name], dtype=np.float64) for name in ("frequency_hz", quantity))
 
 
 def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from pendpipe import physics
-from pendpipe.figures.data import Entry, error, number, used
+from pendpipe.figures.data import Entry, error, number, typical_record, used
 from pendpipe.files import without_folders
 from pendpipe.quantities import compact, pretty_unit, with_error
 from pendpipe.templates import render as fill_template
@@ -297,12 +297,6 @@ class Row(NamedTuple):
     difference: str = ""
     truth: str = ""
     pull: str = ""
-
-
-def typical_record(comparison: Comparison) -> Entry | None:
-    """The record of figures 7 and 8, unless it was refused."""
-    name = comparison.get("typical_record")
-    return next((entry for entry in used(comparison) if entry["record"] == name), None)
 
 
 def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
