@@ -18,6 +18,8 @@ _SLACK: Final = 1e-9
 """Rounding error of the gradient."""
 _BEYOND: Final = 1e-9
 """Standard deviations by which rounding may put a step beyond its bound."""
+_SINGULAR: Final = 1e12
+"""Of the scaled inverse: beyond, it is mostly rounding."""
 
 
 class Bounds(NamedTuple):
@@ -134,12 +136,22 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     the truth lies, so they are those of the free estimate.
     """
     free = [j for j in range(len(normal)) if j not in held]
-    part = normal[np.ix_(free, free)]
+    part = normal if len(free) == len(normal) else normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
     scales = scale[:, None] * scale
+    scaled = part * scales
+    try:
+        inverse = np.linalg.inv(scaled)
+        sound = bool(np.abs(inverse).max(initial=0.0) < _SINGULAR)
+    except np.linalg.LinAlgError:
+        sound = False
+    if not sound:
+        inverse = np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    inverse *= scales
+    if len(free) == len(normal):
+        return np.asarray(inverse)
     result = np.zeros_like(normal)
-    inverse = np.linalg.pinv(part * scales, rcond=1e-14, hermitian=True)
-    result[np.ix_(free, free)] = inverse * scales
+    result[np.ix_(free, free)] = inverse
     return result
 
 
