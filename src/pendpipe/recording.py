@@ -113,13 +113,20 @@ class Recording:
         displacement_m: ArrayLike | None = None,
         volts_per_radian: float | None = None,
     ) -> None:
-        named = {"angle_rad": angle_rad, "volts": volts, "displacement_m": displacement_m}
+        named: dict[Quantity, ArrayLike | None] = {
+            "angle_rad": angle_rad,
+            "volts": volts,
+            "displacement_m": displacement_m,
+        }
         given = [(name, readings) for name, readings in named.items() if readings is not None]
         metadata = dict(metadata or {})
         if volts_per_radian is not None:
             metadata["volts_per_radian"] = repr(float(volts_per_radian))
         if values is None:
-            quantity, values = _the_only(given)
+            found = ", ".join(name for name, _ in given) or "none"
+            problem = f"exactly one quantity is needed, not {found}"
+            refuse_if(len(given) != 1, "Recording", problem, "give angle_rad=...")
+            quantity, values = given[0]
         elif given or quantity not in QUANTITIES:
             raise InputError(
                 "Recording", f"values of quantity {quantity!r}", f"use {', '.join(QUANTITIES)}"
@@ -279,17 +286,6 @@ def from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
             )
             return values - shift, tuple(notes)
     return values, tuple(notes)
-
-
-def _the_only(given: list[tuple[str, ArrayLike]]) -> tuple[Quantity, ArrayLike]:
-    """Return the one quantity whose readings were given."""
-    if len(given) != 1:
-        found = ", ".join(name for name, _ in given) or "none"
-        raise InputError(
-            "Recording", f"exactly one quantity is needed, not {found}", "give angle_rad=..."
-        )
-    name, readings = given[0]
-    return QUANTITIES[QUANTITIES.index(name)], readings
 
 
 def _column(name: str, values: ArrayLike) -> FloatArray:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import IO, Final, TextIO, cast
 
@@ -23,7 +23,7 @@ from pendpipe.acquisition.drivers.decoders import Scans
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
 from pendpipe.arrays import AnyArray
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
 _POLLS: Final = 256
@@ -102,7 +102,7 @@ class Session:
         self._driver = driver
         self._request = request
         self._clock = clock
-        self._progress = progress
+        self._progress = progress or ProgressLine(StringIO(), request.duration_s)
         self._received = 0
         self._by_clock = False  # the clock ends it, not the count of scans
         self._watch: NoiseWatch | None = None
@@ -135,8 +135,7 @@ class Session:
             self._stop()
             raise
         finally:
-            if self._progress:
-                self._progress.end()
+            self._progress.end()
         keep = {"keep_scans": self._scans} if reason == "scans" else {}
         writer.event(self._elapsed_s(), event="stopped", reason=reason, **keep)
 
@@ -163,8 +162,7 @@ class Session:
         if request.until_noise:
             self._watch = self._watch or NoiseWatch(setup.rate_hz)
         self._decoder = self._driver.decoder(len(setup.channels))
-        if self._progress:
-            self._progress.begin(setup.range_volts / 2 ** (self._driver.bits - 1))
+        self._progress.begin(setup.range_volts / 2 ** (self._driver.bits - 1))
         return identity, setup
 
     def _listen(self, writer: RawWriter) -> str:
@@ -185,8 +183,7 @@ class Session:
                 writer.data(elapsed_s, data)
                 self._received += len(data)
             decoded = self._decoder.feed(data)
-            if self._progress:
-                self._progress.update(elapsed_s, decoded)
+            self._progress.update(elapsed_s, decoded)
             enough = self._received >= wanted
             if enough and elapsed_s < 0.9 * (scans - 1) / self.setup.rate_hz:
                 self._by_clock = True
@@ -194,8 +191,8 @@ class Session:
                 return "time"
             if not data:
                 return f"the device fell silent after {elapsed_s:.6g} s"
-            if message := self._instrument.ended(data):
-                return f"the device ended its stream with '{message}'"
+            if self._decoder.ended:
+                return f"the device ended its stream with '{self._decoder.ended}'"
             if enough and not self._by_clock:
                 return "scans"
             if self._watch and self._watch.feed(decoded.counts[:, 0]):
@@ -213,12 +210,9 @@ class Session:
                 if not self._line.is_open:
                     self._line = Line(self._line.port, self._driver.baudrate)
                 self._line.set_baudrate(self._driver.baudrate)
-                identity, setup = self._introduce()
-                if (identity, setup) != (self.identity, self.setup):
-                    # Another device, or an answer that was damaged: it is asked again.
-                    self._line.close()
-                    time.sleep(_RETRY_S)
-                    continue
+                # Another device, or an answer that was damaged: it is asked again.
+                another = self._introduce() != (self.identity, self.setup)
+                refuse_if(another, self._line.port, "another device answers", "ask it again")
                 writer.event(self._elapsed_s(), event="restarted", reason=reason)
                 self._instrument.start()
             except InputError:
@@ -477,8 +471,6 @@ class NoiseWatch:
         self._kept: list[AnyArray] = []
         self._count = self._small = 0
         self._large = False
-        self.amplitude = math.nan
-        """In counts, of the last window."""
 
     def feed(self, counts: AnyArray) -> bool:
         """Take further readings, shape (n,); return whether the end is reached."""
@@ -498,7 +490,6 @@ class NoiseWatch:
         place = np.linspace(-1.0, 1.0, len(window))
         slope = float(np.sum(place * window) / np.sum(place**2))
         left = window - np.mean(window) - slope * place
-        self.amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
-        self._large = self._large or self.amplitude > _LARGE * noise
-        small = self._large and self.amplitude < _REACHED * noise
-        self._small = self._small + 1 if small else 0
+        amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
+        self._large = self._large or amplitude > _LARGE * noise
+        self._small = self._small + 1 if self._large and amplitude < _REACHED * noise else 0

@@ -160,7 +160,6 @@ def _only_falls(values: FloatArray) -> bool:
     """Whether a column holds a decay without its swings: sizes that fall from row to row."""
     sizes = np.abs(values[np.isfinite(values)])
     steps = np.diff(sizes)
-    steps = steps[steps != 0.0]
     return len(steps) >= 5 and sizes[-1] < 0.8 * sizes[0] and bool(np.mean(steps < 0.0) > 0.85)
 
 
@@ -274,9 +273,7 @@ def _of_one_run(channels: Sequence[Column], time: Column | None) -> tuple[Sequen
     ]
     holding = [c.number for c in channels if _WORTH[c.role] > 0.5 and _moves(c)]
     end = min((number for number in clocks if number > start), default=start)
-    # Readings before the first clock: then those are several clocks of one run.
-    before = any(c.number < start and _WORTH[c.role] > 0.5 for c in channels)
-    if before or not any(start < number < end for number in holding):
+    if not any(start < number < end for number in holding):
         return channels, ""
     mine = [c for c in channels if start < c.number < end]
     wanted = [c.number - start for c in mine]

@@ -128,7 +128,6 @@ def made_up(time: FloatArray, values: FloatArray) -> BoolArray:
     width = round(0.25 * swing.samples_per_cycle)
     if not swing.clear or width < 10 or width > len(values) // 8 or np.isnan(values).any():
         return drawn
-    cycles = periods(time, values)[0]
     starts = np.arange(0, len(values) - width, max(1, width // 4))
     clock = np.lib.stride_tricks.sliding_window_view(time, width + 1)[starts]
     windows = np.lib.stride_tricks.sliding_window_view(values, width + 1)[starts]
@@ -136,7 +135,6 @@ def made_up(time: FloatArray, values: FloatArray) -> BoolArray:
     rise = windows[:, -1:] - windows[:, :1]
     off = np.abs(windows - windows[:, :1] - rise * (clock - clock[:, :1]) / lasts).max(axis=1)
     straight = (off < 1e-3 * np.abs(rise[:, 0])) & (np.abs(rise[:, 0]) > 0.5 * swing.amplitude)
-    straight &= lasts[:, 0] > 0.2 * np.median(cycles) if len(cycles) else False
     for start in starts[straight].tolist():
         drawn[start : start + width + 1] = True
     return drawn

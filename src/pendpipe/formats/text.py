@@ -90,7 +90,13 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
 def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Table:
     """Read the table that is in `text`; `form` is the format's name for the user."""
     lines = _without_tags(text).split("\n")
-    _refuse_long(place, lines)
+    longest = max(range(len(lines)), key=lambda number: len(lines[number]))
+    refuse_if(
+        len(lines[longest]) > _LONGEST_LINE,
+        f"{place}, line {longest + 1}",
+        f"the line is {len(lines[longest])} letters long",
+        "give a table with a row a sample",
+    )
     for begins, own_form in _DIALECTS:
         if begins.match("\n".join(lines[:50])):
             lines = own_form(lines)
@@ -168,9 +174,8 @@ def _of_octave(lines: list[str]) -> list[str]:
 def _of_cassy(lines: list[str]) -> list[str]:
     """Make of the header that CASSY Lab writes (MIN=, MAX=, SCALE=, DEC=, DEF=) a line of names."""
     head = [re.sub("^(?=(MIN|MAX|SCALE|DEC)=)", "# ", line) for line in lines[:50]]
-    names = [line.removeprefix("DEF=").replace('"', "").replace("&", "") for line in head]
-    told = zip(head, names, strict=True)
-    return [name if line.startswith("DEF=") else line for line, name in told] + lines[50:]
+    head = [re.sub('^DEF=|"|&', "", line) if line[:4] == "DEF=" else line for line in head]
+    return head + lines[50:]
 
 
 _PANEL: Final = re.compile(r"([^,]*),([^,]*),([^,]*),(\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?,.*)")
@@ -497,34 +502,19 @@ def first_row(lines: Sequence[str], layout: Layout) -> int:
     """Find the first line of the block of numbers.
 
     It has the usual width and at least half of its filled cells are numbers; so have the next
-    rows, in the same cells (a few rows of numbers, or a title that ends in one, belong to the
-    header).
+    rows (a few rows of numbers belong to the header).
     """
-    above: list[tuple[int, list[str]]] = []
+    above: list[int] = []
     first: list[int] = []
     for place, line in enumerate(lines):
         if not line.strip() or is_comment(line):
             continue
-        cells = layout.split(line)
-        row = _is_row(cells, layout)
-        if not row or (above and _is_title(above[-1][1], cells, layout)):
-            above = []
-        if row:
-            first = first or [place]
-            above.append((place, cells))
+        above = [*above, place] if _is_row(layout.split(line), layout) else []
+        first = first or above
         if len(above) == _IN_A_ROW:
             break
     next_reader_if(not first, "no row of numbers was found")
-    return above[0][0] if above else first[0]
-
-
-def _is_title(above: Sequence[str], cells: Sequence[str], layout: Layout) -> bool:
-    """Say whether a row has words where the next one has a number or a time of day."""
-    return any(
-        not any(map(str.isdigit, word)) and not is_blank(word)
-        for word, cell in zip(above, cells, strict=True)
-        if any(map(str.isdigit, cell)) and not layout.is_number(word)
-    )
+    return (above or first)[0]
 
 
 def _is_row(cells: Sequence[str], layout: Layout) -> bool:
@@ -532,17 +522,6 @@ def _is_row(cells: Sequence[str], layout: Layout) -> bool:
     filled = len(kinds) - kinds.count("b")
     # "Record Length,2500" belongs to a header.
     return "n" in kinds and 2 * kinds.count("t") <= filled and kinds not in ("tn", "nt")
-
-
-def all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
-    """Read rows that hold nothing but numbers; ``None`` where they hold anything else."""
-    if layout.decimal == ",":
-        rows = [row.replace(",", ".") for row in rows]
-    delimiter = None if layout.delimiter == " " else layout.delimiter
-    try:
-        return np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64)
-    except ValueError:
-        return None
 
 
 _DATE: Final = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
@@ -598,11 +577,14 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     if not cells or any(match is None for match in matches):
         return None
     seconds = np.empty(len(cells))
-    days = {match.groups()[:6]: 0 for match in matches if match is not None}
+    slashed = {match.groups()[:6]: "/" in match[0] for match in matches if match is not None}
+    try:
+        days = {date: _days(date, slashes) for date, slashes in slashed.items()}
+    except ValueError:  # there is no such day
+        return None
     for row, match in enumerate(matches):
         assert match is not None
         date, (hour, minute, second, half) = match.groups()[:6], match.groups()[6:]
-        days[date] = days[date] or _days(date, "/" in match[0])
         hours = int(hour or 0)
         hours = hours % 12 + 12 * (half.lower() == "pm") if half else hours
         of_day = 3600 * hours + 60 * int(minute) + float(re.sub("[,:]", ".", second))
@@ -615,27 +597,14 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
 
 
 def _days(date: tuple[str | None, ...], slashed: bool) -> int:
-    """Count the days since 1970; 0 without a date, -1 where there is no such day."""
+    """Count the days since 1970; 0 without a date."""
     parts = [int(part or 0) for part in date]
     if not any(date):
         return 0
     year, month, day = parts[:3] if date[0] else parts[:2:-1]
     if not date[0] and (month > 12 or (slashed and day <= 12)):
         day, month = month, day
-    try:
-        return max(-1, dt.date(year, month, day).toordinal() - 719163)
-    except ValueError:
-        return -1
-
-
-def _refuse_long(place: Path, lines: Sequence[str]) -> None:
-    longest = max(range(len(lines)), key=lambda number: len(lines[number]))
-    refuse_if(
-        len(lines[longest]) > _LONGEST_LINE,
-        f"{place}, line {longest + 1}",
-        f"the line is {len(lines[longest])} letters long",
-        "give a table with a row a sample",
-    )
+    return dt.date(year, month, day).toordinal() - 719163
 
 
 def _without_cut_row(
@@ -675,9 +644,16 @@ def _at_once(
 ) -> list[Column] | None:
     """Read a block of nothing but numbers, a row a line; ``None`` if it is anything else."""
     last = max(row for row, line in enumerate(lines, start=1) if line.strip())
-    table = all_numbers(lines[first:last], layout)
+    rows = lines[first:last]
+    if layout.decimal == ",":
+        rows = [row.replace(",", ".") for row in rows]
+    delimiter = None if layout.delimiter == " " else layout.delimiter
+    try:
+        table = np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64)
+    except ValueError:
+        return None
     # A blank line is passed over in silence: then the rows' lines are to be found.
-    if table is None or len(table) != last - first:
+    if len(table) != len(rows):
         return None
     return [_column(header, place, values) for place, values in enumerate(table.T)]
 
@@ -1002,6 +978,5 @@ def _metadata(lines: Sequence[str]) -> dict[str, str]:
 
 def _unique(names: Sequence[str]) -> list[str]:
     """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
-    counts = [list(names[:place]).count(name) for place, name in enumerate(names)]
-    numbered = zip(names, counts, strict=True)
-    return [f"{name} ({n + 1})" if n and name else name for name, n in numbered]
+    before = ((name, list(names[:place]).count(name)) for place, name in enumerate(names))
+    return [f"{name} ({n + 1})" if n and name else name for name, n in before]

@@ -96,9 +96,6 @@ _UNITS: Final = {
 def plain(text: str) -> str:
     """Lower-case a name or unit and give each sign one form (both µ, ², full width)."""
     text = unicodedata.normalize("NFKC", text).replace("μ", "µ").replace("−", "-")
-    text = text.strip()
-    if len(text) > 2 and text[0] == text[-1] and text[0] in "\"'":
-        text = text[1:-1]
     return " ".join(text.lower().split())
 
 

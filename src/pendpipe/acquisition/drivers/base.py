@@ -205,10 +205,6 @@ class Driver(ABC):
         """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""
         return self.line.receive(limit_s)
 
-    def ended(self, data: bytes) -> str:  # noqa: ARG002 - most families send none
-        """Return the device's message that its stream has ended, if these bytes hold one."""
-        return ""
-
     @classmethod
     def decoder(cls, channels: int) -> Decoder:
         """Return a fresh decoder for scans of so many channels."""

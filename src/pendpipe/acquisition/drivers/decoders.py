@@ -88,6 +88,9 @@ class SyncBitDecoder:
     scans) can't be seen here.
     """
 
+    ended = ""
+    """Families with a mark send no message that their stream has ended."""
+
     def __init__(self, channels: int, bits: int) -> None:
         self.bytes_per_scan = 2 * channels
         self._bits = bits
@@ -173,9 +176,8 @@ class SyncBitDecoder:
         return Loss(after_scan, discarded, lost, suspect_before=suspect and after_scan > 0)
 
 
-STOP_CODE: Final = re.compile(rb"stop 0[123]")
+_STOP_CODE: Final = re.compile(rb"stop 0[123]")
 """In words of chance it stands once in 2e16 bytes."""
-STOP_CODE_BYTES: Final = 7
 _BEGINNINGS: Final = tuple(b"stop 0"[:size] for size in range(6, 0, -1))
 
 
@@ -194,35 +196,31 @@ class WordDecoder:
         self.bytes_per_scan = 2 * channels
         self._channels = channels
         self._shift = 16 - bits
-        self._pending = b""  # an unfinished scan, or what may be the beginning of a stop code
+        # An unfinished scan; or what may begin a stop code; or that code and all behind it.
+        self._pending = b""
         self._scans = 0
-        self._ended = ""  # the stop code, once it was met
-        self._discarded = 0
+        self.ended = ""  # the stop code, once it was met
 
     def feed(self, data: bytes) -> Scans:
         """Decode further bytes; an unfinished scan waits for the next call."""
-        if self._ended:
-            self._discarded += len(data)
-            return self._scans_of(b"")
         data = self._pending + data
-        if found := STOP_CODE.search(data):
-            self._ended = found.group().decode("ascii")
-            whole = found.start() - found.start() % self.bytes_per_scan
-            self._discarded = len(data) - whole
+        if found := _STOP_CODE.search(data):
+            self.ended = found.group().decode("ascii")
+            free = found.start()
         else:
             free = len(data) - next((len(b) for b in _BEGINNINGS if data.endswith(b)), 0)
-            whole = free - free % self.bytes_per_scan
-        self._pending = b"" if self._ended else data[whole:]
+        whole = free - free % self.bytes_per_scan
+        self._pending = data[whole:]
         return self._scans_of(data[:whole])
 
     def finish(self) -> Scans:
-        """Return what was held back, forget an unfinished scan, and tell of a stop code."""
+        """Return what was held back, forget an unfinished scan; or tell of a stop code."""
         held = self._pending
+        if self.ended:
+            loss = Loss(self._scans, len(held), 0, reason=self.ended)
+            return Scans(self._scans_of(b"").counts, (loss,))
         self._pending = b""
-        scans = self._scans_of(held[: len(held) - len(held) % self.bytes_per_scan])
-        if not self._ended:
-            return scans
-        return Scans(scans.counts, (Loss(self._scans, self._discarded, 0, reason=self._ended),))
+        return self._scans_of(held[: len(held) - len(held) % self.bytes_per_scan])
 
     def _scans_of(self, data: bytes) -> Scans:
         """Turn whole scans into counts; shape (scans, channels)."""

@@ -10,7 +10,7 @@ import math
 from typing import ClassVar, Final
 
 from pendpipe.acquisition.drivers.base import Driver, Identity
-from pendpipe.acquisition.drivers.decoders import STOP_CODE, STOP_CODE_BYTES, WordDecoder
+from pendpipe.acquisition.drivers.decoders import WordDecoder
 from pendpipe.errors import InputError
 
 _DI149_HZ: Final = 750_000
@@ -92,7 +92,6 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
     divisors: ClassVar[tuple[int, int]] = (375, 65535)
     decimations: ClassVar[int] = 512
     further_decimations: ClassVar[int] = 40000
-    _tail = b""
 
     def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
         divisor, decimation, further = self._divisors(rate_hz)
@@ -112,15 +111,7 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
         return rate
 
     def _start_stream(self) -> None:
-        self._tail = b""
         self.line.write(b"start\r")
-
-    def ended(self, data: bytes) -> str:
-        """Return the stop code (``"stop 01"``: overflow) if it stands in these bytes."""
-        seen = self._tail + data
-        self._tail = seen[1 - STOP_CODE_BYTES :]
-        found = STOP_CODE.search(seen)
-        return found.group().decode("ascii") if found else ""
 
     @classmethod
     def decoder(cls, channels: int) -> WordDecoder:
