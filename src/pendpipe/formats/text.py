@@ -639,21 +639,25 @@ def _size(cell: str, layout: Layout) -> tuple[int, int]:
     return len(bare), len(bare.partition(layout.decimal)[2])
 
 
+def _all_numbers(rows: Sequence[str], layout: Layout) -> FloatArray | None:
+    """Read rows that hold nothing but numbers; ``None`` where they hold anything else."""
+    if layout.decimal == ",":
+        rows = [row.replace(",", ".") for row in rows]
+    delimiter = None if layout.delimiter == " " else layout.delimiter
+    try:
+        return np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64)
+    except ValueError:
+        return None
+
+
 def _at_once(
     lines: Sequence[str], first: int, layout: Layout, header: Header
 ) -> list[Column] | None:
     """Read a block of nothing but numbers, a row a line; ``None`` if it is anything else."""
     last = max(row for row, line in enumerate(lines, start=1) if line.strip())
-    rows = lines[first:last]
-    if layout.decimal == ",":
-        rows = [row.replace(",", ".") for row in rows]
-    delimiter = None if layout.delimiter == " " else layout.delimiter
-    try:
-        table = np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64)
-    except ValueError:
-        return None
+    table = _all_numbers(lines[first:last], layout)
     # A blank line is passed over in silence: then the rows' lines are to be found.
-    if len(table) != len(rows):
+    if table is None or len(table) != last - first:
         return None
     return [_column(header, place, values) for place, values in enumerate(table.T)]
 
@@ -702,6 +706,9 @@ def _columns(
     place: Path, rows: list[str], numbers: IntArray, layout: Layout, header: Header
 ) -> tuple[list[Column], list[list[str]]]:
     """Turn the rows into columns with the header's names, and those of words as they stand."""
+    table = _all_numbers(rows, layout)
+    if table is not None:
+        return [_column(header, column, values) for column, values in enumerate(table.T)], []
     cells = [layout.split(row) for row in rows]
     widths = list(map(len, cells))
     width = max(layout.width, *widths)
