@@ -31,7 +31,7 @@ _TRIES: Final = 6
 _POOR: Final = 0.25
 _GOOD: Final = 0.75
 """Parts of the expected gain below (above) which a step was too long (may be longer)."""
-_SHORTER: Final = 0.25
+_SHORTER: Final = (0.1, 0.5)
 _LONGER: Final = 2.0
 """Radius of the next step over the length of the last; with the two above as More (1978) has."""
 _NUMBERS: Final = 100.0
@@ -272,13 +272,15 @@ class Refining:
             there = self._corrected(there, free, expected)
             gained = here.chi2 - there.chi2 if there else -math.inf
             if gained < _POOR * expected:
-                self._radius = _SHORTER * length
+                # Where the parabola through chi^2 here, its slope, and chi^2 there is least.
+                least = expected / (2.0 * expected - gained) if expected > 0.0 else 0.0
+                self._radius = min(max(least, _SHORTER[0]), _SHORTER[1]) * length
             elif gained > _GOOD * expected:
                 self._radius = max(self._radius, _LONGER * length)
             if gained > -0.5 * SETTLED:
                 break
             tries += 1
-            if tries > _TRIES or expected < settled:
+            if tries > (_TRIES if expected > self._unit else 1) or expected < settled:
                 self._ended, self._converged = True, expected < 10.0 * settled
                 return
         assert there is not None

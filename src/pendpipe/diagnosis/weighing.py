@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -13,9 +14,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Rival, Scale, of_one_class, probabilities
+from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate, off_harmonics
-from pendpipe.diagnosis.refine import Fit, best_fit
+from pendpipe.diagnosis.refine import Fit, best_fit, misfit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
@@ -23,6 +25,7 @@ from pendpipe.diagnosis.result import FoundEffect
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Fault, Step, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 
@@ -255,6 +258,8 @@ def refitted(
     effect = rival.lead.effect
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
+    if _is_of(rival.fit, without, effect, found):
+        return rival.fit
     own = rival.fit.value[len(rival.fit.value) - effect.count :]
     start = np.concatenate([without.value, own])
     # With its shape but no size yet it begins where the fit without it ended.
@@ -262,6 +267,17 @@ def refitted(
     absent[len(without.value) :][: 0 if effect.parameter_free else effect.sizes] = 0.0
     model, starts = without.model.adding(effect), [start, absent, rival.fit.value]
     return best_fit(model, found.data, found.noise, starts, held=held, useful=useful)
+
+
+def _is_of(fit: Fit, without: Fit, effect: Effect, found: Search) -> bool:
+    """Whether a fit is that of an effect beside those of another, on the same readings."""
+    keys = [each.key for each in (*without.model.effects, effect)]
+    if [each.key for each in fit.model.effects] != keys:
+        return False
+    with suppress(NoMotionError):
+        now = misfit(fit.model, found.data, found.noise, fit.value)
+        return abs(now - fit.chi2) < SETTLED
+    return False
 
 
 def swap_in_likelier(

@@ -92,6 +92,10 @@ def _integration(order: int) -> FloatArray:
 
 
 _TOLERANCE: Final = 1e-9
+_SETTLED: Final = 1e-6
+"""Change of a half cycle that will move it no further."""
+_PATIENCE: Final = 5
+"""Rounds that one half cycle may take once all before it are settled."""
 _ROUNDS: Final = 25
 _STEP: Final = 1e-6
 _STRIDE: Final = 0.7
@@ -104,6 +108,10 @@ _LARGEST: Final = 4.0
 
 class NoMotionError(ArithmeticError):
     """The law stops the pendulum, or drives it away, before the end that was asked for."""
+
+
+class StopsError(NoMotionError):
+    """It stops there, wherever the iteration began."""
 
 
 @dataclass(frozen=True)
@@ -166,38 +174,21 @@ class Rates:
 
     loss: FloatArray
     pace: FloatArray
+    pull: FloatArray
+    """G of the law, without a bound."""
 
 
-def rates(law: Law, motion: Motion, largest: float | None = None) -> Rates:
-    """Return the rates of a law along a motion.
+def rates(law: Law, motion: Motion, largest: float = _LARGEST) -> Rates:
+    """Return the rates of a law along a motion, with g bounded by `largest`.
 
-    Parameters
-    ----------
-    law, motion
-        The law, and a motion.
-    largest
-        Along a motion that may be wrong, for a search on its way: g is bounded by this.
-
-    Raises
-    ------
-    NoMotionError
-        Where it does not turn.
+    So they are finite along a motion that is wrong: for a search on its way, and after the time
+    until which a motion was followed.
     """
-    if largest is None:
-        g = _turning(law, motion)
-    else:
-        g = np.nan_to_num(np.clip(_pull(law, motion), -largest, largest))
-        g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
+    pull = _pull(law, motion)
+    g = np.nan_to_num(np.clip(pull, -largest, largest))
+    g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
     free = 1.0 - g * motion.clock.cosine
-    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free))
-
-
-def _turning(law: Law, motion: Motion) -> FloatArray:
-    """G of a law, with which the pendulum turns."""
-    g = _pull(law, motion)
-    if not np.all(np.abs(g) <= _LARGEST) or np.max(g * motion.clock.cosine) > _STEEPEST:
-        raise NoMotionError("the pendulum does not turn")
-    return g
+    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free), pull)
 
 
 def _pull(law: Law, motion: Motion) -> FloatArray:
@@ -213,8 +204,12 @@ def follow(
     start_s: float,
     guess: Motion,
     reset: tuple[FloatArray, FloatArray] | None = None,
+    until_s: float = math.inf,
 ) -> Motion:
     """Solve the motion from a turning point.
+
+    A half cycle depends on those before it alone, so that what the iteration makes of those after
+    `until_s` is of no consequence.
 
     Parameters
     ----------
@@ -228,11 +223,13 @@ def follow(
         Where the iteration begins: another law's motion, on the wanted clock.
     reset
         Sudden changes of ln r and t at the nodes, given as what they add up to.
+    until_s
+        When the motion may end; by default it is that of all the clock's half cycles.
 
     Raises
     ------
     NoMotionError
-        If the pendulum stops or runs away within the clock's half cycles.
+        If the pendulum stops or runs away before.
     """
     clock, upwards = guess.clock, math.copysign(1.0, start_rad)
     origin = math.log(abs(start_rad))
@@ -242,10 +239,18 @@ def follow(
     jumps, delays = (0.0, 0.0) if reset is None else reset
     # Larger g are but on the way, and lead astray, unless the equilibrium is far off.
     for largest in (_STEEPEST, _LARGEST):
-        motion = _solved(law, motion, origin + jumps, start_s + delays, largest)
-        if np.max(np.abs(_turning(law, motion))) <= largest:
+        motion = _solved(law, motion, origin + jumps, start_s + delays, largest, until_s)
+        g = _pull(law, motion)[: _followed(motion, until_s)]
+        if np.all(np.abs(g) <= largest):
             break
+    if not np.all(np.abs(g) <= _LARGEST) or np.max(g * clock.cosine[: len(g)]) > _STEEPEST:
+        raise NoMotionError("the pendulum does not turn")
     return motion
+
+
+def _followed(motion: Motion, until_s: float) -> int:
+    """How many half cycles begin before a time."""
+    return int(np.searchsorted(motion.time_s[:-1, -1], until_s)) + 1
 
 
 def _solved(
@@ -254,11 +259,12 @@ def _solved(
     log_start: FloatArray | float,
     start_s: FloatArray | float,
     largest: float,
+    until_s: float,
 ) -> Motion:
     """Iterate a motion until it is that of the law with bounded g."""
     clock, omega = motion.clock, motion.angular_frequency
     steepness: FloatArray | None = None
-    before = math.inf
+    before, front, waits = math.inf, -1, 0
     for _ in range(_ROUNDS):
         now = rates(law, motion, largest)
         if steepness is None:
@@ -267,13 +273,22 @@ def _solved(
         off = log_start + clock.integral(now.loss) - motion.log_amplitude
         change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
         late = start_s + clock.integral(now.pace) - motion.time_s
-        error = max(float(np.max(np.abs(change))), omega * float(np.max(np.abs(late))))
+        errors = np.maximum(np.abs(change), omega * np.abs(late)).max(axis=1)
+        errors = errors[: _followed(motion, until_s)]
+        error = float(np.max(errors))
         motion = replace(
             motion, log_amplitude=motion.log_amplitude + change, time_s=motion.time_s + late
         )
         # The next change will be smaller by what this one is smaller than the last.
         smaller = min(error / before, 1.0) if before < math.inf else 1.0
         if error * smaller < _TOLERANCE:
+            return motion
+        # Half cycles before the first that still changes will change no more.
+        last, front = front, int(np.argmax(errors > _SETTLED))
+        waits = waits + 1 if front == last else 0
+        if waits == _PATIENCE or np.any((now.pull * clock.cosine)[:front] > _STEEPEST):
+            if largest == _LARGEST:
+                raise StopsError("the pendulum stops")
             return motion
         if not error < 1e3:
             break

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow, rates
+from pendpipe.dynamics.any_law import (
+    Clock,
+    Law,
+    Motion,
+    NoMotionError,
+    StopsError,
+    Tangent,
+    follow,
+    rates,
+)
 from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects.baseline import (
     BASELINE,
@@ -256,6 +265,7 @@ class Model:
         """
         omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
         law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+        until = math.inf if self.half_cycles is not None else float(self.time_s[-1])
         motion = self._smooth(law, value)
         self._last["motion"] = motion
         pieces = [(-math.inf, motion)]
@@ -268,7 +278,9 @@ class Model:
                 log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
                 by_log[whole:] += log[0]
                 by_time[whole:] += late[0]
-                motion = follow(law, omega, start, begin, motion, (by_log, by_time))
+                motion = follow(
+                    law, omega, start, begin, motion, (by_log, by_time), until_s=until
+                )
             pieces.append((kick.time_s, motion))
         return pieces
 
@@ -283,10 +295,7 @@ class Model:
         return sorted(inside, key=lambda kick: kick.time_s)
 
     def _smooth(self, law: Law, value: FloatArray) -> Motion:
-        """The motion without kicks, on as many half cycles as it takes, and hardly more.
-
-        More would ask for motion beyond the stop.
-        """
+        """The motion without kicks, on as many half cycles as it takes."""
         if self.half_cycles is not None:
             return self._from_guesses(law, value, Clock(self.half_cycles, self._nodes))
         omega, begin = float(value[OMEGA]), float(value[TIME])
@@ -295,31 +304,26 @@ class Model:
             raise NoMotionError("the frequency is out of reach")
         last = self._last.get("motion")
         known = [] if last is None else [last.clock.count]
-        stops = math.inf
         for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
-            if not needed - 1.0 < count < min(1.3 * needed + 4.0, stops):
-                continue
-            clock = Clock(count, self._nodes)
-            try:
-                motion = self._from_guesses(law, value, clock)
-            except NoMotionError:
-                # So many half cycles are too many; fewer may do.
-                stops = count
-                continue
-            if motion.time_s[-1, -1] >= self.time_s[-1]:
-                return motion
-        raise NoMotionError("it stops, or the frequency is out of reach")
+            if needed - 1.0 < count < 1.3 * needed + 4.0:
+                motion = self._from_guesses(law, value, Clock(count, self._nodes))
+                if motion.time_s[-1, -1] >= self.time_s[-1]:
+                    return motion
+        raise NoMotionError("the frequency is out of reach")
 
     def _from_guesses(self, law: Law, value: FloatArray, clock: Clock) -> Motion:
         """Begin with the last motion, if it was on this clock; else with the closed form."""
         start = (float(value[OMEGA]), float(value[START]), float(value[TIME]))
+        until = math.inf if self.half_cycles is not None else float(self.time_s[-1])
         last = self._last.get("motion")
         if last is not None and last.clock == clock:
             try:
-                return follow(law, *start, last)
+                return follow(law, *start, last, until_s=until)
+            except StopsError:
+                raise
             except NoMotionError:
                 pass
-        return follow(law, *start, closed_form(value, clock))
+        return follow(law, *start, closed_form(value, clock), until_s=until)
 
     def evaluate(self, value: FloatArray) -> Evaluated:
         """Return readings, and what the derivatives need."""
