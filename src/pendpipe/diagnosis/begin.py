@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import held_values, start_of
+from pendpipe.analysis.fit.by_points import held_values, start_of, swing_phase
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import TurningPoints
@@ -21,8 +21,8 @@ from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
-from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.catalogue.in_time import BEATING_MODE
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
@@ -31,6 +31,8 @@ LARGE_PHASE_ERROR: Final = 0.1
 SINE: Final = "circular-error"
 """The effect that turns x into sin x."""
 _FEWEST_READINGS: Final = 24
+_ROUNDS: Final = 4
+"""In which the frequency of small swings and their angles settle."""
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
 jumps with the parameters."""
@@ -92,11 +94,13 @@ def begin(
         span = slice(None)
         value, second = _modes_start(samples, value)
         known = BEATING_MODE, np.append(value, second)
-    elif not fixed and samples.unit == "rad":
-        laws = start_of(points, stated=stated)
+    elif not fixed and samples.unit in ("rad", "rad/s"):
+        laws = start_of(points if samples.unit == "rad" else _of_the_angle(points), stated=stated)
         if laws.sine and laws.favoured == "sine" and laws.linear.slip_rad > LARGE_PHASE_ERROR:
             # Both laws begin at the first turning point, so that they count the same half cycles.
             value, sine = laws.linear.value, laws.sine.value
+            if samples.unit == "rad/s":
+                value, sine = (_of_the_rate(each) for each in (value, sine))
             value[TIME] = sine[TIME]
             if baseline == "viscous":
                 value[[A, C]] = sine[[A, C]] = 0.0
@@ -124,13 +128,41 @@ def begin(
     )
     data, model, at = _before_the_stop(data, model, value)
     if sine is not None:
-        known = by_identifier(SINE), np.append(sine, 1.0)
+        known = CIRCULAR_ERROR_IN.get(samples.unit, circular_error), np.append(sine, 1.0)
         data, _, at = _before_the_stop(data, model.adding(known[0]), known[1])
         model = model.at_times(data.time_s)
     if sine is not None or known is None:
         data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
     return Beginning(data, model, value, held, data.noise_rms, points, known)
+
+
+def _of_the_angle(points: TurningPoints) -> TurningPoints:
+    """Turning points of the angle with the swings of its rate: u = 2 omega sin(A/2) at the lowest."""
+    rate, half = points.angle_rad, np.diff(points.half_cycle)
+    paces = np.diff(points.time_s) / half
+    omega = math.pi / float(np.median(paces))
+    for _ in range(_ROUNDS):
+        angle = 2.0 * np.arcsin(np.clip(0.5 * rate / omega, -1.0, 1.0))
+        omega = float(np.median(swing_phase(np.abs(angle), "sine") / paces))
+    slope = 1.0 / (omega * np.cos(0.5 * angle))
+    return replace(
+        points,
+        angle_rad=angle,
+        angle_sd_rad=points.angle_sd_rad * slope,
+        level_rad=points.level_rad / omega,
+        noise_rms_rad=points.noise_rms_rad / omega,
+        step_rad=points.step_rad / omega,
+        unit="rad",
+    )
+
+
+def _of_the_rate(value: FloatArray) -> FloatArray:
+    """Values of Eq. 8 for the angle's rate u from those for the angle."""
+    omega, found = value[OMEGA], value.copy()
+    found[A], found[C], found[OFFSET] = value[A] / omega, value[C] * omega, value[OFFSET] * omega
+    found[START] = 2.0 * omega * math.sin(0.5 * value[START])
+    return found
 
 
 def _modes_start(samples: Samples, value: FloatArray) -> tuple[FloatArray, FloatArray]:
