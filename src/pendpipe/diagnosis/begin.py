@@ -138,7 +138,7 @@ def begin(
 
 
 def _of_the_angle(points: TurningPoints) -> TurningPoints:
-    """Turning points of the angle with the swings of its rate: u = 2 omega sin(A/2) at the lowest."""
+    """Turning points of the angle from those of its rate: the largest is 2 omega sin(A/2)."""
     rate, half = points.angle_rad, np.diff(points.half_cycle)
     paces = np.diff(points.time_s) / half
     omega = math.pi / float(np.median(paces))

@@ -60,14 +60,15 @@ class Proposed(NamedTuple):
 
 def price(steps: Sequence[Step]) -> float:
     """Return the charges of a set of effects, with the price of each further name."""
-    return _chosen(sum(map(_is_further, steps))) + sum(step.winner.charge for step in steps)
+    return _chosen(sum(map(is_further, steps))) + sum(step.winner.charge for step in steps)
 
 
 def _chosen(names: int) -> float:
     return CHOICE * min(names, 1) + FURTHER * max(names - 1, 0)
 
 
-def _is_further(step: Step) -> bool:
+def is_further(step: Step) -> bool:
+    """Whether it is a name with a price: no curve, and nothing that is there anyway."""
     effect = step.winner.lead.effect
     known = effect.expected or effect.parameter_free or isinstance(effect, ReleasedParameter)
     return not (known or effect.kind == "unnamed")
@@ -122,7 +123,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
 
     Where more than noise is left, the name that gains most stays: a curve competes for the rest.
     """
-    own = [step for step in state.steps if _is_further(step)]
+    own = [step for step in state.steps if is_further(step)]
     if own and not Scale.of(state.fit, state.data, state.noise).clean:
         own.remove(max(own, key=lambda step: step.winner.gain))
     effects = [(step, step.winner.lead.effect) for step in own]
@@ -230,7 +231,7 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
     scale = Scale.of(lowest, state.data, state.noise)
     others = [each.again(each.fit, before.chi2, scale) for each in rivals]
     named = ranked([_rival(before, fit, scale) for fit in fits])
-    names = sum(map(_is_further, state.steps))
+    names = sum(map(is_further, state.steps))
     price = _chosen(names + 1) - _chosen(names) if leader.drawn else 0.0
     if named[0].evidence - price <= others[0].evidence:
         return list(rivals)

@@ -94,8 +94,8 @@ def _integration(order: int) -> FloatArray:
 _TOLERANCE: Final = 1e-9
 _SETTLED: Final = 1e-6
 """Change of a half cycle that will move it no further."""
-_PATIENCE: Final = 5
-"""Rounds that one half cycle may take once all before it are settled."""
+_PATIENCE, _STILL_OFF = 5, 0.1
+"""Rounds that one half cycle may take to come so near, once all before it are settled."""
 _ROUNDS: Final = 25
 _STEP: Final = 1e-6
 _STRIDE: Final = 0.7
@@ -239,9 +239,9 @@ def follow(
     jumps, delays = (0.0, 0.0) if reset is None else reset
     # Larger g are but on the way, and lead astray, unless the equilibrium is far off.
     for largest in (_STEEPEST, _LARGEST):
-        motion = _solved(law, motion, origin + jumps, start_s + delays, largest, until_s)
+        motion, settled = _solved(law, motion, origin + jumps, start_s + delays, largest, until_s)
         g = _pull(law, motion)[: _followed(motion, until_s)]
-        if np.all(np.abs(g) <= largest):
+        if settled and np.all(np.abs(g) <= largest):
             break
     if not np.all(np.abs(g) <= _LARGEST) or np.max(g * clock.cosine[: len(g)]) > _STEEPEST:
         raise NoMotionError("the pendulum does not turn")
@@ -260,8 +260,8 @@ def _solved(
     start_s: FloatArray | float,
     largest: float,
     until_s: float,
-) -> Motion:
-    """Iterate a motion until it is that of the law with bounded g."""
+) -> tuple[Motion, bool]:
+    """Iterate a motion until it is that of the law with bounded g; or until that stops it."""
     clock, omega = motion.clock, motion.angular_frequency
     steepness: FloatArray | None = None
     before, front, waits = math.inf, -1, 0
@@ -282,14 +282,15 @@ def _solved(
         # The next change will be smaller by what this one is smaller than the last.
         smaller = min(error / before, 1.0) if before < math.inf else 1.0
         if error * smaller < _TOLERANCE:
-            return motion
+            return motion, True
         # Half cycles before the first that still changes will change no more.
         last, front = front, int(np.argmax(errors > _SETTLED))
         waits = waits + 1 if front == last else 0
-        if waits == _PATIENCE or np.any((now.pull * clock.cosine)[:front] > _STEEPEST):
+        stuck = waits >= _PATIENCE and errors[front] > _STILL_OFF
+        if stuck or np.any((now.pull * clock.cosine)[:front] > _STEEPEST):
             if largest == _LARGEST:
                 raise StopsError("the pendulum stops")
-            return motion
+            return motion, False
         if not error < 1e3:
             break
         if error > 0.5 * before:

@@ -278,9 +278,7 @@ class Model:
                 log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
                 by_log[whole:] += log[0]
                 by_time[whole:] += late[0]
-                motion = follow(
-                    law, omega, start, begin, motion, (by_log, by_time), until_s=until
-                )
+                motion = follow(law, omega, start, begin, motion, (by_log, by_time), until_s=until)
             pieces.append((kick.time_s, motion))
         return pieces
 
