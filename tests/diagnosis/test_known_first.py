@@ -150,3 +150,25 @@ def test_a_brake_leaves_few_cycles_that_show_sin_x(seed: int, torque: type) -> N
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(len(time_s))
     answer = diagnose_recording(Recording(time_s, found.y[0] + noise, "angle_rad"))
     assert [each.identifier for each in answer.effects] == ["circular-error"] * (torque is np.sin)
+
+
+def test_a_gyroscope_on_a_pendulum_shows_sin_x() -> None:
+    """Rates of a pendulum released at 1.1 rad, over 90 s: the linear law loses turns of phase."""
+    omega, loss, drag = 4.8, 0.008, 0.02
+    time_s = np.arange(0.0, 90.0, 0.04)
+    solved = solve_ivp(
+        lambda _, y: (y[1], -(omega**2) * np.sin(y[0]) - (loss + drag * abs(y[1])) * y[1]),
+        (0.0, 90.0),
+        (1.1, 0.0),
+        t_eval=time_s,
+        rtol=1e-9,
+        atol=1e-10,
+    )
+    noise = 4e-3 * np.random.default_rng(8).standard_normal(len(time_s))
+    begun = beginning_of(
+        Recording(time_s, solved.y[1] + noise, "reading", metadata={"unit": "rad/s"})
+    )
+    assert begun.known is not None
+    effect, start = begun.known
+    assert effect.identifier == "circular-error"
+    assert start[OMEGA] == pytest.approx(omega, rel=1e-3)

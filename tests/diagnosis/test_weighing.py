@@ -116,3 +116,18 @@ def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
     for name in ("a", "b", "c", "frequency"):
         alone, given = diagnosis.baseline.parameters[name], diagnosis.improved.parameters[name]
         assert abs(given.value - alone.value) < 0.1 * given.sd
+
+
+def test_each_of_several_names_is_less_certain_than_one() -> None:
+    """The same effect with the same gain, where one name, and where three, leave only noise."""
+    found = jumped().search
+    (step,) = found.steps
+    alone = weigh(found, jumped().beginning, step).weights
+    others = [
+        replace(step, rivals=(rival(by_identifier(name), 50.0),))
+        for name in ("impulse", "second-mode")
+    ]
+    # The comparison of one step does not look at what the others explain.
+    several = replace(found, steps=(step, *others))
+    doubted = weigh(several, jumped().beginning, step).weights
+    assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)

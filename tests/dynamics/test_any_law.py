@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
-from pendpipe.dynamics.any_law import Clock, Law, Motion, NoMotionError, Tangent, follow
+from pendpipe.dynamics.any_law import (
+    Clock,
+    Law,
+    Motion,
+    NoMotionError,
+    StopsError,
+    Tangent,
+    follow,
+)
 from pendpipe.dynamics.sampling import sample_motion
 from pendpipe.effects import Pendulum
 
@@ -176,3 +184,26 @@ def test_nodes_integrate_polynomials_of_the_phase_exactly() -> None:
         found = clock.integral(clock.psi**power)
         exact = clock.psi ** (power + 1) / (power + 1)
         np.testing.assert_allclose(found, exact, 0.0, 1e-13 * exact.max())
+
+
+def test_what_comes_after_the_last_reading_is_of_no_consequence() -> None:
+    """Friction stops it after 30 half cycles: a clock of 60 has the first 20 of one of 20."""
+    start, count = 0.15, 30
+    coulomb = start / (count * math.pi / OMEGA)
+    pendulum = Pendulum(OMEGA, 0.0, 0.0, 0.0, coulomb)
+    short = eq8_motion(pendulum, start, 20)
+    until = float(short.time_s[-1, -1])
+    whole = follow(
+        pendulum.acceleration, OMEGA, start, 0.0, undamped(Clock(60), start), until_s=until
+    )
+    time = np.arange(0.0, until, 0.037)
+    one, other = (sample_motion(motion, time).angle for motion in (short, whole))
+    assert np.max(np.abs(one - other)) < 1e-6 * start
+
+
+def test_a_pendulum_that_stops_before_the_last_reading_is_refused() -> None:
+    """Friction stops it after 30 half cycles, and 50 are read."""
+    pendulum = Pendulum(OMEGA, 0.0, 0.0, 0.0, 0.15 / (30.0 * math.pi / OMEGA))
+    clock, until = Clock(60), 50.0 * math.pi / OMEGA
+    with pytest.raises(StopsError):
+        follow(pendulum.acceleration, OMEGA, 0.15, 0.0, undamped(clock, 0.15), until_s=until)

@@ -250,7 +250,7 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     if len(found.steps) == 1 and _same(gain, step) and not is_gross(without, found.data):
         return without, step.rivals
     # Refit what was behind in the search, but not far: noise and other effects have changed.
-    hopeless = step.winner.evidence - class_width(step.winner) - 2.0 * NEAR
+    hopeless = step.winner.evidence - 2.0 * (class_width(step.winner) + NEAR)
     scale = Scale.of(found.improved, found.data, found.noise)
     useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
     if found.remainder.systematic:
