@@ -201,9 +201,8 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     densities, pulls = [], []
     for number, whitening in enumerate(fit.data.whitening):
         part = slice(number * rows, (number + 1) * rows)
-        slope, off = fit.jacobian[part], fit.residuals[part]
-        left = np.eye(rows) - slope @ fit.covariance @ slope.T
-        left = 0.5 * (left + left.T) + 1e-12 * np.eye(rows)
+        root, off = fit.jacobian[part] @ fit.root, fit.residuals[part]
+        left = (1.0 + 1e-12) * np.eye(rows) - root @ root.T
         size = float(off @ np.linalg.solve(left, off))
         scale = np.linalg.slogdet(whitening @ whitening.T)[1]
         densities.append(

@@ -126,11 +126,16 @@ class JointFit:
         return len(self.residuals) - len(self.unknowns)
 
     @cached_property
+    def root(self) -> FloatArray:
+        """A square root of the covariance, from the Jacobian itself: no variance is negative."""
+        _, sizes, directions = np.linalg.svd(self.jacobian, full_matrices=False)
+        # What no record depends on gets a huge error, not a division by zero.
+        return np.asarray(directions.T / np.sqrt(sizes**2 + 1e-12))
+
+    @cached_property
     def covariance(self) -> FloatArray:
         """Of the unknowns."""
-        information = self.jacobian.T @ self.jacobian
-        # What no record depends on gets a huge error, not a division by zero.
-        return np.asarray(np.linalg.inv(information + 1e-12 * np.eye(len(information))))
+        return np.asarray(self.root @ self.root.T)
 
     def estimate(self, number: int, unit: str, scale: float, about: float = 0.0) -> Estimate:
         """One unknown as an estimate of ``about + scale u``."""
