@@ -1,6 +1,5 @@
 """Compile the engine while the package is built, so that nobody's first fit waits for it."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,11 +13,12 @@ class BuildWithMachineCode(build_py):
 
     def run(self) -> None:
         """Compile, in a process of its own; then build as ever."""
-        # sys.path holds pip's own environment for the build, and the compiler with it.
-        source = str(Path(__file__).parent / "src")
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join([source, *sys.path])}
-        command = [sys.executable, "-m", "pendpipe.warm_up", "ship"]
-        if subprocess.run(command, env=environment, check=False).returncode:
+        # sys.path holds pip's own environment for the build, and the compiler with it. Given as
+        # PYTHONPATH it would lose the sources where an editable installation names them as well.
+        paths = [str(Path(__file__).parent / "src"), *sys.path]
+        code = f"import sys; sys.path[:] = {paths!r}; from pendpipe import warm_up; warm_up.ship()"
+        command = [sys.executable, "-c", code]
+        if subprocess.run(command, check=False).returncode:
             print("no machine code was made: the first fit will compile", file=sys.stderr)
         super().run()
 
