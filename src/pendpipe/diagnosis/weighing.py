@@ -39,6 +39,7 @@ names were right, 76 % of those beside another, 45 % of those beside two."""
 _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
 _RANDOM: Final = ("jitter", "broadband-drive")
+"""Faults that count as names: a random cause can take what a wrong name leaves."""
 _SEEN_IN_RESIDUAL: Final = (*_RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
 _LIKELIER: Final = 1.5
@@ -199,8 +200,6 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
         doubt *= finding.confirmed.p_value
     # Effects that give exactly the same codes are equally probable.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
-    if finding.identifier in _RANDOM:
-        doubt *= math.exp(0.5 * _charge_for_several(found))
     if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
     return FoundEffect(

@@ -265,7 +265,6 @@ class Model:
         """
         omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
         law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
-        until = math.inf if self.half_cycles is not None else float(self.time_s[-1])
         motion = self._smooth(law, value)
         self._last["motion"] = motion
         pieces = [(-math.inf, motion)]
@@ -278,9 +277,16 @@ class Model:
                 log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
                 by_log[whole:] += log[0]
                 by_time[whole:] += late[0]
-                motion = follow(law, omega, start, begin, motion, (by_log, by_time), until_s=until)
+                motion = follow(
+                    law, omega, start, begin, motion, (by_log, by_time), until_s=self._until_s
+                )
             pieces.append((kick.time_s, motion))
         return pieces
+
+    @property
+    def _until_s(self) -> float:
+        """When the motion may end: after the last reading, unless half cycles are asked for."""
+        return math.inf if self.half_cycles is not None else float(self.time_s[-1])
 
     @property
     def _nodes(self) -> int:
@@ -312,16 +318,15 @@ class Model:
     def _from_guesses(self, law: Law, value: FloatArray, clock: Clock) -> Motion:
         """Begin with the last motion, if it was on this clock; else with the closed form."""
         start = (float(value[OMEGA]), float(value[START]), float(value[TIME]))
-        until = math.inf if self.half_cycles is not None else float(self.time_s[-1])
         last = self._last.get("motion")
         if last is not None and last.clock == clock:
             try:
-                return follow(law, *start, last, until_s=until)
+                return follow(law, *start, last, until_s=self._until_s)
             except StopsError:
                 raise
             except NoMotionError:
                 pass
-        return follow(law, *start, closed_form(value, clock), until_s=until)
+        return follow(law, *start, closed_form(value, clock), until_s=self._until_s)
 
     def evaluate(self, value: FloatArray) -> Evaluated:
         """Return readings, and what the derivatives need."""
