@@ -16,8 +16,6 @@ from pendpipe.arrays import BoolArray, FloatArray
 
 _SLACK: Final = 1e-9
 """Rounding error of the gradient."""
-_BEYOND: Final = 1e-9
-"""Standard deviations by which rounding may put a step beyond its bound."""
 _SINGULAR: Final = 1e12
 """Of the scaled inverse: beyond, it is mostly rounding."""
 
@@ -244,6 +242,7 @@ CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
 _FAR: Final = 8.0
 """Standard deviations from which a bound is out of sight."""
+_ROUNDS: Final = 60
 
 
 def intervals95(
@@ -309,35 +308,16 @@ def _profiled_end(
 ) -> float:
     """One end of an interval that a bound takes part in, at most `reach` away.
 
-    The end is found as if nothing were bounded; what then lies beyond its bound is put there, and
-    what its bound holds back no more is let go, until the end stays.
+    chi^2 is a convex function of the distance, the others following within their bounds: Newton's
+    steps come from beyond the end and never pass it.
     """
-    room, on = bounds.about(value), dict[int, float]()
-    low, high = sorted((0.0, reach))
-    low, high = max(low, float(room.lower[index])), min(high, float(room.upper[index]))
-    others = [j for j in range(len(value)) if j not in held and j != index]
-    for _ in range(3 * len(value)):
-        free = [j for j in others if j not in on] + [index]
-        step = np.zeros(len(value))
-        step[list(on)] = list(on.values())
-        pulled = gradient - normal @ step
-        risen = float(step @ normal @ step - 2.0 * gradient @ step)
-        block = normal[np.ix_(free, free)]
-        best = solved(block, pulled[free])
-        follow = solved(block, (np.array(free) == index).astype(np.float64))
-        left = CHI2_95 - risen + float(pulled[free] @ best)
-        end = float(best[-1]) + math.copysign(math.sqrt(max(left * follow[-1], 0.0)), reach)
-        end = min(max(end, low), high)
-        step[free] = best + follow / follow[-1] * (end - best[-1])
-        slope = normal @ step - gradient
-        idle = [j for j, wall in on.items() if (slope[j] < 0.0) == (wall == room.lower[j])]
-        beyond = np.maximum(room.lower - step, step - room.upper) * np.sqrt(normal.diagonal())
-        worst = max(free[:-1], key=lambda j: float(beyond[j]), default=index)
-        if idle:
-            del on[idle[0]]
-        elif worst != index and beyond[worst] > _BEYOND:
-            walls = room.lower if step[worst] < room.lower[worst] else room.upper
-            on[worst] = float(walls[worst])
-        else:
+    room = bounds.about(value)
+    end = max(reach, float(room.lower[index])) if reach < 0.0 else min(reach, room.upper[index])
+    for _ in range(_ROUNDS):
+        step = bounded_step(normal, gradient - end * normal[:, index], room, (*held, index))
+        step[index] = end
+        beyond = float(step @ normal @ step - 2.0 * gradient @ step) - CHI2_95
+        if beyond < 1e-9:
             break
-    return float(value[index]) + end
+        end -= 0.5 * beyond / float(normal[index] @ step - gradient[index])
+    return float(value[index] + end)
