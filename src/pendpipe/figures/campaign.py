@@ -1,15 +1,14 @@
 """All the figures of a campaign, and which of them could not be drawn."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
@@ -17,11 +16,11 @@ from pendpipe.figures.data import (
     Entry,
     NothingToDrawError,
     branches,
-    curve,
     error,
     number,
     of_branch,
     series,
+    theory,
     typical_record,
     used,
 )
@@ -31,17 +30,23 @@ from pendpipe.figures.style import (
     GREEN,
     GREY,
     INK,
+    RESIDUALS_BELOW,
     VERMILION,
-    WIDTH_IN,
+    Mark,
+    Panel,
+    band,
     branch,
-    figure_with_residuals,
-    key_above,
-    panels,
+    curve,
+    figure_of,
+    level,
+    logarithmic,
+    measured,
     placeholder,
-    plain_numbers,
     save,
     second_scale,
+    strip,
     styled,
+    words,
 )
 from pendpipe.files import read_json
 from pendpipe.quantities import axis_unit, prefixed, with_error
@@ -181,35 +186,29 @@ def draw_fig03(calibration: Mapping[str, Any] | None) -> Figure:
         [[point.get(name) or 0.0 for name in columns] for point in calibration["points"]]
     ).T
     slope, offset = number(calibration["volts_per_radian"]), number(calibration["offset_volts"])
-    residual = volts - offset - slope * angle
-    residual_sd = np.hypot(volts_sd, slope * angle_sd)
+    residual = 1e3 * (volts - offset - slope * angle)
+    residual_sd = 1e3 * np.hypot(volts_sd, slope * angle_sd)
     turn, unit = axis_unit(angle, "rad")
-
-    figure, upper, lower = figure_with_residuals()
     ends = 1.06 * np.array([np.min(angle), np.max(angle)])
-    label = f"line: {with_error(slope, error(calibration['volts_per_radian']), 'V/rad')}"
-    upper.plot(turn * ends, offset + slope * ends, color=INK, zorder=3, label=label)
-    upper.errorbar(
-        turn * angle,
-        volts,
-        volts_sd,
-        turn * angle_sd,
-        fmt="o",
-        color=BLUE,
-        markersize=4.5,
-        label=f"caliper run, {len(angle)} positions",
+    line = f"line: {with_error(slope, error(calibration['volts_per_radian']), 'V/rad')}"
+    run = f"caliper run, {len(angle)} positions"
+    return figure_of(
+        4.4,
+        Panel(
+            [
+                curve(turn * ends, offset + slope * ends, zorder=3, label=line),
+                measured(turn * angle, volts, volts_sd, turn * angle_sd, label=run),
+            ],
+            {"ylabel": "Sensor output (V)"},
+            key=2,
+        ),
+        Panel(
+            [level(0.0), measured(turn * angle, residual, residual_sd, markersize=3.5)],
+            {"xlabel": f"Angle ({unit})", "ylabel": "Data − line (mV)", "ymargin": 0.25},
+            note=_linearity(calibration),
+        ),
+        shares=RESIDUALS_BELOW,
     )
-    upper.set_ylabel("Sensor output (V)")
-    key_above(upper)
-    lower.errorbar(
-        turn * angle, 1e3 * residual, 1e3 * residual_sd, fmt="o", color=BLUE, markersize=3.5
-    )
-    lower.set(xlabel=f"Angle ({unit})", ylabel="Data − line (mV)")
-    lower.margins(y=0.25)
-    verdict = _linearity(calibration)
-    if verdict:
-        lower.set_title(verdict, fontsize=8.5, pad=3)
-    return figure
 
 
 def _linearity(calibration: Mapping[str, Any]) -> str:
@@ -221,7 +220,8 @@ def _linearity(calibration: Mapping[str, Any]) -> str:
     return f"Linearity test: $p$ = {chance:.2g}, {verdict}"
 
 
-PERIODS_S = (15, 6, 4, 3, 2.5, 2, 1.5, 1)
+PERIODS_S: Final = (15.0, 6.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0)
+"""The periods that people think in."""
 
 
 @styled
@@ -235,53 +235,55 @@ def draw_fig04(comparison: Mapping[str, Any]) -> Figure:
     if not len(points.x) or not np.isfinite(coefficient):
         raise NothingToDrawError("the campaign has no benchmark in air")
     squared, squared_sd = points.x**2, 2.0 * points.x * points.x_sd
-
-    figure, upper, lower = figure_with_residuals(4.6)
+    per_line, spread = 100.0 / (coefficient * squared), 100.0 * error(fitted) / coefficient
     edge = 1.05 * float(np.max(squared))
-    label = f"$Q = k\\,f^{{\\,2}}$, $k$ = {with_error(coefficient, error(fitted), 's^2')}"
-    upper.plot([0.0, edge], [0.0, coefficient * edge], color=INK, label=label)
-    upper.errorbar(
-        squared,
-        points.y,
-        points.y_sd,
-        squared_sd,
-        fmt="^",
-        color=BLUE,
-        zorder=3,
-        label="in air",
-    )
-    upper.set(ylabel="Quality factor $Q$", xlim=(0.0, edge), ylim=(0.0, None))
-    upper.legend(loc="upper left")
-    # The periods that people think in.
-    periods = [period for period in PERIODS_S if period**-2.0 <= edge]
-    at = [period**-2.0 for period in periods]
-    second_scale(upper, "top", at, [f"{period:g}" for period in periods], "Period (s)")
-
-    line = coefficient * squared
-    lower.errorbar(
-        squared,
-        100.0 * (points.y / line - 1.0),
-        100.0 * points.y_sd / line,
-        fmt="^",
-        color=BLUE,
-        markersize=4.5,
-    )
-    band = 100.0 * error(fitted) / coefficient
-    lower.axhspan(-band, band, color=GREY, alpha=0.18, linewidth=0.0)
-    lower.set(xlabel="Frequency squared $f^{\\,2}$ (Hz²)", ylabel="Data over\nline − 1 (%)")
-    lower.margins(y=0.2)
+    line = f"$Q = k\\,f^{{\\,2}}$, $k$ = {with_error(coefficient, error(fitted), 's^2')}"
     exponent = (fitted or {}).get("free_exponent")
-    if exponent:
-        text = with_error(number(exponent), error(exponent))
-        label = f"With a free exponent: $Q \\propto f^{{\\,n}}$, $n$ = {text}"
-        lower.set_title(label, fontsize=8.5, pad=3)
-    return figure
+    free = with_error(number(exponent), error(exponent)) if exponent else ""
+    triangles = {"fmt": "^"}
+    return figure_of(
+        4.6,
+        Panel(
+            [
+                curve([0.0, edge], [0.0, coefficient * edge], label=line),
+                measured(
+                    squared,
+                    points.y,
+                    points.y_sd,
+                    squared_sd,
+                    zorder=3,
+                    label="in air",
+                    markersize=5.0,
+                    **triangles,
+                ),
+                methodcaller("legend", loc="upper left"),
+                second_scale(
+                    "top", np.power(PERIODS_S, -2.0), [f"{p:g}" for p in PERIODS_S], "Period (s)"
+                ),
+            ],
+            {"ylabel": "Quality factor $Q$", "xlim": (0.0, edge), "ylim": (0.0, None)},
+        ),
+        Panel(
+            [
+                level(0.0),
+                measured(squared, per_line * points.y - 100.0, per_line * points.y_sd, **triangles),
+                strip(-spread, spread),
+            ],
+            {
+                "xlabel": "Frequency squared $f^{\\,2}$ (Hz²)",
+                "ylabel": "Data over\nline − 1 (%)",
+                "ymargin": 0.2,
+            },
+            note=free and f"With a free exponent: $Q \\propto f^{{\\,n}}$, $n$ = {free}",
+        ),
+        shares=RESIDUALS_BELOW,
+    )
 
 
-CAUSES: Final = {
-    "buoyancy": ("buoyancy", BLUE, (5, 2)),
-    "added_mass": ("added mass", GREEN, (1.5, 1.5)),
-    "both": ("both", INK, ()),
+CAUSES: Final[dict[str, tuple[str, str, Any]]] = {
+    "buoyancy": ("buoyancy", BLUE, (0, (5, 2))),
+    "added_mass": ("added mass", GREEN, (0, (1.5, 1.5))),
+    "both": ("both", INK, "-"),
 }
 _SHIFTS_PERCENT: Final = (1, 2, 5, 10, 20, 40, 60, 70, 80)
 
@@ -290,148 +292,124 @@ _SHIFTS_PERCENT: Final = (1, 2, 5, 10, 20, 40, 60, 70, 80)
 def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
     """Draw the relative lengthening of the period against frequency, cause by cause."""
     names = branches(comparison)
-    figure, axes = panels(3.8)
-    for name in names:
-        marker = branch(name).marker
-        for cause, (_, colour, dashes) in CAUSES.items():
-            frequency, value = curve(comparison, name, f"lengthening_{cause}")
-            axes.plot(frequency, 100.0 * value, color=colour, dashes=dashes or (None, None))
-            dots = [
-                (e["frequency"]["value"], 100.0 * e["lengthening"][cause])
-                for e in of_branch(comparison, name)
-                if e.get("lengthening") and e.get("frequency")
-            ]
-            axes.plot(*np.array(dots).reshape(-1, 2).T, marker, color=colour, markersize=4.5)
-    axes.set(
-        yscale="log",
-        xlabel="Frequency (Hz)",
-        ylabel="Lengthening of the period (%)",
-        xlim=(0.0, None),
-    )
-    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
-    axes.tick_params(which="minor", length=0)
-    # The same as a lowering of the frequency: T up by x means f down by x/(1 + x).
-    low, high = axes.get_ylim()
-    lowered = [p for p in _SHIFTS_PERCENT if low <= 100.0 * p / (100.0 - p) <= high]
-    at = [100.0 * p / (100.0 - p) for p in lowered]
-    label = "Lowering of the frequency (%)"
-    second_scale(axes, "right", at, [str(p) for p in lowered], label)
-    _keys(axes, names)
-    return figure
-
-
-def _keys(axes: Any, names: list[str]) -> None:
-    """Causes by colour and dashes, branches by symbol."""
     causes = [
-        Line2D([], [], color=colour, dashes=dashes or (None, None), label=text)
-        for text, colour, dashes in CAUSES.values()
+        mark for name in names for cause in CAUSES for mark in _cause(comparison, name, cause)
     ]
-    kinds = [
-        Line2D(
-            [],
-            [],
-            color=INK,
-            marker=branch(name).marker,
-            linestyle="",
-            markersize=4.5,
-            label=branch(name).name,
-        )
+    symbols = [
+        curve([], [], INK, "", marker=branch(name).marker, markersize=4.5, label=branch(name).name)
         for name in names
     ]
-    key_above(axes, 2, handles=causes + kinds)
+    # The same as a lowering of the frequency: T up by x means f down by x/(1 + x).
+    at = [100.0 * p / (100.0 - p) for p in _SHIFTS_PERCENT]
+    lowered = second_scale(
+        "right", at, [str(p) for p in _SHIFTS_PERCENT], "Lowering of the frequency (%)"
+    )
+    about = {
+        "xlabel": "Frequency (Hz)",
+        "ylabel": "Lengthening of the period (%)",
+        "xlim": (0.0, None),
+    }
+    scales = [logarithmic("y", 100.0), lowered]
+    return figure_of(3.8, Panel([*causes, *symbols, *scales], about, key=2))
+
+
+def _cause(comparison: Mapping[str, Any], name: str, cause: str) -> list[Mark]:
+    """One cause along a branch, and at the geometry of each of its records."""
+    text, colour, dashes = CAUSES[cause]
+    frequency, value = theory(comparison, name, f"lengthening_{cause}")
+    dots = [
+        (e["frequency"]["value"], 100.0 * e["lengthening"][cause])
+        for e in of_branch(comparison, name)
+        if e.get("lengthening") and e.get("frequency")
+    ]
+    x, y = np.array(dots).reshape(-1, 2).T
+    symbol: dict[str, Any] = {"marker": branch(name).marker, "markersize": 4.5}
+    label = text if name == branches(comparison)[0] else None
+    return [
+        curve(frequency, 100.0 * value, colour, dashes, label=label),
+        curve(x, y, colour, "", **symbol),
+    ]
 
 
 @styled
 def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     """Draw log10 Q_v against frequency: Eq. 16, steady Stokes flow, and what was measured."""
     names = branches(comparison)
-    figure, axes = panels(4.0)
-    for name in names:
-        look = branch(name)
-        frequency, steady = curve(comparison, name, "quality_factor_viscous_steady")
-        axes.plot(
-            frequency,
-            np.log10(steady),
+    marks = [mark for name in names for mark in _viscous(comparison, name)]
+    about = {
+        "xlabel": "Frequency (Hz)",
+        "ylabel": "$\\log_{10}\\, Q_v$",
+        "xlim": (0.0, None),
+    }
+    return figure_of(4.0, Panel(marks, about, key=len(names)))
+
+
+def _viscous(comparison: Mapping[str, Any], name: str) -> list[Mark]:
+    """Both theories of a branch, with the factor between them, and its records."""
+    look = branch(name)
+    frequency, steady = theory(comparison, name, "quality_factor_viscous_steady")
+    _, full = theory(comparison, name, "quality_factor_viscous_theory")
+    points = series(of_branch(comparison, name), "quality_factor_viscous")
+    middle = len(frequency) // 2
+    x, low, high = frequency[middle], np.log10(full[middle]), np.log10(steady[middle])
+    symbol: dict[str, Any] = {"markerfacecolor": "white", "markersize": 4.5}
+    arrow = {"arrowstyle": "->", "color": look.colour, "linewidth": 0.9, "shrinkB": 3.0}
+    return [
+        curve(
+            frequency, np.log10(steady), look.colour, "--", label=f"{name}: steady Stokes, Eq. 1"
+        ),
+        curve(frequency, np.log10(full), look.colour, label=f"{name}: with history term, Eq. 16"),
+        methodcaller("annotate", "", (x, low), (x, high), arrowprops=arrow),
+        words(
+            f"÷ {steady[middle] / full[middle]:.0f}",
+            (x, 0.5 * (low + high)),
+            (5.0, 0.0),
+            va="center",
             color=look.colour,
-            linestyle="--",
-            label=f"{name}: steady Stokes, Eq. 1",
-        )
-        _, full = curve(comparison, name, "quality_factor_viscous_theory")
-        axes.plot(
-            frequency, np.log10(full), color=look.colour, label=f"{name}: with history term, Eq. 16"
-        )
-        _say_how_many_times(axes, frequency, steady, full, look.colour)
-        points = series(of_branch(comparison, name), "quality_factor_viscous")
-        axes.errorbar(
+        ),
+        measured(
             points.x,
             np.log10(points.y),
             points.y_sd / (points.y * np.log(10.0)),
             points.x_sd,
+            look.colour,
             fmt=look.marker,
-            color=look.colour,
-            markerfacecolor="white",
-            markersize=4.5,
-            label=f"{name}: measured, Eq. 17",
-        )
-    axes.set(xlabel="Frequency (Hz)", ylabel="$\\log_{10}\\, Q_v$", xlim=(0.0, None))
-    handles, labels = axes.get_legend_handles_labels()
-    # A column of the key for each branch, theory before measurement.
-    order = sorted(range(len(labels)), key=lambda i: names.index(labels[i].partition(":")[0]))
-    key_above(
-        axes,
-        len(names),
-        handles=[handles[i] for i in order],
-        labels=[labels[i] for i in order],
-    )
-    return figure
-
-
-def _say_how_many_times(
-    axes: Axes, frequency: FloatArray, steady: FloatArray, full: FloatArray, colour: str
-) -> None:
-    """An arrow from one curve to the other, with the factor between them."""
-    middle = len(frequency) // 2
-    x, low, high = frequency[middle], np.log10(full[middle]), np.log10(steady[middle])
-    axes.annotate(
-        "",
-        (x, low),
-        (x, high),
-        arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 0.9, "shrinkB": 3.0},
-    )
-    axes.annotate(
-        f"÷ {steady[middle] / full[middle]:.0f}",
-        (x, 0.5 * (low + high)),
-        (5.0, 0.0),
-        textcoords="offset points",
-        va="center",
-        fontsize=8.5,
-        color=colour,
-    )
+            **symbol,
+        ),
+        # The key has a column for each branch, theory before measurement.
+        curve(
+            [], [], look.colour, "", marker=look.marker, label=f"{name}: measured, Eq. 17", **symbol
+        ),
+    ]
 
 
 @styled
 def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q with Eq. 16 and the hysteretic part together, and their ratio."""
-    figure, upper, lower = figure_with_residuals(4.8, residual_share=0.45, baseline=1.0)
-    draw_measured(upper, comparison)
-    for name in branches(comparison):
-        frequency, theory = curve(comparison, name, "quality_factor_limit_theory")
-        upper.plot(frequency, theory, color=branch(name).colour, zorder=1.5)
-    upper.plot([], [], color=INK, label="lines: Eq. 16 and hysteresis together")
-    upper.set(ylabel="Limiting quality factor $Q$", xlim=(0.0, None), ylim=(0.0, None))
-    key_above(upper, 1)
-
-    spread = _theory_spread(comparison)
-    lower.axhspan(1.0 - spread, 1.0 + spread, color=GREY, alpha=0.18, linewidth=0.0)
-    for name in branches(comparison):
-        _ratio(lower, comparison, name)
+    names, spread = branches(comparison), _theory_spread(comparison)
+    full = [
+        curve(*theory(comparison, name, "quality_factor_limit_theory"), branch(name).colour)
+        for name in names
+    ]
+    key = curve([], [], label="lines: Eq. 16 and hysteresis together")
     factor = comparison.get("theory_factor")
-    if factor and np.isfinite(number(factor)):
-        text = with_error(number(factor), error(factor))
-        lower.set_title(f"Drag measured over Eq. 16: {text}", fontsize=8.5, pad=3)
-    lower.set(xlabel="Frequency (Hz)", ylabel="Q, measured\nover theory")
-    lower.margins(y=0.15)
-    return figure
+    known = factor and np.isfinite(number(factor))
+    note = f"Drag measured over Eq. 16: {with_error(number(factor), error(factor))}"
+    about = {"ylabel": "Limiting quality factor $Q$", "xlim": (0.0, None), "ylim": (0.0, None)}
+    return figure_of(
+        4.8,
+        Panel([*limits_measured(comparison), *full, key], about, key=1),
+        Panel(
+            [
+                level(1.0),
+                strip(1.0 - spread, 1.0 + spread),
+                *(_ratio(comparison, name) for name in names),
+            ],
+            {"xlabel": "Frequency (Hz)", "ylabel": "Q, measured\nover theory", "ymargin": 0.15},
+            note=note if known else "",
+        ),
+        shares=(1.0, 0.45),
+    )
 
 
 @styled
@@ -440,109 +418,118 @@ def draw_causes(path: Path) -> Figure:
     patterns = read_json(path).get("patterns") if path.is_file() else None
     if not patterns:
         raise NothingToDrawError("the records were not diagnosed together")
-    figure = Figure(figsize=(WIDTH_IN, 5.0), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
     records = patterns["records"]
-    frequency = np.array([record["frequency_hz"] for record in records])
-    excess = np.array([record["excess"] for record in records])
-    span = max(1.6 * float(np.abs(excess).max()), 0.01)
-    names = list(dict.fromkeys(record["branch"] for record in records))
-    for axes, within in ((left, True), (right, False)):
-        shown = [cause for cause in patterns["causes"] if cause["in_class"] == within][:8]
-        for name in names:
-            # A line ends with its branch: the other one is another set of weights.
-            mine = [n for n, record in enumerate(records) if record["branch"] == name]
-            at = sorted(mine, key=frequency.__getitem__)
-            look = branch(name)
-            points = {"fmt": look.marker, "color": look.colour, "mfc": "none", "zorder": 3}
-            sds = [100.0 * records[number]["sd"] for number in at]
-            label = f"measured, {look.name}" if within else None
-            axes.errorbar(frequency[at], 100.0 * excess[at], sds, label=label, **points)
-            for colour, cause in enumerate(shown):
-                curve_ = 100.0 * np.array(cause["excess"])[at]
-                label = cause["name"] if name == names[0] else None
-                axes.plot(frequency[at], curve_, color=f"C{colour}", label=label)
-        axes.set(xlabel="Frequency (Hz)", ylim=(-10.0 * span, 110.0 * span))
-        axes.set_title("not told apart" if within else "rejected")
-        if shown:
-            axes.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.16))
-    left.set(ylabel="Viscous loss above Eq. 16 (%)")
-    return figure
+    span = max(1.6 * max(abs(record["excess"]) for record in records), 0.01)
+    limits = {"xlabel": "Frequency (Hz)", "ylim": (-10.0 * span, 110.0 * span)}
+    return figure_of(
+        5.0,
+        *(
+            Panel(
+                [*_in_class(patterns, within), methodcaller("set_title", title)],
+                {**limits, "ylabel": "Viscous loss above Eq. 16 (%)" if within else ""},
+            )
+            for within, title in ((True, "not told apart"), (False, "rejected"))
+        ),
+        across=True,
+    )
 
 
-def draw_measured(axes: Axes, comparison: Mapping[str, Any]) -> None:
-    """Draw the limiting Q of each branch with error bars."""
+def _in_class(patterns: Mapping[str, Any], within: bool) -> Iterator[Mark]:
+    """The records, and up to eight causes that are told apart from them or not."""
+    shown = [cause for cause in patterns["causes"] if cause["in_class"] == within][:8]
+    names = list(dict.fromkeys(record["branch"] for record in patterns["records"]))
+    for name in names:
+        # A line ends with its branch: the other one is another set of weights.
+        mine = [n for n, record in enumerate(patterns["records"]) if record["branch"] == name]
+        at = sorted(mine, key=lambda n: patterns["records"][n]["frequency_hz"])
+        own = [patterns["records"][n] for n in at]
+        look, frequency = branch(name), [record["frequency_hz"] for record in own]
+        yield measured(
+            frequency,
+            [100.0 * record["excess"] for record in own],
+            [100.0 * record["sd"] for record in own],
+            None,
+            look.colour,
+            label=f"measured, {look.name}" if within else None,
+            fmt=look.marker,
+            markersize=5.0,
+            mfc="none",
+            zorder=3,
+        )
+        for colour, cause in enumerate(shown):
+            label = cause["name"] if name == names[0] else None
+            excess = [100.0 * cause["excess"][n] for n in at]
+            yield curve(frequency, excess, f"C{colour}", label=label)
+    if shown:
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
+        yield methodcaller("legend", fontsize=6.5, **below)
+
+
+def limits_measured(comparison: Mapping[str, Any]) -> list[Mark]:
+    """The limiting Q of each branch with error bars."""
     names = branches(comparison)
     found = {n: series(of_branch(comparison, n), "quality_factor_limit") for n in names}
     if not any(len(points.x) for points in found.values()):
         raise NothingToDrawError("no record in a fluid has a limiting Q")
-    for name, points in found.items():
-        look = branch(name)
-        axes.errorbar(
+    return [
+        measured(
             points.x,
             points.y,
             points.y_sd,
             points.x_sd,
-            fmt=look.marker,
-            color=look.colour,
+            branch(name).colour,
+            fmt=branch(name).marker,
+            markersize=5.0,
             zorder=3,
-            label=f"measured, {look.name}",
+            label=f"measured, {branch(name).name}",
         )
+        for name, points in found.items()
+    ]
 
 
 def _theory_spread(comparison: Mapping[str, Any]) -> float:
     """Relative standard deviation of Eq. 16 itself, from distances and diameter."""
-    theory = [entry.get("quality_factor_viscous_theory") for entry in used(comparison)]
-    spreads = [error(entry) / number(entry) for entry in theory if entry and number(entry) > 0.0]
+    theories = [entry.get("quality_factor_viscous_theory") for entry in used(comparison)]
+    spreads = [error(entry) / number(entry) for entry in theories if entry and number(entry) > 0.0]
     return float(np.median(spreads)) if spreads else 0.0
 
 
-def _ratio(axes: Axes, comparison: Mapping[str, Any], name: str) -> None:
-    """Draw measured over theory; the theory at each record's own geometry."""
+def _ratio(comparison: Mapping[str, Any], name: str) -> Mark:
+    """Measured over theory; the theory at each record's own geometry."""
     look = branch(name)
     entries = [e for e in of_branch(comparison, name) if e.get("quality_factor_limit_theory")]
     points = series(entries, "quality_factor_limit")
-    theory = {e["record"]: number(e["quality_factor_limit_theory"]) for e in entries}
-    own = np.array([theory[record] for record in points.names])
-    axes.errorbar(
-        points.x,
-        points.y / own,
-        points.y_sd / own,
-        fmt=look.marker,
-        color=look.colour,
-        markersize=4.5,
-        ecolor=GREY,
-    )
+    of_each = {e["record"]: number(e["quality_factor_limit_theory"]) for e in entries}
+    own = np.array([of_each[record] for record in points.names])
+    symbol = {"fmt": look.marker, "ecolor": GREY}
+    return measured(points.x, points.y / own, points.y_sd / own, None, look.colour, **symbol)
 
 
 @styled
 def draw_fig10(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q with Eq. 16 alone, in red, beside the full theory."""
-    figure, axes = panels(4.1)
-    draw_measured(axes, comparison)
+    without: dict[str, Any] = {"colour": VERMILION, "dashes": "--", "width": 1.8}
+    marks = limits_measured(comparison)
     for name in branches(comparison):
-        frequency, full = curve(comparison, name, "quality_factor_limit_theory")
-        axes.plot(frequency, full, color=GREY, linewidth=1.0, zorder=1.2)
-        frequency, viscous = curve(comparison, name, "quality_factor_viscous_theory")
-        axes.plot(frequency, viscous, color=VERMILION, linestyle="--", linewidth=1.8, zorder=1.5)
-        axes.fill_between(frequency, full, viscous, color=VERMILION, alpha=0.10, linewidth=0.0)
-    axes.plot(
-        [],
-        [],
-        color=VERMILION,
-        linestyle="--",
-        linewidth=1.8,
-        label="Eq. 16 alone: hysteresis left out",
-    )
-    axes.plot([], [], color=GREY, linewidth=1.0, label="Eq. 16 and hysteresis together")
-    axes.set(
-        xlabel="Frequency (Hz)",
-        ylabel="Limiting quality factor $Q$",
-        xlim=(0.0, None),
-        ylim=(0.0, None),
-    )
-    key_above(axes, 1)
-    return figure
+        frequency, full = theory(comparison, name, "quality_factor_limit_theory")
+        _, viscous = theory(comparison, name, "quality_factor_viscous_theory")
+        half = 0.5 * (full - viscous)
+        marks += [
+            curve(frequency, full, GREY, width=1.0, zorder=1.2),
+            curve(frequency, viscous, zorder=1.5, **without),
+            band(frequency, viscous + half, half, VERMILION, alpha=0.10),
+        ]
+    marks += [
+        curve([], [], label="Eq. 16 alone: hysteresis left out", **without),
+        curve([], [], GREY, width=1.0, label="Eq. 16 and hysteresis together"),
+    ]
+    about = {
+        "xlabel": "Frequency (Hz)",
+        "ylabel": "Limiting quality factor $Q$",
+        "xlim": (0.0, None),
+        "ylim": (0.0, None),
+    }
+    return figure_of(4.1, Panel(marks, about, key=1))
 
 
 _UNITS: Final = {"a": "rad⁻¹ s⁻¹", "b": "s⁻¹", "c": "rad/s"}
@@ -559,37 +546,32 @@ def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
     """
     if not tail or len(tail) < 2:
         raise NothingToDrawError("there are no fits to tails")
-    figure, drawn = panels(5.0, 3, sharex=True)
     start = np.array([fit["start_s"] for fit in tail], dtype=np.float64)
-    for panel, name in zip(drawn, "abc", strict=True):
-        values = np.array([number(fit[name]) for fit in tail])
-        errors = np.array([error(fit[name]) for fit in tail])
-        factor, unit = axis_unit(values, _UNITS[name])
-        # The whole record's value with its 95 % band, against the tails' error bars.
-        panel.axhspan(
-            factor * (values[0] - 1.96 * errors[0]),
-            factor * (values[0] + 1.96 * errors[0]),
-            color=BLUE,
-            alpha=0.22,
-            linewidth=0.0,
-        )
-        panel.axhline(factor * values[0], color=BLUE, label="whole record, 95 % band")
-        panel.errorbar(
-            start[1:],
-            factor * values[1:],
-            factor * errors[1:],
-            fmt="o",
-            color=VERMILION,
-            markersize=4.5,
-            label="fit to the tail from here on",
-        )
-        panel.set_ylabel(f"${name}$ ({unit})")
-        panel.set_ylim(*(factor * end for end in _window(values, errors)))
-    drawn[-1].set_xlabel("Start of the fitted part (s)")
-    _amplitudes_on_top(drawn[0], tail, start)
-    key_above(drawn[0], 2, lift=1.28)
-    figure.align_ylabels(drawn)
-    return figure
+    first, second, third = (_rate(tail, name, start) for name in "abc")
+    return figure_of(
+        5.0,
+        first._replace(marks=[*first.marks, _amplitudes_on_top(tail, start)], key=2, lift=1.28),
+        second,
+        third._replace(about=third.about | {"xlabel": "Start of the fitted part (s)"}),
+    )
+
+
+def _rate(tail: Sequence[Mapping[str, Any]], name: str, start: FloatArray) -> Panel:
+    """A rate of the whole record with its 95 % band, against the tails' error bars."""
+    values = np.array([number(fit[name]) for fit in tail])
+    errors = np.array([error(fit[name]) for fit in tail])
+    factor, unit = axis_unit(values, _UNITS[name])
+    values, errors = factor * values, factor * errors
+    whole, reach = values[0], 1.96 * errors[0]
+    tails = {"fmt": "o", "label": "fit to the tail from here on"}
+    return Panel(
+        [
+            strip(whole - reach, whole + reach, BLUE, 0.22),
+            level(whole, BLUE, 1.4, label="whole record, 95 % band"),
+            measured(start[1:], values[1:], errors[1:], None, VERMILION, **tails),
+        ],
+        {"ylabel": f"${name}$ ({unit})", "ylim": _window(values, errors)},
+    )
 
 
 def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
@@ -605,7 +587,7 @@ def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
     return whole - half, whole + half
 
 
-def _amplitudes_on_top(panel: Any, tail: Sequence[Mapping[str, Any]], start: FloatArray) -> None:
+def _amplitudes_on_top(tail: Sequence[Mapping[str, Any]], start: FloatArray) -> Mark:
     """Mark round amplitudes where the decay passes them."""
     amplitude = np.array([number(fit["amplitude_rad"]) for fit in tail])
     factor, unit = prefixed(float(np.nanmax(amplitude)), "rad")
@@ -615,6 +597,6 @@ def _amplitudes_on_top(panel: Any, tail: Sequence[Mapping[str, Any]], start: Flo
     marks = marks[(marks >= np.min(shown)) & (marks <= np.max(shown))]
     order = np.argsort(shown)
     moments = np.interp(np.log(marks), np.log(shown[order]), start[order])
-    second_scale(
-        panel, "top", moments, [f"{mark:g}" for mark in marks], f"Amplitude there ({unit})"
+    return second_scale(
+        "top", moments, [f"{mark:g}" for mark in marks], f"Amplitude there ({unit})"
     )

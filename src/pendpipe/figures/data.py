@@ -85,12 +85,14 @@ def of_branch(comparison: Mapping[str, Any], name: str) -> list[Entry]:
     return [entry for entry in used(comparison) if entry.get("branch") == name]
 
 
-def curve(comparison: Mapping[str, Any], branch: str, quantity: str) -> tuple[FloatArray, ...]:
+def theory(
+    comparison: Mapping[str, Any], branch: str, quantity: str
+) -> tuple[FloatArray, FloatArray]:
     """Frequency and a quantity along a branch's theory curve, by rising frequency."""
     columns = comparison["curves"][branch]
     if not columns.get(quantity):
         raise NothingToDrawError(f"there is no theory curve of {quantity.replace('_', ' ')}")
-    return tuple(np.array(columns[name], dtype=np.float64) for name in ("frequency_hz", quantity))
+    return np.array(columns["frequency_hz"], float), np.array(columns[quantity], float)
 
 
 def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str, Any]:

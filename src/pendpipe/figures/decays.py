@@ -4,15 +4,14 @@ Each draws the law that was fitted, and names it in its key.
 """
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
@@ -27,16 +26,21 @@ from pendpipe.figures.style import (
     GREY,
     INK,
     PALE,
+    RESIDUALS_BELOW,
+    THIN,
     VERMILION,
+    Mark,
+    Panel,
     band,
-    figure_with_residuals,
-    key_above,
-    panels,
-    plain_numbers,
+    curve,
+    figure_of,
+    level,
+    logarithmic,
+    measured,
     plain_text,
-    points,
     quantity_of,
     styled,
+    words,
 )
 from pendpipe.files import without_folders
 from pendpipe.quantities import axis_unit, compact
@@ -161,52 +165,60 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
     scale = volts_per_radian if recording.quantity == "volts" and volts_per_radian else 1.0
     unit = recording.unit
     large, large_unit = axis_unit(recording.values[recording.usable], unit)
-    figure, upper, lower = figure_with_residuals(4.4)
     # Every sample is drawn; as pixels, since ten thousand line segments help nobody.
-    upper.plot(
-        recording.time_s,
-        large * recording.values,
-        color=PALE,
-        linewidth=0.6,
-        rasterized=True,
-        label=plain_text(f"all {len(recording)} samples of {decay.record}"),
+    samples = f"all {len(recording)} samples of {decay.record}"
+    look: dict[str, Any] = {"width": 0.6, "rasterized": True, "label": plain_text(samples)}
+    about = {"xlabel": "Time (s)", "xmargin": 0.01, "ymargin": 0.1}
+    return figure_of(
+        4.4,
+        Panel(
+            [
+                curve(recording.time_s, large * recording.values, PALE, **look),
+                *_fitted(decay, large * scale),
+            ],
+            {"ylabel": f"{'Sensor output' if unit == 'V' else 'Motion'} ({large_unit})"},
+            key=1,
+        ),
+        _residual(decay, about, scale=scale, unit=unit, markersize=2.0),
+        shares=RESIDUALS_BELOW,
     )
-    _fitted(upper, decay, large * scale)
-    upper.set(ylabel=f"{'Sensor output' if unit == 'V' else 'Motion'} ({large_unit})")
-    key_above(upper, 1)
-    _residual(lower, decay, scale=scale, unit=unit, size=2.0)
-    lower.set(xlabel="Time (s)")
-    lower.margins(x=0.01, y=0.1)
-    return figure
 
 
-def _fitted(axes: Axes, decay: Decay, factor: float) -> None:
-    """Draw the amplitude of the fitted law above and below the level."""
+def _fitted(decay: Decay, factor: float) -> list[Mark]:
+    """The amplitude of the fitted law above and below the level."""
     elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
     moment = decay.points.time_s[0] + elapsed
-    level = np.interp(moment, decay.points.time_s, decay.level_rad)
+    middle = np.interp(moment, decay.points.time_s, decay.level_rad)
     amplitude = decay.along(elapsed)[0]
-    for side, label in ((1.0, f"fitted amplitude, {decay.law_name}"), (-1.0, None)):
-        axes.plot(moment, factor * (level + side * amplitude), color=INK, label=label)
+    label = f"fitted amplitude, {decay.law_name}"
+    return [
+        curve(moment, factor * (middle + amplitude), label=label),
+        curve(moment, factor * (middle - amplitude)),
+    ]
 
 
 def _residual(
-    axes: Axes, decay: Decay, *, scale: float = 1.0, unit: str | None = None, size: float = 2.4
-) -> None:
-    """Draw the turning points less the fitted law."""
+    decay: Decay,
+    about: Mapping[str, Any],
+    *,
+    scale: float = 1.0,
+    unit: str | None = None,
+    **look: Any,
+) -> Panel:
+    """The turning points less the fitted law."""
     residual = scale * decay.residual_rad
     sd = abs(scale) * decay.points.angle_sd_rad
     factor, unit = axis_unit(np.abs(residual) + sd, unit or decay.points.unit)
-    points(axes, decay.points.time_s, factor * residual, factor * sd, size, **_as_pixels(decay))
-    axes.set_ylabel(f"Data − fit ({unit})")
+    points = measured(decay.points.time_s, factor * residual, factor * sd, **_many(decay) | look)
+    return Panel([level(0.0), points], {**about, "ylabel": f"Data − fit ({unit})"})
 
 
 MANY = 150
 """From this many points on they are drawn as pixels inside the SVG, to keep it small."""
 
 
-def _as_pixels(decay: Decay) -> dict[str, bool]:
-    return {"rasterized": len(decay.points) > MANY}
+def _many(decay: Decay) -> dict[str, Any]:
+    return {**THIN, "rasterized": len(decay.points) > MANY}
 
 
 @styled
@@ -215,52 +227,44 @@ def draw_fig08(decay: Decay) -> Figure:
     elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 400)
     quality, half_width = quality_with_band(decay, elapsed)
     moment = decay.points.time_s[0] + elapsed
-
-    figure, axes = panels(3.6)
-    band(axes, moment, quality, half_width, label="95 % band")
-    axes.plot(
-        moment, quality, color=BLUE, label=f"fitted law, {decay.law_name.replace('14', '15')}"
-    )
-    _measured_quality(axes, *local_quality(decay))
+    law = f"fitted law, {decay.law_name.replace('14', '15')}"
+    marks = [
+        band(moment, quality, half_width, label="95 % band"),
+        curve(moment, quality, BLUE, label=law),
+        _measured_quality(*local_quality(decay)),
+    ]
     top, limit = float(np.nanmax(quality)), decay.fit.quality_factor_limit
     if limit is not None and limit.value > 0.0:
         top = max(top, limit.value)
-        axes.axhline(limit.value, color=VERMILION, linestyle="--", linewidth=1.1)
-        axes.annotate(
-            f"limit for $a = c = 0$: {limit.value:.1f}",
-            (0.02, limit.value),
-            (0.0, 4.0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            color=VERMILION,
-            fontsize=8.5,
-        )
-        _mark_maximum(axes, decay, elapsed, quality)
-    axes.set(xlabel=plain_text(f"Time in {decay.record} (s)"), ylabel="Quality factor $Q$")
-    axes.set_ylim(0.0, 1.16 * top)
-    axes.margins(x=0.01)
-    key_above(axes, 2)
-    return figure
+        place = {"xycoords": ("axes fraction", "data"), "color": VERMILION}
+        name = f"limit for $a = c = 0$: {limit.value:.1f}"
+        marks += [
+            level(limit.value, VERMILION, 1.1, linestyle="--"),
+            words(name, (0.02, limit.value), (0.0, 4.0), **place),
+            *_maximum(decay, elapsed, quality),
+        ]
+    about = {
+        "xlabel": plain_text(f"Time in {decay.record} (s)"),
+        "ylabel": "Quality factor $Q$",
+        "ylim": (0.0, 1.16 * top),
+        "xmargin": 0.01,
+    }
+    return figure_of(3.6, Panel(marks, about, key=2))
 
 
-def _mark_maximum(axes: Axes, decay: Decay, elapsed_s: FloatArray, quality: FloatArray) -> None:
-    """Mark where Q is largest, if that lies inside the record."""
+def _maximum(decay: Decay, elapsed_s: FloatArray, quality: FloatArray) -> list[Mark]:
+    """Where Q is largest, if that lies inside the record."""
     index = int(np.nanargmax(quality))
     if index in (0, len(quality) - 1):
-        return
+        return []
     amplitude = float(decay.along(elapsed_s)[0][index])
-    top = (float(decay.points.time_s[0] + elapsed_s[index]), float(quality[index]))
-    axes.plot(*([each] for each in top), "D", color=BLUE, markersize=5, zorder=4)
-    axes.annotate(
-        f"maximum {top[1]:.1f}\nwhere $y$ = {compact(amplitude, decay.points.unit)}",
-        top,
-        (0.0, -30.0),
-        textcoords="offset points",
-        ha="center",
-        va="top",
-        fontsize=8.5,
-        arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7},
-    )
+    x, y = float(decay.points.time_s[0] + elapsed_s[index]), float(quality[index])
+    text = f"maximum {y:.1f}\nwhere $y$ = {compact(amplitude, decay.points.unit)}"
+    line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.7}
+    return [
+        curve([x], [y], BLUE, "", marker="D", markersize=5, zorder=4),
+        words(text, (x, y), (0.0, -30.0), ha="center", va="top", arrowprops=line),
+    ]
 
 
 def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -331,10 +335,9 @@ def local_quality(decay: Decay) -> LocalQuality:
     return LocalQuality(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
-def _measured_quality(axes: Axes, x: FloatArray, value: FloatArray, sd: FloatArray) -> None:
-    label = "turning points alone, no model"
-    look = {"color": INK, "markerfacecolor": "white", "capsize": 2.0, "elinewidth": 0.8}
-    points(axes, x, value, sd, 3.5, label=label, **look)
+def _measured_quality(x: FloatArray, value: FloatArray, sd: FloatArray) -> Mark:
+    look = {"markerfacecolor": "white", "markersize": 3.5, "capsize": 2.0, "elinewidth": 0.8}
+    return measured(x, value, sd, None, INK, label="turning points alone, no model", **look)
 
 
 _MARGINS: Final = {"top": 0.872, "bottom": 0.105, "hspace": 0.09}
@@ -349,43 +352,38 @@ def draw_decay(decay: Decay) -> Figure:
     elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
     unit = decay.points.unit
     factor, shown_unit = axis_unit(y, unit)
-    figure, upper, lower = figure_with_residuals(4.2, residual_share=0.5, margins=_MARGINS)
-    points(
-        upper, time, factor * y, factor * sd, label=f"{len(y)} turning points", **_as_pixels(decay)
-    )
-    for curve, misfit, name, colour, dashes in (
-        (decay.along(elapsed)[0], decay.residual_rad, decay.law_name, INK, "-"),
-        (start * np.exp(-rate * elapsed), y - linear, "linear damping", VERMILION, "--"),
-    ):
-        rms = compact(float(np.sqrt(np.mean(misfit**2))), unit)
-        upper.plot(
+    laws = [
+        curve(
             time[0] + elapsed,
-            factor * curve,
-            color=colour,
-            linestyle=dashes,
-            linewidth=1.1,
+            factor * values,
+            colour,
+            dashes,
+            1.1,
             zorder=3,
-            label=f"{name} (rms misfit {rms})",
+            label=f"{name} (rms misfit {compact(float(np.sqrt(np.mean(misfit**2))), unit)})",
         )
+        for values, misfit, name, colour, dashes in (
+            (decay.along(elapsed)[0], decay.residual_rad, decay.law_name, INK, "-"),
+            (start * np.exp(-rate * elapsed), y - linear, "linear damping", VERMILION, "--"),
+        )
+    ]
+    turned = measured(
+        time, factor * y, factor * sd, label=f"{len(y)} turning points", **_many(decay)
+    )
     # The logarithm of an amplitude within its own noise is chance.
     lowest = float(np.min(y, where=y > 2.0 * sd, initial=float(np.max(y))))
-    upper.set_yscale("log")
-    upper.set_ylim(0.75 * factor * lowest, 1.35 * factor * float(np.max(y)))
-    plain_numbers(upper.yaxis, _round_steps(*upper.get_ylim()))
-    upper.yaxis.set_minor_locator(NullLocator())
-    upper.set_ylabel(f"Amplitude ({shown_unit})")
-    key_above(upper, 2)
-    _residual(lower, decay)
-    lower.set(xlabel=plain_text(f"Time in {decay.record} (s)"))
-    lower.margins(x=0.015)
-    return figure
-
-
-def _round_steps(low: float, high: float) -> tuple[float, ...]:
-    """The numbers of a decade that an axis has room for."""
-    if high < 8.0 * low:
-        return (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
-    return (1.0,) if high > 1000.0 * low else (1.0, 2.0, 5.0)
+    ends = 0.75 * factor * lowest, 1.35 * factor * float(np.max(y))
+    return figure_of(
+        4.2,
+        Panel(
+            [turned, *laws, logarithmic("y", ends[1] / ends[0])],
+            {"ylim": ends, "ylabel": f"Amplitude ({shown_unit})"},
+            key=2,
+        ),
+        _residual(decay, {"xlabel": plain_text(f"Time in {decay.record} (s)"), "xmargin": 0.015}),
+        shares=(1.0, 0.5),
+        margins=_MARGINS,
+    )
 
 
 def fit_exponential(
@@ -441,21 +439,25 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     """
     unit = decay.points.unit
     factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
-    heights = {"height_ratios": [1.3, 0.7, 1.0]}
-    figure, (upper, rest, quality) = panels(6.6, 3, gridspec_kw=heights)
     time, values = _thinned(recording.time_s[recording.usable], recording.values[recording.usable])
-    upper.plot(time, factor * values, color=BLUE, linewidth=0.5, alpha=0.6, label="readings")
-    _fitted(upper, decay, factor)
-    upper.set(xlabel="Time (s)", ylabel=f"{quantity_of(unit)} ({shown_unit})")
-    key_above(upper, 2)
-    rest.axhline(0.0, color=INK, linewidth=0.9)
-    _residual(rest, decay)
-    rest.set(xlabel="Time (s)")
-    rest.sharex(upper)
-    _quality_by_amplitude(quality, decay, factor)
-    quality.set(xlabel=f"Amplitude ({shown_unit})", ylabel="Q", ylim=(0.0, None))
-    key_above(quality, 2)
-    return figure
+    readings = curve(time, factor * values, BLUE, width=0.5, alpha=0.6, label="readings")
+    about = {"xlabel": "Time (s)", "xlim": (float(time[0]), float(time[-1]))}
+    return figure_of(
+        6.6,
+        Panel(
+            [readings, *_fitted(decay, factor)],
+            about | {"ylabel": f"{quantity_of(unit)} ({shown_unit})"},
+            key=2,
+        ),
+        _residual(decay, about),
+        Panel(
+            _quality_by_amplitude(decay, factor),
+            {"xlabel": f"Amplitude ({shown_unit})", "ylabel": "Q", "ylim": (0.0, None)},
+            key=2,
+        ),
+        shares=(1.3, 0.7, 1.0),
+        sharex=False,
+    )
 
 
 def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -471,14 +473,14 @@ def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArr
     return time[kept], values[kept]
 
 
-def _quality_by_amplitude(axes: Axes, decay: Decay, factor: float) -> None:
+def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:
     amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
-    axes.plot(factor * amplitude, quality, color=INK, label="fitted law")
+    yield curve(factor * amplitude, quality, label="fitted law")
     seen = [(factor * y, quality.value, quality.sd) for y, quality in seen_qualities(decay.fit)]
-    _measured_quality(axes, *np.array(seen).reshape(-1, 3).T)
+    yield _measured_quality(*np.array(seen).reshape(-1, 3).T)
     limit = decay.fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):
-        axes.axhline(limit.value, color=GREY, linestyle=":", label="limit πf/b")
-    if np.max(amplitude) > 5.0 * np.min(amplitude):
-        axes.set_xscale("log")
-        plain_numbers(axes.xaxis, (1.0, 2.0, 5.0))
+        yield level(limit.value, GREY, 1.4, linestyle=":", label="limit πf/b")
+    fall = float(np.max(amplitude) / np.min(amplitude))
+    if fall > 5.0:
+        yield logarithmic("x", fall)

@@ -2,14 +2,14 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter
@@ -30,15 +30,20 @@ from pendpipe.figures.style import (
     GREEN,
     GREY,
     INK,
+    THIN,
     VERMILION,
+    Mark,
+    Panel,
     band,
-    key_above,
-    panels,
-    plain_numbers,
-    points,
+    curve,
+    figure_of,
+    level,
+    logarithmic,
+    measured,
     quantity_of,
     save,
     styled,
+    words,
 )
 from pendpipe.quantities import axis_unit, compact, prefixed, pretty_unit
 
@@ -91,6 +96,10 @@ class Shown:
         left = self.data.residual(fit.at.reading)
         return np.where(self.data.weight > 0.0, left, math.nan)
 
+    def rms(self, fit: Fit) -> str:
+        """The residual's root mean square, for people."""
+        return compact(math.sqrt(float(np.nanmean(self.residual(fit) ** 2))), self.data.unit)
+
     @cached_property
     def _measured(self) -> tuple[Cycles, list[int]]:
         """The cycles of the readings, and those between which they are compared."""
@@ -129,30 +138,35 @@ _CYCLES: Final = 4.0
 @styled
 def draw_decay(content: Shown) -> Figure:
     """Draw the amplitude's decay, the last cycles, and the residuals against time."""
-    data = content.data
-    figure, (decay, end, rest) = panels(5.4, 3)
+    data, time = content.data, content.data.time_s
     values = np.where(data.weight > 0.0, data.values, np.nan)
     factor, unit = axis_unit(values, data.unit)
     # The last cycles are where a wrong model is most out of phase.
-    last = data.time_s > data.time_s[-1] - _CYCLES * content.baseline.at.span.period_s
-    decay.plot(data.time_s, factor * values, color=GREY, linewidth=0.4, label="readings")
-    end.plot(data.time_s[last], factor * values[last], "o", color=GREY, markersize=2.0)
+    last = time > time[-1] - _CYCLES * content.baseline.at.span.period_s
     residuals = [content.residual(fit) for _, fit in content.models]
     small, small_unit = axis_unit(np.stack(residuals), data.unit)
-    rest.axhline(0.0, color=INK, linewidth=0.8)
+    dots: dict[str, Any] = {"marker": "o", "markersize": 2.0}
+    decay = [curve(time, factor * values, GREY, width=0.4, label="readings")]
+    end = [curve(time[last], factor * values[last], GREY, "", **dots)]
+    rest = [level(0.0, width=0.8)]
     for (name, fit), colour, residual in zip(content.models, COLOURS, residuals, strict=False):
         middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
-        for side, label in ((1.0, name), (-1.0, None)):
-            outline = factor * (middle + side * fit.at.sampled.amplitude)
-            decay.plot(data.time_s, outline, color=colour, linewidth=1.2, label=label)
-        end.plot(data.time_s[last], factor * fit.at.reading[last], color=colour, linewidth=1.0)
-        rest.plot(data.time_s, small * residual, ".", color=colour, markersize=1.5)
+        high, low = (middle + side * fit.at.sampled.amplitude for side in (1.0, -1.0))
+        decay += [
+            curve(time, factor * high, colour, width=1.2, label=name),
+            curve(time, factor * low, colour, width=1.2),
+        ]
+        end.append(curve(time[last], factor * fit.at.reading[last], colour, width=1.0))
+        rest.append(curve(time, small * residual, colour, "", marker=".", markersize=1.5))
     label = f"{quantity_of(data.unit)} ({unit})"
-    decay.set(ylabel=label)
-    key_above(decay, 3)
-    end.set(title="The last cycles", xlabel="Time (s)", ylabel=label)
-    rest.set(xlabel="Time (s)", ylabel=f"Readings − model ({small_unit})")
-    return figure
+    below = {"xlabel": "Time (s)", "ylabel": f"Readings − model ({small_unit})"}
+    return figure_of(
+        5.4,
+        Panel(decay, {"ylabel": label}, key=3),
+        Panel(end, {"title": "The last cycles", "xlabel": "Time (s)", "ylabel": label}),
+        Panel(rest, below),
+        sharex=False,
+    )
 
 
 PHASES: Final = 24
@@ -171,34 +185,42 @@ def draw_residual_map(content: Shown) -> Figure:
     """Draw mean residuals over their standard errors, the baseline's and the extended model's."""
     maps = [residual_map(content, fit) for _, fit in content.models]
     largest = max([4.0] + [float(np.nanmax(np.abs(each))) for each in maps])
-    norm = AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest)
     height = 2.0 * len(maps) + 0.95
     ticks = _ticks(largest)
     labels = [f"{tick:+.0f}".replace("-", "−") if tick else "0" for tick in ticks]
     right = 0.845 - _CHARACTER * max(max(map(len, labels)) - 3, 0)
     margins = {"bottom": 0.46 / height, "top": 1.0 - 0.28 / height, "hspace": 0.28}
-    margins |= {"left": 0.105, "right": right}
-    figure, drawn = panels(height, len(maps), margins, sharex=True, squeeze=False)
-    rows, time = drawn[:, 0], content.data.time_s
-    for axes, (name, fit), values in zip(rows, content.models, maps, strict=True):
-        image = axes.imshow(
-            values,
-            norm=norm,
-            cmap=_COLOURS,
-            aspect="auto",
-            origin="lower",
-            interpolation="nearest",
-            extent=(float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
+    time = content.data.time_s
+    look = {
+        "norm": AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest),
+        "cmap": _COLOURS,
+        "aspect": "auto",
+        "origin": "lower",
+        "interpolation": "nearest",
+        "extent": (float(time[0]), float(time[-1]), 0.0, 2.0 * math.pi),
+    }
+    rows = [
+        Panel(
+            [methodcaller("imshow", values, **look), methodcaller("grid", visible=False)],
+            {
+                "yticks": np.linspace(0.0, 2.0 * math.pi, 5),
+                "yticklabels": ["0", "π/2", "π", "3π/2", "2π"],
+                "title": f"{name}: residual {content.rms(fit)} rms",
+            },
         )
-        axes.grid(visible=False)
-        axes.set_yticks(np.linspace(0.0, 2.0 * math.pi, 5), ["0", "π/2", "π", "3π/2", "2π"])
+        for (name, fit), values in zip(content.models, maps, strict=True)
+    ]
+    figure = figure_of(height, *rows, margins=margins | {"left": 0.105, "right": right})
+    for axes in figure.axes:
         axes.set_ylabel("Phase of the cycle", labelpad=1)
-        rms = math.sqrt(float(np.nanmean(content.residual(fit) ** 2)))
-        axes.set_title(f"{name}: residual {compact(rms, content.data.unit)} rms")
-    rows[-1].set_xlabel("Time (s)")
-    low = rows[-1].get_position().y0
-    place = figure.add_axes((right + 0.02, low, 0.02, rows[0].get_position().y1 - low))
-    bar = figure.colorbar(image, cax=place, ticks=ticks, format=FixedFormatter(labels))
+    figure.axes[-1].set_xlabel("Time (s)")
+    low, high = figure.axes[-1].get_position().y0, figure.axes[0].get_position().y1
+    bar = figure.colorbar(
+        figure.axes[0].images[0],
+        cax=figure.add_axes((right + 0.02, low, 0.02, high - low)),
+        ticks=ticks,
+        format=FixedFormatter(labels),
+    )
     bar.ax.minorticks_off()
     bar.set_label("Data − model (standard errors)", labelpad=1)
     return figure
@@ -246,50 +268,42 @@ _HARMONICS: Final = 8
 def draw_residual_spectrum(content: Shown) -> Figure:
     """Draw the amplitude spectral density of what each model leaves."""
     spectra = [spectrum(content, fit) for _, fit in content.models]
-    frequency, level = spectra[0][0], noise_level(content, spectra[0][0])
+    frequency, floor = spectra[0][0], noise_level(content, spectra[0][0])
     highest = float(max(np.max(density) for _, density in spectra))
     factor, unit = prefixed(highest, content.data.unit)
-    figure, axes = panels(3.3, margins={"bottom": 0.14, "top": 0.8})
     looks = zip(content.models, spectra, COLOURS, (1.3, 0.8), strict=False)
-    for (name, _), (_, density), colour, width in looks:
-        axes.plot(frequency, factor * density, color=colour, linewidth=width, label=name)
-    axes.plot(frequency, factor * level, color=INK, linestyle="--", linewidth=1.1, label="noise")
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="Frequency (Hz)",
-        ylabel=f"Residual, density ({unit}/√Hz)",
-        xlim=(float(frequency[0]), float(frequency[-1])),
-        ylim=(0.1 * factor * float(np.min(level)), 2.0 * factor * highest),
+    marks = [
+        curve(frequency, factor * density, colour, width=width, label=name)
+        for (name, _), (_, density), colour, width in looks
+    ]
+    ends = float(frequency[0]), float(frequency[-1])
+    marks += [
+        curve(frequency, factor * floor, INK, "--", 1.1, label="noise"),
+        *_harmonics(content, *ends),
+        logarithmic("x"),
+        logarithmic("y"),
+    ]
+    about = {
+        "xlabel": "Frequency (Hz)",
+        "ylabel": f"Residual, density ({unit}/√Hz)",
+        "xlim": ends,
+        "ylim": (0.1 * factor * float(np.min(floor)), 2.0 * factor * highest),
+    }
+    return figure_of(
+        3.3, Panel(marks, about, key=2, lift=1.06), margins={"bottom": 0.14, "top": 0.8}
     )
-    for axis in (axes.xaxis, axes.yaxis):
-        plain_numbers(axis)
-    axes.tick_params(which="minor", length=0)
-    _mark_harmonics(axes, content)
-    key_above(axes, 2, lift=1.06)
-    return figure
 
 
-def _mark_harmonics(axes: Axes, content: Shown) -> None:
+def _harmonics(content: Shown, low: float, high: float) -> Iterator[Mark]:
     """A thin line at each multiple of the motion's frequency."""
     motion = float((content.extended or content.baseline).value[OMEGA]) / (2.0 * math.pi)
-    low, high = axes.get_xlim()
+    place = {"xycoords": ("data", "axes fraction"), "ha": "center", "color": GREY}
     for harmonic in range(1, _HARMONICS + 1):
         line = harmonic * motion
-        if not low < line < high:
-            continue
-        axes.axvline(line, color=GREY, linewidth=0.6, linestyle=":", zorder=0)
-        if harmonic in (1, 2, 3, 5, 8):
-            axes.annotate(
-                f"{harmonic}",
-                (line, 1.0),
-                (0.0, 2.0),
-                xycoords=("data", "axes fraction"),
-                textcoords="offset points",
-                ha="center",
-                fontsize=7.5,
-                color=GREY,
-            )
+        if low < line < high:
+            yield methodcaller("axvline", line, color=GREY, linewidth=0.6, linestyle=":", zorder=0)
+        if low < line < high and harmonic in (1, 2, 3, 5, 8):
+            yield words(f"{harmonic}", (line, 1.0), (0.0, 2.0), fontsize=7.5, **place)
 
 
 def spectrum(content: Shown, fit: Fit) -> tuple[FloatArray, FloatArray]:
@@ -339,49 +353,45 @@ Curves = list[tuple[str, str, str, Spans]]
 @styled
 def draw_damping(content: Shown) -> Figure:
     """Draw 1/Q of each span of cycles, and by how much it differs from the baseline's."""
-    measured, omega = content.measured, float(content.baseline.value[OMEGA])
-    margins = {"bottom": 0.11, "top": 0.885, "hspace": 0.1}
-    rows = {"sharex": True, "gridspec_kw": {"height_ratios": [1.0, 0.8]}}
-    figure, (upper, lower) = panels(4.2, 2, margins, **rows)
+    found, omega = content.measured, float(content.baseline.value[OMEGA])
     curves = _models(content)
-    quality_sd = 2.0 * measured.loss_sd / omega
+    quality_sd = 2.0 * found.loss_sd / omega
     expected = 2.0 * curves[0][3].loss / omega
-    power, factor = _power(np.concatenate([2.0 * measured.loss / omega - expected, quality_sd]))
-    _against_amplitude(
-        upper, content, curves, lambda spans: 2e3 * spans.loss / omega, 1e3 * quality_sd
+    power, factor = _power(np.concatenate([2.0 * found.loss / omega - expected, quality_sd]))
+    upper = _against_amplitude(
+        content, curves, lambda spans: 2e3 * spans.loss / omega, 1e3 * quality_sd
     )
-    upper.set(xlabel="", ylabel="Loss 1/Q (10⁻³)")
-    _against_amplitude(
-        lower,
+    lower = _against_amplitude(
         content,
         curves,
         lambda spans: factor * (2.0 * spans.loss / omega - expected),
         factor * quality_sd,
     )
-    lower.set_ylabel(f"1/Q − {content.baseline_name}'s ({power})")
-    key_above(upper, 3 if content.extended is None else 2)
-    figure.align_ylabels([upper, lower])
-    return figure
+    off = f"1/Q − {content.baseline_name}'s ({power})"
+    return figure_of(
+        4.2,
+        upper._replace(about={"ylabel": "Loss 1/Q (10⁻³)"}),
+        lower._replace(about=lower.about | {"ylabel": off}, key=0),
+        shares=(1.0, 0.8),
+        margins={"bottom": 0.11, "top": 0.885, "hspace": 0.1},
+    )
 
 
 @styled
 def draw_frequency(content: Shown) -> Figure:
     """Draw the frequency of each span of cycles, relative to the baseline's omega/(2 pi)."""
-    measured = content.measured
+    found = content.measured
     origin = float(content.baseline.value[OMEGA]) / (2.0 * math.pi)
-    shift_sd = measured.frequency_sd_hz / origin
-    power, factor = _power(np.concatenate([measured.frequency_hz / origin - 1.0, shift_sd]))
-    figure, axes = panels(3.2, margins={"bottom": 0.145, "top": 0.84})
-    _against_amplitude(
-        axes,
+    shift_sd = found.frequency_sd_hz / origin
+    power, factor = _power(np.concatenate([found.frequency_hz / origin - 1.0, shift_sd]))
+    shifts = _against_amplitude(
         content,
         _models(content),
         lambda spans: factor * (spans.frequency_hz / origin - 1.0),
         factor * shift_sd,
     )
-    axes.set_ylabel(f"Frequency change from {origin:.5g} Hz ({power})")
-    key_above(axes, 3 if content.extended is None else 2)
-    return figure
+    about = shifts.about | {"ylabel": f"Frequency change from {origin:.5g} Hz ({power})"}
+    return figure_of(3.2, shifts._replace(about=about), margins={"bottom": 0.145, "top": 0.84})
 
 
 def _models(content: Shown) -> Curves:
@@ -394,28 +404,24 @@ def _models(content: Shown) -> Curves:
 
 
 def _against_amplitude(
-    axes: Axes,
     content: Shown,
     curves: Curves,
     quantity: Callable[[Spans], FloatArray],
     sd: FloatArray,
-) -> None:
-    """Draw a quantity of the readings' spans, with its error, and of each model's."""
+) -> Panel:
+    """A quantity of the readings' spans, with its error, and of each model's."""
     across, unit = axis_unit(content.measured.amplitude, content.data.unit)
     x = across * content.measured.amplitude
-    points(axes, x, quantity(content.measured), sd, 3.2, elinewidth=0.7, label="readings")
-    for name, colour, dashes, spans in curves:
-        axes.plot(x, quantity(spans), color=colour, linestyle=dashes, label=name, linewidth=1.2)
-    axes.set_xlabel(f"Amplitude ({unit})")
+    look: dict[str, Any] = THIN | {"markersize": 3.2, "elinewidth": 0.7, "label": "readings"}
+    marks = [measured(x, quantity(content.measured), sd, **look)]
+    marks += [
+        curve(x, quantity(spans), colour, dashes, 1.2, label=name)
+        for name, colour, dashes, spans in curves
+    ]
     fall = float(np.max(x)) / float(np.min(x))
-    if fall < 3.0:
-        return
-    axes.set_xscale("log")
-    few = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
-    plain_numbers(
-        axes.xaxis, (1.0, 3.0) if fall > 100.0 else (1.0, 2.0, 5.0) if fall > 10.0 else few
-    )
-    axes.tick_params(which="minor", length=0)
+    if fall >= 3.0:
+        marks.append(logarithmic("x", fall))
+    return Panel(marks, {"xlabel": f"Amplitude ({unit})"}, key=2 if content.extended else 3)
 
 
 def _power(values: FloatArray) -> tuple[str, float]:
@@ -434,53 +440,45 @@ def draw_curve(content: Shown) -> Figure:
     unnamed = [effect for effect in content.diagnosis.effects if effect.curve is not None]
     if not unnamed:
         raise NothingToDrawError("every effect has a name")
-    rows = sum(1 + ("local_exponent" in (effect.curve or {})) for effect in unnamed)
-    height = 2.7 * rows
+    below = [panel for effect in unnamed for panel in _curves(effect.name, effect.curve or {})]
+    height = 2.7 * len(below)
     margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
-    figure, drawn = panels(height, rows, margins, squeeze=False)
-    below = iter(drawn[:, 0])
-    for effect in unnamed:
-        panel, curve = next(below), effect.curve or {}
-        at, argument = _scaled(curve["at"], curve["argument"])
-        _curve(panel, at, curve)
-        panel.set(xlabel=argument, xmargin=0.01)
-        if not panel.get_legend():
-            panel.set_title(effect.name[:1].upper() + effect.name[1:])
-        if "local_exponent" in curve:
-            panel = next(below)
-            _exponent(panel, at, curve)
-            panel.set(xlabel=argument, xmargin=0.01)
-    return figure
+    return figure_of(height, *below, margins=margins, sharex=False)
 
 
-def _curve(axes: Axes, at: FloatArray, curve: Mapping[str, Any]) -> None:
-    """Draw a curve, or its two parts: in phase and in quadrature."""
+def _curves(effect: str, drawn: Mapping[str, Any]) -> Iterator[Panel]:
+    """A curve, or its two parts (in phase and in quadrature); and its local exponent."""
+    at, argument = _scaled(drawn["at"], drawn["argument"])
     looks = [("value", "sd", BLUE, "-", "in phase")]
-    if "quadrature" in curve:
+    if "quadrature" in drawn:
         looks.append(("quadrature", "quadrature_sd", GREEN, "--", "in quadrature"))
-    name, _, unit = str(curve["ordinate"]).replace("omega^2", "ω²").partition(", ")
-    largest = max(float(np.max(np.abs(curve[key]))) for key, *_ in looks)
+    name, _, unit = str(drawn["ordinate"]).replace("omega^2", "ω²").partition(", ")
+    largest = max(float(np.max(np.abs(drawn[key]))) for key, *_ in looks)
     factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
-    axes.axhline(0.0, color=INK, linewidth=0.9)
+    marks = [level(0.0)]
     for key, sd, colour, dashes, label in looks:
-        value = factor * np.asarray(curve[key])
-        band(axes, at, value, 1.96 * factor * np.asarray(curve[sd]), colour)
-        axes.plot(at, value, color=colour, linestyle=dashes, label=label)
+        value = factor * np.asarray(drawn[key])
+        marks += [
+            band(at, value, 1.96 * factor * np.asarray(drawn[sd]), colour),
+            curve(at, value, colour, dashes, label=label),
+        ]
     label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
-    axes.set_ylabel("\n".join(textwrap.wrap(label, 30)))
+    about = {"xlabel": argument, "xmargin": 0.01}
+    own = about | {"ylabel": "\n".join(textwrap.wrap(label, 30))}
     if len(looks) > 1:
-        key_above(axes, 2)
-
-
-def _exponent(axes: Axes, at: FloatArray, curve: Mapping[str, Any]) -> None:
-    """Draw the power of the velocity that the whole loss follows, by amplitude."""
-    value = np.asarray(curve["local_exponent"])
-    band(axes, at, value, 1.96 * np.asarray(curve["local_exponent_sd"]))
-    axes.plot(at, value, color=BLUE)
-    for power in (0, 1, 2):
-        axes.axhline(power, color=INK, linewidth=0.6, linestyle=":")
-    axes.set_ylabel("Local exponent $n$ of |v|ⁿ")
-    axes.set_ylim(max(float(np.min(value)) - 1.0, -2.0), min(float(np.max(value)) + 1.0, 5.0))
+        yield Panel(marks, own, key=2)
+    else:
+        yield Panel(marks, own | {"title": effect[:1].upper() + effect[1:]})
+    if "local_exponent" in drawn:
+        # The power of the velocity that the whole loss follows, by amplitude.
+        value = np.asarray(drawn["local_exponent"])
+        reach = 1.96 * np.asarray(drawn["local_exponent_sd"])
+        powers = [level(power, width=0.6, linestyle=":") for power in (0, 1, 2)]
+        ends = max(float(np.min(value)) - 1.0, -2.0), min(float(np.max(value)) + 1.0, 5.0)
+        yield Panel(
+            [band(at, value, reach), curve(at, value, BLUE), *powers],
+            about | {"ylabel": "Local exponent $n$ of |v|ⁿ", "ylim": ends},
+        )
 
 
 def _scaled(at: object, argument: str) -> tuple[FloatArray, str]:
@@ -520,15 +518,21 @@ def draw_codes(content: Shown) -> Figure:
     given, _ = np.histogram(codes, edges)
     wanted, _ = np.histogram(expected, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    figure, axes = panels(3.0, margins={"bottom": 0.15, "top": 0.86})
-    axes.bar(middle, given, width=group, color=BLUE, linewidth=0.0, label="readings")
-    axes.step(middle, wanted, where="mid", color=INK, linewidth=0.9, label="expected")
-    for code in marked[:200]:
-        axes.axvline(code, color=VERMILION, linewidth=0.8, zorder=0)
-    axes.set(xlabel="Code (0: nearest to a reading of zero)", ylabel="Readings")
-    axes.margins(x=0.0)
-    key_above(axes, 2)
-    return figure
+    bars = {"width": group, "color": BLUE, "linewidth": 0.0, "label": "readings"}
+    counted: list[Mark] = [
+        methodcaller("bar", middle, given, **bars),
+        curve(middle, wanted, width=0.9, drawstyle="steps-mid", label="expected"),
+    ]
+    look = {"color": VERMILION, "linewidth": 0.8, "zorder": 0}
+    marks = [methodcaller("axvline", code, **look) for code in marked[:200]]
+    about = {
+        "xlabel": "Code (0: nearest to a reading of zero)",
+        "ylabel": "Readings",
+        "xmargin": 0.0,
+    }
+    return figure_of(
+        3.0, Panel([*counted, *marks], about, key=2), margins={"bottom": 0.15, "top": 0.86}
+    )
 
 
 DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {

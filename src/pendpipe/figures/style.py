@@ -5,8 +5,9 @@ dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import wraps
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, ParamSpec
 
@@ -100,33 +101,116 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     return inside
 
 
-def panels(
-    height_in: float = 3.5, rows: int = 1, margins: Mapping[str, float] | None = None, **grid: Any
-) -> tuple[Figure, Any]:
-    """A figure, and its axes or the array of them, one below the other.
+Mark = Callable[[Axes], Any]
+"""One thing that a panel shows: it draws itself on axes."""
+THIN: Final[dict[str, Any]] = {"capsize": 0.0, "elinewidth": 0.6, "markersize": 2.4}
+"""The look of many measured points."""
 
-    It is laid out so that nothing is cut off, or with fixed `margins`: four times faster, for
-    the figures that every record has.
+
+def curve(
+    x: Any, y: Any, colour: str = INK, dashes: Any = "-", width: float = 1.4, **look: Any
+) -> Mark:
+    """A line; with a marker, and "" for dashes, points without errors."""
+    return methodcaller("plot", x, y, color=colour, linestyle=dashes, linewidth=width, **look)
+
+
+def measured(x: Any, y: Any, sd: Any, x_sd: Any = None, colour: str = BLUE, **look: Any) -> Mark:
+    """Measured points with their error bars."""
+    look = {"fmt": "o", "markersize": 4.5, "color": colour} | look
+    return methodcaller("errorbar", x, y, sd, x_sd, **look)
+
+
+def band(x: FloatArray, y: FloatArray, half: FloatArray, colour: str = BLUE, **look: Any) -> Mark:
+    """The band of a curve's uncertainty."""
+    look = {"color": colour, "alpha": 0.22, "linewidth": 0.0} | look
+    return methodcaller("fill_between", x, y - half, y + half, **look)
+
+
+def level(y: float, colour: str = INK, width: float = 0.9, **look: Any) -> Mark:
+    """A line across the panel."""
+    return methodcaller("axhline", y, color=colour, linewidth=width, **look)
+
+
+def strip(low: float, high: float, colour: str = GREY, alpha: float = 0.18) -> Mark:
+    """The uncertainty of a level, across the panel."""
+    return methodcaller("axhspan", low, high, color=colour, alpha=alpha, linewidth=0.0)
+
+
+def words(text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> Mark:
+    """Words, some points off a place."""
+    look = {"fontsize": 8.5, "textcoords": "offset points"} | look
+    return methodcaller("annotate", text, at, off, **look)
+
+
+RESIDUALS_BELOW: Final = (1.0, 0.4)
+"""Heights of a panel for data and fit, and of one below for how they differ."""
+
+
+class Panel(NamedTuple):
+    """What one pair of axes shows.
+
+    Parameters
+    ----------
+    marks
+        What is drawn, in turn.
+    about
+        What `Axes.set` takes: labels, limits, scales, margins.
+    key
+        Columns of the legend above, where it can't hide data; 0 for none.
+    lift
+        How high that stands, over the height of the axes.
+    note
+        A line in smaller letters above.
+    """
+
+    marks: Iterable[Mark]
+    about: dict[str, Any]
+    key: int = 0
+    lift: float = 1.0
+    note: str = ""
+
+
+def figure_of(
+    height_in: float,
+    *panels: Panel,
+    shares: Sequence[float] | None = None,
+    margins: Mapping[str, float] | None = None,
+    sharex: bool = True,
+    across: bool = False,
+) -> Figure:
+    """Draw panels.
+
+    Parameters
+    ----------
+    height_in
+        Of the figure, in inches.
+    panels
+        From the top down; side by side if they stand `across`.
+    shares
+        Their heights, relative to each other.
+    margins
+        By default it is laid out so that nothing is cut off. With fixed margins it is four times
+        faster, for the figures that every record has.
+    sharex
+        Whether panels below each other have one scale.
     """
     figure = Figure(figsize=(WIDTH_IN, height_in), layout=None if margins else "constrained")
     if margins:
         figure.subplots_adjust(**{"left": 0.135, "right": 0.975, **margins})
-    return figure, figure.subplots(rows, 1, **grid)
-
-
-def figure_with_residuals(
-    height_in: float = 4.4,
-    *,
-    margins: Mapping[str, float] | None = None,
-    residual_share: float = 0.4,
-    baseline: float = 0.0,
-) -> tuple[Figure, Axes, Axes]:
-    """A figure with a panel for data and fit, and one below for how they differ."""
-    shares = {"height_ratios": [1.0, residual_share]}
-    figure, (upper, lower) = panels(height_in, 2, margins, sharex=True, gridspec_kw=shares)
-    figure.align_ylabels([upper, lower])
-    lower.axhline(baseline, color=INK, linewidth=0.9)
-    return figure, upper, lower
+    rows, columns = (1, len(panels)) if across else (len(panels), 1)
+    common = {"sharey": True} if across else {"sharex": sharex, "height_ratios": shares}
+    grid = figure.subplots(rows, columns, squeeze=False, **common)
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        for mark in panel.marks:
+            mark(axes)
+        axes.set(**panel.about)
+        if panel.note:
+            axes.set_title(panel.note, fontsize=8.5, pad=3)
+        if panel.key:
+            above: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, panel.lift)}
+            axes.legend(ncols=panel.key, borderaxespad=0.3, **above)
+    figure.align_ylabels()
+    return figure
 
 
 def quantity_of(unit: str) -> str:
@@ -134,45 +218,39 @@ def quantity_of(unit: str) -> str:
     return {"rad": "Angle", "m": "Displacement"}.get(unit, "Reading")
 
 
-def points(
-    axes: Axes, x: FloatArray, y: FloatArray, sd: FloatArray, size: float = 2.4, **look: Any
-) -> None:
-    """Draw many measured points with thin error bars."""
-    look = {"fmt": "o", "color": BLUE, "capsize": 0.0, "elinewidth": 0.6, **look}
-    axes.errorbar(x, y, sd, markersize=size, **look)
+def logarithmic(axis: Literal["x", "y"], span: float | None = None) -> Mark:
+    """A logarithmic axis with 0.5, 1, 2, 5, ... instead of powers of ten.
 
+    `span`, the highest over the lowest value, tells how many of a decade it has room for.
+    """
 
-def band(
-    axes: Axes, x: FloatArray, y: FloatArray, half: FloatArray, colour: str = BLUE, **look: Any
-) -> None:
-    """Draw the band of a curve's uncertainty."""
-    axes.fill_between(x, y - half, y + half, color=colour, alpha=0.22, linewidth=0.0, **look)
+    def scale(axes: Axes) -> None:
+        axes.set(**{f"{axis}scale": "log"})
+        own: Axis = getattr(axes, f"{axis}axis")
+        if span is not None:
+            few, many = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+            own.set_major_locator(LogLocator(subs=many if span < 10.0 else few))
+        own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        own.set_minor_formatter(NullFormatter())
+        own.set_tick_params(which="minor", length=0)
 
-
-def plain_numbers(axis: Axis, steps: Sequence[float] | None = None) -> None:
-    """Write 0.5, 1, 2, 5, ... on a logarithmic axis instead of powers of ten."""
-    if steps is not None:
-        axis.set_major_locator(LogLocator(subs=steps))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def key_above(axes: Axes, columns: int = 2, *, lift: float = 1.0, **entries: Any) -> None:
-    """Put the legend above the axes, where it can't hide data."""
-    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, lift)}
-    axes.legend(ncols=columns, borderaxespad=0.3, **place, **entries)
+    return scale
 
 
 def second_scale(
-    axes: Any, side: Literal["top", "right"], at: Sequence[float], marks: Sequence[str], label: str
-) -> None:
-    """Mark the same axis in other units along the upper or the right edge."""
+    side: Literal["top", "right"], at: Any, numbers: Sequence[str], label: str
+) -> Mark:
+    """The same axis in other units, along the upper or the right edge."""
     letter = "x" if side == "top" else "y"
-    scale = getattr(axes, f"secondary_{letter}axis")(side)
-    getattr(scale, f"set_{letter}ticks")(at, marks)
-    getattr(scale, f"{letter}axis").set_minor_locator(NullLocator())
-    getattr(scale, f"set_{letter}label")(label, labelpad=3)
-    scale.spines[side].set_visible(True)
+
+    def scale(axes: Axes) -> None:
+        other = getattr(axes, f"secondary_{letter}axis")(side)
+        other.set(**{f"{letter}ticks": at, f"{letter}ticklabels": numbers})
+        getattr(other, f"{letter}axis").set_minor_locator(NullLocator())
+        getattr(other, f"set_{letter}label")(label, labelpad=3)
+        other.spines[side].set_visible(True)
+
+    return scale
 
 
 def plain_text(text: str) -> str:
