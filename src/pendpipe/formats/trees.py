@@ -1,13 +1,12 @@
 """Files of named arrays: HDF5 (and MATLAB 7.3), MATLAB, NumPy, JSON, TDMS, sound.
 
-MATLAB's versions 4 to 7 are read here and not by scipy, whose reader trusts the sizes in a file, so
+MATLAB's versions 5 to 7 are read here and not by scipy, whose reader trusts the sizes in a file, so
 that a damaged one makes it crash. Layout after MathWorks' "MAT-File Format", version 5: elements of
 a type, a byte count and the data, padded to eight bytes; arrays are elements that hold elements.
 """
 
 import io
 import json
-import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +21,14 @@ import numpy as np
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.samples import swing_of
-from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, most_unpacked
+from pendpipe.formats.table import (
+    Column,
+    NotThisFormatError,
+    ReadOptions,
+    Table,
+    most_unpacked,
+    next_reader_if,
+)
 from pendpipe.formats.text import column_of_clock_times, table_of_text
 from pendpipe.formats.words import role_of, split_header
 
@@ -309,15 +315,14 @@ _CELL, _STRUCT, _CHARACTERS = 1, 2, 4
 _NUMERIC: Final = range(6, 16)
 _COMPLEX: Final = 0x0800
 _DEEPEST: Final = 32
-
-
-class DamagedError(ValueError):
-    """The file's tags contradict one another."""
+_LAST_TYPE_4: Final = 51
+"""Of version 4: an array of bytes that is a text."""
 
 
 def _damaged_if(wrong: object, problem: str) -> None:
+    """Refuse a file whose tags contradict one another."""
     if wrong:
-        raise DamagedError(problem)
+        raise ValueError(problem)
 
 
 def is_matlab(data: bytes) -> bool:
@@ -331,7 +336,7 @@ def tree_of(data: bytes) -> dict[str, Any]:
 
     Raises
     ------
-    DamagedError
+    ValueError
         When a size or a type can't be true.
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128], "")
@@ -410,33 +415,21 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
 
 
 def tree_of_version_4(data: bytes) -> dict[str, Any]:
-    """Read the variables of a file of version 4.
-
-    Each has five words (type, rows, columns, whether complex, length of the name), its name and
-    its numbers. Type MOPT has the byte order in its thousands, 0 in its hundreds, the kind of
-    number in its tens, and 0 for a full matrix in its ones.
+    """Read the variables of a file of version 4, which scipy reads without compiled code.
 
     Raises
     ------
     NotThisFormatError
         When the file is none of that version.
     """
-    tree, at = {}, 0
-    while at < len(data):
-        try:
-            kind, rows, columns, is_complex, length = struct.unpack_from("<5I", data, at)
-            name = re.fullmatch(rb"(\w{1,63})\0", data[at + 20 : at + 20 + length])
-            stored = {0: "f8", 10: "f4", 20: "i4", 30: "i2", 40: "u2", 50: "u1"}[kind]
-            count = rows * columns * (1 + is_complex)
-            values = np.frombuffer(data, "<" + stored, count, at + 20 + length)
-        except (struct.error, KeyError, ValueError):
-            name = None
-        if name is None or is_complex > 1:
-            raise NotThisFormatError("the file does not begin with 'MATLAB 5.0'")
-        if not is_complex:
-            tree[name[1].decode()] = values.reshape(rows, columns, order="F")
-        at += 20 + length + values.nbytes
-    return tree
+    type_of_first = int.from_bytes(data[:4], "little")
+    next_reader_if(type_of_first > _LAST_TYPE_4, "the file does not begin with 'MATLAB 5.0'")
+    from scipy.io import loadmat
+
+    try:
+        return dict(loadmat(io.BytesIO(data)))  # type: ignore[arg-type]
+    except Exception as fault:
+        raise NotThisFormatError(f"it is no file of MATLAB 4 ({fault})") from None
 
 
 _Reader = Callable[[Path, bytes, str, ReadOptions], Table]
