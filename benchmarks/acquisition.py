@@ -32,12 +32,11 @@ from benchmarks.acquisition_speed import speed_table
 from benchmarks.faulty_device import Fault, FaultyPath, acquire_faulty
 from benchmarks.fuzz import fuzz_table
 from benchmarks.fuzz_seeds import windaq
-from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.decode import decode_recording, find_clock_losses
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.simulated import acquire_simulated
-from pendpipe.acquisition.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read

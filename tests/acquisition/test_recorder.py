@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.decode import decode_recording, find_clock_losses
 from pendpipe.acquisition.drivers.decoders import Scans
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
 from pendpipe.acquisition.recorder import NoiseWatch, ProgressLine
 from pendpipe.acquisition.simulated import acquire_simulated
-from pendpipe.acquisition.timebase import find_clock_losses
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.acquisition.timebase import find_clock_losses, measure_rate
+from pendpipe.acquisition.decode import find_clock_losses, measure_rate
 
 
 @given(

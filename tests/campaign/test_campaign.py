@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 from pendpipe import physics
-from pendpipe.campaign.answer import next_measurements
-from pendpipe.campaign.diagnose import global_p_value, held_out, local_scores, search
-from pendpipe.campaign.effects import CATALOGUE
+from pendpipe.campaign.design import height_sd
+from pendpipe.campaign.diagnose import (
+    global_p_value,
+    held_out,
+    local_scores,
+    next_measurements,
+    search,
+)
+from pendpipe.campaign.effects import CATALOGUE, Surface, confined
 from pendpipe.campaign.fit import (
     Candidate,
     candidates,
@@ -19,7 +25,6 @@ from pendpipe.campaign.fit import (
     only,
     predict,
 )
-from pendpipe.campaign.walls import Surface, confined, height_sd
 
 from .campaigns import data, default
 

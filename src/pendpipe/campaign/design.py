@@ -15,10 +15,9 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.walls import height_sd
 from pendpipe.configuration.apparatus import fluid_at
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Apparatus, Fluid
+from pendpipe.configuration.models import Apparatus, Fluid, Tank
 
 AIR_DRAG_RELATIVE_SD = 0.1
 """Of the drag that weights and rod meet in air: each weight counts as the sphere of its area."""
@@ -94,6 +93,15 @@ class Inputs:
     inertia_exponent: FloatArray
     higher: FloatArray
     """Of the sphere in the tank, in depths of the fluid."""
+
+
+def height_sd(tank: Tank) -> float:
+    """Standard uncertainty of the sphere's height in depths of the fluid.
+
+    Half the depth stays half the depth, however deep the fluid is.
+    """
+    height = 0.0 if tank.height_m is None else tank.height_m
+    return float(np.hypot(tank.height_sd_m, height / tank.depth_m * tank.depth_sd_m)) / tank.depth_m
 
 
 @dataclass(frozen=True)

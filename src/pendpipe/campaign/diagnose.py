@@ -1,16 +1,28 @@
-"""What a campaign's model lacks: tested over the catalogue, refitted, named as a class."""
+"""What a campaign's model lacks: tested over the catalogue, refitted, named as a class.
+
+The answer is campaign_diagnosis.json and its paragraph. With it goes what each cause alone would do
+to the records, and which further runs would tell the rivals of a class apart.
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.design import Design
-from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit
+from pendpipe.campaign.design import Design, Run
+from pendpipe.campaign.fit import (
+    Candidate,
+    JointFit,
+    Measured,
+    candidates,
+    chi2_near,
+    joint_fit,
+    predict,
+)
 from pendpipe.estimate import chi_square_p_value
 
 CLASS_CHI2: Final = 6.0
@@ -210,3 +222,382 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
         )
         pulls.append(math.copysign(math.sqrt(size / rows), float(off[-1])))
     return np.array(densities), -np.array(pulls)
+
+
+_CLAMPED_ANEW_M: Final = 1e-9
+"""A place this far away is the same place with an error of its own."""
+_GLYCEROL: Final = {"viscosity_pa_s": 5.6e-3, "density_kg_per_m3": 1122.0}
+"""Half glycerol, half water by mass at 20 C: about 5 mm^2/s."""
+
+
+def _fluid(run: Run, changes: dict[str, float]) -> Run:
+    return replace(run, fluid=run.fluid.model_copy(update=changes) if run.fluid else None)
+
+
+RUNS: Final[dict[str, Callable[[Run], Run]]] = {
+    "a large and deep tank": lambda run: replace(run, tank=False),
+    "half glycerol, half water": lambda run: _fluid(run, _GLYCEROL),
+    "half glycerol, half water in a large and deep tank": lambda run: replace(
+        _fluid(run, _GLYCEROL), tank=False
+    ),
+    "the bare screw in the water": lambda run: replace(run, sphere=False),
+    "the same settings without water": lambda run: replace(run, fluid=None),
+    "releases at 10 mrad": lambda run: replace(run, release_rad=0.010),
+    "a lid on the water": lambda run: replace(run, open_surface=False),
+    "the reversed order": lambda run: replace(run, order=-run.order),
+    "water at 35 °C": lambda run: replace(run, temperature_c=35.0),
+    "the same records once more": lambda run: run,
+}
+"""Candidates: what each does to every record in the fluid."""
+
+
+class NextRun(NamedTuple):
+    """One candidate: the sigma at which it would reject each rival, before and with it."""
+
+    what: str
+    now: dict[str, float]
+    then: dict[str, float]
+
+    @property
+    def worst(self) -> float:
+        """The sigma of the rival that is rejected least."""
+        return min(self.then.values())
+
+
+def next_measurements(fit: JointFit, rivals: Sequence[JointFit]) -> list[NextRun]:
+    """Rank the candidates by the sigma at which they would reject every rival.
+
+    The campaign with the runs added, as the leader predicts it, is fitted with each rival instead:
+    the root of its chi^2 is that sigma. A new record is as good, relative to its b and its
+    frequency, as the one whose weights it has; the weights are clamped anew for it.
+
+    Parameters
+    ----------
+    fit
+        With the leader.
+    rivals
+        The fits with each of the others in its place.
+    """
+    if not rivals:
+        return []
+    with np.errstate(invalid="ignore", divide="ignore"):  # without the sphere some turn over
+        now = _sigmas(fit, rivals, None)
+        found = [NextRun(what, now, _sigmas(fit, rivals, change)) for what, change in RUNS.items()]
+    return sorted(found, key=lambda run: -run.worst)
+
+
+def _sigmas(
+    fit: JointFit, rivals: Sequence[JointFit], change: Callable[[Run], Run] | None
+) -> dict[str, float]:
+    """How many sigma each rival would be away."""
+    design, again = _extended(fit.design, change)
+    expected = predict(design, fit.added, _carried(fit, fit, design))
+    usable = np.asarray(np.isfinite(expected).all(axis=-1))
+    # The same relative errors at other values.
+    whitening = fit.data.whitening[again] * (fit.data.values[again] / expected)[:, None, :]
+    runs = tuple(run for run, good in zip(design.runs, usable.tolist(), strict=True) if good)
+    kept, data = replace(design, runs=runs), Measured(expected[usable], whitening[usable])
+    return {
+        rival.last.identifier: math.sqrt(
+            chi2_near(kept, data, rival.added, _carried(rival, fit, kept))
+        )
+        for rival in rivals
+    }
+
+
+def _extended(design: Design, change: Callable[[Run], Run] | None) -> tuple[Design, list[int]]:
+    """The design with changed copies of its records in the fluid, and what each run repeats."""
+    every = list(range(len(design.runs)))
+    if change is None:
+        return design, every
+    wet = [number for number in every if design.runs[number].fluid is not None]
+    more = []
+    for number in wet:
+        run = design.runs[number]
+        places = {name: place + _CLAMPED_ANEW_M for name, place in run.weights_m.items()}
+        more.append(change(replace(run, weights_m=places)))
+    return replace(design, runs=(*design.runs, *more)), [*every, *wet]
+
+
+def _carried(fit: JointFit, truth: JointFit, design: Design) -> FloatArray:
+    """Unknowns of a fit for another design, where the truth has its inputs as configured."""
+    there, count = fit.design.index, len(fit.design.nuisances)
+    moved = fit.unknowns[:count] - truth.design.has_prior * truth.unknowns[:count]
+    found = [moved[there[each.name]] if each.name in there else 0.0 for each in design.nuisances]
+    return np.array([*found, *fit.unknowns[count:]])
+
+
+BASELINE = "eq16"
+"""Eq. 16 with the exact root, the priors of the configuration and the loss torque."""
+
+
+def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of campaign_diagnosis.json: the keys of diagnosis.json, and more.
+
+    Added are ``baseline.chi2`` and ``improved.chi2``; for each effect ``rivals`` (values and chi^2
+    of its class) and ``next_measurements``; for the campaign ``excluded``, ``records`` and
+    ``patterns`` (`causes`).
+    """
+    ranked = [
+        next_measurements(found.leader, [rival for rival, _ in found.rivals])
+        for found in search.found
+    ]
+    before, _ = held_out(search.baseline)
+    after, pulls = held_out(search.improved)
+    gain = after - before
+    left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
+    effects = [
+        _effect(search, found, runs) for found, runs in zip(search.found, ranked, strict=True)
+    ]
+    if search.missing and not effects:
+        effects = [_unnamed(search)]
+    return {
+        "schema_version": 1,
+        "baseline": {"name": BASELINE, **_fit(search.baseline)},
+        "noise_rms_rad": None,
+        "verdict": "missing-physics" if search.missing else "consistent",
+        "p_value": search.p_value,
+        "effects": effects,
+        "improved": _fit(search.improved),
+        "held_out": {
+            "log_density_before": float(before.sum()),
+            "log_density_after": float(after.sum()),
+            "gain": float(gain.sum()),
+            "gain_sd": float(np.sqrt(len(gain) * gain.var())),
+        },
+        "unexplained": {"residual_rms_rad": None, "p_value": left},
+        "excluded": search.excluded,
+        "patterns": causes(search),
+        "records": [
+            {"record": run.record, "pull_from_the_others": float(pull)}
+            for run, pull in zip(search.improved.design.runs, pulls, strict=True)
+        ],
+        "statement": statement(search, ranked),
+        "figures": [],
+        "warnings": [],
+        "provenance": provenance,
+    }
+
+
+def _fit(fit: JointFit) -> dict[str, Any]:
+    """A joint fit in the form of diagnosis.json: parameters, chi^2."""
+    parameters = {
+        each.name: fit.estimate(number, each.unit, float(fit.design.sds[number])).as_json()
+        for number, each in enumerate(fit.design.nuisances)
+    }
+    parameters |= {
+        one.effect.identifier: fit.size(position).as_json()
+        for position, one in enumerate(fit.added)
+    }
+    off = (fit.prediction / fit.data.values - 1.0)[:, 1]
+    return {
+        "parameters": parameters,
+        "residual_rms_rad": None,
+        "residual_rms_of_b": float(np.sqrt(np.mean(off**2))),
+        "chi2": fit.chi2,
+        "chi2_per_dof": fit.chi2 / max(fit.degrees_of_freedom, 1),
+    }
+
+
+def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> dict[str, Any]:
+    effect = found.leader.last
+    return {
+        "id": effect.identifier,
+        "name": effect.name,
+        "kind": "campaign",
+        "equation": effect.equation,
+        "parameters": _parameters(found.leader),
+        "delta_chi2": found.delta_chi2,
+        "p_value_global": found.p_value,
+        "probability": found.probability,
+        "indistinguishable_from": [
+            {"id": rival.last.identifier, "probability": probability}
+            for rival, probability in found.rivals
+        ],
+        "rivals": [
+            {
+                "id": rival.last.identifier,
+                "parameters": _parameters(rival),
+                "chi2_above_best": rival.chi2 - found.leader.chi2,
+            }
+            for rival, _ in found.rivals
+        ],
+        "deciding_measurement": _deciding(runs),
+        "next_measurements": [
+            {"measurement": run.what, "sigma": run.worst, "rivals": run.then, "now": run.now}
+            for run in runs
+        ],
+        "location": _location(search),
+    }
+
+
+def _parameters(fit: JointFit) -> dict[str, Any]:
+    size, shape = fit.size().as_json(), fit.added[-1].shape
+    if shape is not None:
+        size["of"] = " ".join(shape) if isinstance(shape, tuple) else shape
+    return {fit.last.parameter.name: size}
+
+
+def _unnamed(search: CampaignSearch) -> dict[str, Any]:
+    """What no entry explains: the records that differ from the rest, in sigma."""
+    _, pulls = held_out(search.baseline)
+    far = sorted(
+        zip(pulls.tolist(), (run.record for run in search.baseline.design.runs), strict=True),
+        key=lambda pair: -abs(pair[0]),
+    )[:3]
+    summary = "; ".join(f"{name} by {pull:+.1f} sigma" for pull, name in far)
+    return {
+        "id": "unnamed-damping",
+        "name": "records that disagree, by nothing that the catalogue has",
+        "kind": "unnamed",
+        "equation": r"b \to b + \Delta b(\text{record})",
+        "parameters": {},
+        "delta_chi2": search.baseline.chi2 - search.baseline.degrees_of_freedom,
+        "p_value_global": search.p_value,
+        "probability": 1.0,
+        "indistinguishable_from": [],
+        "deciding_measurement": "take the records anew that the others predict worst",
+        "location": _location(search) | {"summary": f"worst predicted by the others: {summary}"},
+    }
+
+
+def _location(search: CampaignSearch) -> dict[str, Any]:
+    """The band of frequencies in which b changes most between the two fits."""
+    moved = np.abs(search.improved.prediction / search.baseline.prediction - 1.0)[:, 1]
+    frequency = search.baseline.data.values[:, 0]
+    most = moved >= 0.5 * moved.max()
+    low, high = float(frequency[most].min()), float(frequency[most].max())
+    return {
+        "summary": f"the records between {low:.3g} and {high:.3g} Hz",
+        "time_s": None,
+        "amplitude_rad": None,
+        "phase_rad": None,
+        "frequency_hz": [low, high],
+        "harmonics": [],
+        "adc_codes": [],
+    }
+
+
+def _deciding(runs: Sequence[NextRun]) -> str:
+    if not runs:
+        return "none is needed: no other effect of the catalogue fits as well"
+    best = runs[0]
+    apart = ", ".join(f"{name} by {sigma:.1f} sigma" for name, sigma in best.then.items())
+    return f"{best.what}: it would reject {apart}"
+
+
+def _share(probability: float) -> str:
+    return f"{probability:.0%}" if probability >= 0.01 else "below 1%"
+
+
+def _chance(p_value: float) -> str:
+    return f"p = {p_value:.2g}" if p_value >= 1e-12 else "p < 1e-12"
+
+
+def statement(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> str:
+    """One paragraph of plain English."""
+    count = len(search.baseline.design.runs)
+    chance = _chance(search.p_value)
+    if not search.missing:
+        return (
+            f"The {count} records agree with Eq. 16, the loss torque and the stated errors of the"
+            f" apparatus (global {chance})."
+        )
+    unlike = (
+        f"The {count} records do not agree with Eq. 16 and the stated errors of the apparatus"
+        f" (global {chance})"
+    )
+    if not search.found:
+        return f"{unlike}, and no effect of the catalogue explains how they differ."
+    words = [f"{unlike}."]
+    for found, runs in zip(search.found, ranked, strict=True):
+        effect, size = found.leader.last, found.leader.size()
+        words.append(
+            f"Most probable is {effect.name} ({effect.parameter.name.replace('_', ' ')}"
+            f" {size});"
+            f" chi^2 falls by {found.delta_chi2:.0f}."
+        )
+        if found.rivals:
+            names = ", ".join(
+                f"{rival.last.name} ({_share(probability)})" for rival, probability in found.rivals
+            )
+            words.append(f"These records cannot tell it from {names}.")
+            words.append(f"What would decide is {_deciding(runs)}.")
+    left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
+    if left < 0.01:
+        words.append(f"Something is left that this does not explain ({_chance(left)}).")
+    return " ".join(words)
+
+
+_STEP = 1e-3
+"""Of a size, in what is expected of it: the patterns are those of small sizes."""
+
+
+def causes(search: CampaignSearch) -> dict[str, Any]:
+    """Patterns over the records in the fluid, as excesses of the viscous loss over Eq. 16.
+
+    Inputs are taken as configured, the loss torque as fitted. Each cause is given the size that
+    follows the measured excess best, whether that size is believable or not; its joint fit, which
+    knows priors and frequencies, says whether it is in the class.
+
+    Returns
+    -------
+    dict
+        ``records`` (name, frequency, excess measured and its sd from b), and ``causes``: for each
+        its size, what it predicts, rms of what it leaves, and by how much chi^2 of the joint fit
+        exceeds the best one's (None where nothing was found).
+    """
+    fit = search.improved
+    design, count = fit.design, len(fit.design.nuisances)
+    free = np.where(design.has_prior, 0.0, fit.unknowns[:count])
+    wet = np.flatnonzero(design.wet > 0.0)
+    plain = predict(design, (), free)
+    solid = np.exp(-design.inputs(free).log_coefficient) * np.pi / plain[:, 0]
+    viscous = (plain[:, 1] - solid)[wet]
+    measured = fit.data.values[wet, 1]
+    excess = (measured - plain[wet, 1]) / viscous
+    sd = 1.0 / np.linalg.norm(fit.data.whitening[wet, :, 1], axis=-1) / viscous
+    members = [
+        rival
+        for found in search.found[:1]
+        for rival in (found.leader, *(rival for rival, _ in found.rivals))
+    ]
+    best = min((rival.chi2 for rival in members), default=0.0)
+    above = search.excluded | {rival.last.identifier: rival.chi2 - best for rival in members}
+    rows: dict[str, dict[str, Any]] = {}
+    for one in candidates(design):
+        moved = predict(design, (one,), np.append(free, _STEP))
+        pattern = (moved - plain)[wet, 1] / viscous / _STEP
+        square = float(pattern @ pattern)
+        if not square > 0.0:
+            continue
+        units = float(pattern @ excess) / square
+        left = float(np.sqrt(np.mean((excess - units * pattern) ** 2)))
+        name = one.effect.identifier
+        if name in rows and rows[name]["rms_left"] <= left:
+            continue
+        rows[name] = {
+            "id": name,
+            "name": one.effect.name,
+            "size": units * one.effect.expected,
+            "parameter": one.effect.parameter.name,
+            "unit": one.effect.parameter.unit,
+            "possible": one.bounds[0] <= units <= one.bounds[1],
+            "excess": (units * pattern).tolist(),
+            "rms_left": left,
+            "chi2_above_best": above.get(name),
+            "in_class": name in above and name not in search.excluded,
+        }
+    return {
+        "records": [
+            {
+                "record": design.runs[number].record,
+                "branch": design.runs[number].branch,
+                "frequency_hz": float(fit.data.values[number, 0]),
+                "excess": float(value),
+                "sd": float(spread),
+            }
+            for number, value, spread in zip(wet, excess, sd, strict=True)
+        ],
+        "causes": sorted(rows.values(), key=lambda row: row["rms_left"]),
+    }

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.faults import as_input_error, nearest, read_text
+from pendpipe.configuration.load import as_input_error, nearest, read_text
 from pendpipe.configuration.models import NotNegative, Positive, Section
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError

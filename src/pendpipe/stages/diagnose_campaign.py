@@ -55,8 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
     """Return the content of campaign_diagnosis.json."""
-    from pendpipe.campaign.answer import BASELINE, campaign_diagnosis
-    from pendpipe.campaign.diagnose import search
+    from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis, search
 
     provenance = {"version": __version__, "code": code_version(__name__)}
     found = campaign_data(campaign, read_results(campaign))
