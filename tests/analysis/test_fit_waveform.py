@@ -98,14 +98,13 @@ def test_the_frequency_is_eq_8s_at_low_q(share: float) -> None:
     assert frequency.sd < 5e-4 * 0.516
 
 
-def test_hysteretic_and_viscous_are_told_apart_only_where_the_readings_do() -> None:
-    quiet, loud = fitted(rms=1e-5), fitted(rms=1e-3)
-    hysteretic = quiet.quality_factor_hysteretic
-    assert hysteretic is not None
-    assert abs(hysteretic.value - OMEGA / 2 / 0.00596) < 4.0 * hysteretic.sd
-    assert any("given Eq. 8's form" in warning for warning in quiet.warnings)
-    assert loud.quality_factor_hysteretic is None
-    assert loud.quality_factor_viscous is None
+def test_one_recording_does_not_tell_hysteretic_from_viscous() -> None:
+    """Only Eq. 8's third harmonic would, which another drag or the sensor swamps."""
+    quiet = fitted(rms=1e-5)
+    assert quiet.quality_factor_hysteretic is None
+    assert quiet.quality_factor_viscous is None
+    b = quiet.parameters["b"]
+    assert abs(b.value - TRUTH["b"]) < 4.0 * b.sd
 
 
 def test_an_absent_loss_stays_at_its_bound() -> None:

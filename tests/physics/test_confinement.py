@@ -10,14 +10,88 @@ from pendpipe.physics import penetration_depth
 from pendpipe.physics.confinement import (
     Confined,
     Surface,
-    concentric_sphere,
+    _confined,
     sloshing_frequency,
     sphere_between_planes,
     sphere_in_tank,
-    thin_layer_concentric,
 )
 
 A, B = 1.0, 2.0
+
+
+def thin_layer_concentric(radius_m: float, outer_radius_m: float) -> tuple[float, float]:
+    """Drag factor and added-mass coefficient in a concentric sphere, for thin layers.
+
+    ``K = (1 + s^4)/(1 - s^3)^2`` and ``C_m = (1 + 2 s^3)/(2 (1 - s^3))`` with ``s = a/b``: the
+    slip of the potential flow, squared, over both spheres (Stokes 1851 has C_m).
+
+    Parameters
+    ----------
+    radius_m, outer_radius_m
+        a and b in m.
+
+    Returns
+    -------
+    tuple of float
+        Drag over that of the unbounded sphere, and added mass over the displaced mass.
+
+    """
+    s = radius_m / outer_radius_m
+    return (1.0 + s**4) / (1.0 - s**3) ** 2, (1.0 + 2.0 * s**3) / (2.0 * (1.0 - s**3))
+
+
+def concentric_sphere(radius_m: float, outer_radius_m: float, depth_m: float) -> Confined:
+    """Return the exact force on a sphere oscillating inside a concentric sphere at rest.
+
+    The four solutions of order one (two of the potential, two of the vorticity: modified
+    spherical Bessel functions of ``alpha r``) are fitted to the velocity on both spheres.
+
+    Parameters
+    ----------
+    radius_m, outer_radius_m, depth_m
+        a, b > a, and the penetration depth delta, in m.
+
+    Returns
+    -------
+    Confined
+        Force factor, drag factor, added-mass coefficient.
+
+    Raises
+    ------
+    ValueError
+        If the outer sphere is not the larger one, or a length is not positive.
+
+    Notes
+    -----
+    Stokes, Trans. Camb. Phil. Soc. 9 (1851) 8; Landau and Lifshitz, Fluid Mechanics, section 24.
+
+    """
+    if not 0.0 < radius_m < outer_radius_m or depth_m <= 0.0:
+        raise ValueError("lengths have to be positive, and the outer sphere the larger one")
+    alpha = (1.0 - 1.0j) * radius_m / depth_m
+    ratio = outer_radius_m / radius_m
+
+    def velocity(r: float) -> np.ndarray:
+        """Return the radial and polar amplitude of each solution at r, in units of a."""
+        x = alpha * r
+        # g = k_1(x) and i_1(x), and (x g)'; each without its exponential.
+        outward = np.exp(-alpha * (r - 1.0))
+        inward = np.exp(alpha * (r - ratio))
+        back = np.exp(-2.0 * x)
+        decaying = np.array([1.0 / x + 1.0 / x**2, -(1.0 + 1.0 / x + 1.0 / x**2)]) * outward
+        growing = inward * np.array(
+            [
+                (1.0 + back) / x - (1.0 - back) / x**2,
+                (1.0 - back) - (1.0 + back) / x + (1.0 - back) / x**2,
+            ]
+        )
+        radial = [-2.0 / r**3, 1.0, 2.0 * decaying[0] / r, 2.0 * growing[0] / r]
+        polar = [1.0 / r**3, 1.0, decaying[1] / r, growing[1] / r]
+        return np.array([radial, polar], dtype=np.complex128)
+
+    matrix = np.concatenate([velocity(1.0), velocity(ratio)])
+    dipole = np.linalg.solve(matrix, np.array([1.0, 1.0, 0.0, 0.0], dtype=np.complex128))[0]
+    return _confined(complex(dipole), alpha)
 
 
 def impedance(found: Confined, depth: float) -> complex:

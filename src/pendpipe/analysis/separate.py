@@ -99,9 +99,6 @@ def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
     return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
 
 
-_ROUNDS = 50
-
-
 @dataclass(frozen=True)
 class Benchmark:
     """The hysteretic loss, from the records in air.
@@ -243,24 +240,24 @@ def _separate_one(
 def _free_exponent(
     frequency: FloatArray, rate: FloatArray, sd: FloatArray, inverse: float
 ) -> tuple[Estimate, float]:
-    """Fit ``b = (pi/f0) h (f/f0)^(1-x)`` by Gauss-Newton; x with its error, and chi^2."""
+    """Fit ``b = (pi/f0) h (f/f0)^(1-x)``; x with its error, and chi^2."""
     if len(frequency) < 2 or np.ptp(frequency) <= 1e-9 * np.max(frequency):
         return Estimate(float("nan"), float("nan"), ""), float("nan")
+    from scipy.optimize import curve_fit
+
     # About the weighted mean of ln f the two parameters hardly correlate.
     logarithm = np.log(frequency)
     logarithm = logarithm - np.average(logarithm, weights=(rate / sd) ** 2)
-    scale, exponent = float(np.pi * inverse * np.mean(1.0 / frequency)), 2.0
-    for _ in range(_ROUNDS):
-        shape = np.exp((1.0 - exponent) * logarithm)
-        design = np.stack([shape, -scale * shape * logarithm], axis=1) / sd[:, np.newaxis]
-        step = np.linalg.lstsq(design, (rate - scale * shape) / sd, rcond=None)[0]
-        scale, exponent = scale + float(step[0]), exponent + float(np.clip(step[1], -0.5, 0.5))
-        if abs(step[1]) < 1e-12 and abs(step[0]) < 1e-12 * abs(scale):
-            break
-    shape = np.exp((1.0 - exponent) * logarithm)
-    covariance = np.linalg.inv(design.T @ design)
-    chi2 = float(np.sum(((rate - scale * shape) / sd) ** 2))
-    return Estimate(exponent, float(np.sqrt(covariance[1, 1])), ""), chi2
+
+    def law(at: FloatArray, scale: float, exponent: float) -> FloatArray:
+        return np.asarray(scale * np.exp((1.0 - exponent) * at))
+
+    start = float(np.pi * inverse * np.mean(1.0 / frequency)), 2.0
+    found, covariance = curve_fit(
+        law, logarithm, rate, start, sd, absolute_sigma=True, ftol=1e-14, xtol=1e-14, gtol=0.0
+    )
+    chi2 = float(np.sum(((rate - law(logarithm, *found)) / sd) ** 2))
+    return Estimate(float(found[1]), float(np.sqrt(covariance[1, 1])), ""), chi2
 
 
 def _widened(estimate: Estimate, relative_sd: float) -> Estimate:

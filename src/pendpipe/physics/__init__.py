@@ -6,11 +6,9 @@ The equations are used in their corrected forms; each docstring names its number
 
 from pendpipe.physics.confinement import (
     Confined,
-    concentric_sphere,
     sloshing_frequency,
     sphere_between_planes,
     sphere_in_tank,
-    thin_layer_concentric,
 )
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
 from pendpipe.physics.fluid import (
@@ -95,7 +93,6 @@ __all__ = [
     "amplitude_of_largest_quality_factor",
     "amplitude_rate",
     "bearing_friction_rate",
-    "concentric_sphere",
     "cylinder_drag",
     "damping_coefficient",
     "decay_rates",
@@ -133,7 +130,6 @@ __all__ = [
     "stopping_time",
     "structural_quality_factor",
     "swing",
-    "thin_layer_concentric",
     "time_at",
     "universal_acceleration",
     "viscous_acceleration",

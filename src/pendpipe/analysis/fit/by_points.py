@@ -26,7 +26,6 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import Eq8
-from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude_and_gradient
 
 _LOUD: Final = 2.0
@@ -456,7 +455,6 @@ def fit_points(
             f" (chi^2 of the times is {period.chi2_per_dof:.3g} per point):"
             " the frequency is a mean"
         )
-    known = {name: Estimate(number, 0.0, "") for name, number in fixed.items()}
     return result_of(
         *_numbers(points, envelope, period, stretched),
         envelope.held,
@@ -464,6 +462,7 @@ def fit_points(
         Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring),
         stretched=stretched,
         said=said,
+        fixed=fixed,
         method="turning-points",
         baseline=baseline,
         noise_rms_rad=points.noise_rms_rad,
@@ -471,8 +470,6 @@ def fit_points(
         chi2_per_dof=envelope.chi2_per_dof,
         samples=points.samples,
         turning_points=len(points),
-        quality_factor_hysteretic=known.get("quality_factor_hysteretic"),
-        quality_factor_viscous=known.get("quality_factor_viscous"),
         settled=envelope.converged,
     )
 

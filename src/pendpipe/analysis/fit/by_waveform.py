@@ -1,6 +1,6 @@
 """Eq. 8 on all the readings of a free decay, by Gauss-Newton with the engine's exact sensitivities.
 
-The two parts of b are told apart only as far as Eq. 8's form is believed.
+How b divides into its two parts is not told: any share is as likely beforehand.
 
 Rounded readings say only between which limits the angle lay. With noise of rms s before the
 rounding, a reading r stands for the interval r -+ step/2, and its probability is
@@ -39,7 +39,6 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.noise import quantisation_rms, white_rms
-from pendpipe.analysis.separate import quality_of_rate
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray, IntArray
@@ -52,7 +51,6 @@ from pendpipe.dynamics import (
 )
 from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.kernel import kernel
-from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude, time_at
 
 ROOT_HALF = math.sqrt(0.5)
@@ -459,8 +457,7 @@ def _result(
     stretched = max(misfit(chi2_per_dof, dof), slow if random else 1.0)
     # The search weighed the readings by its own first guess of the noise.
     scale = ((fitted.problem.noise_rms / noise) ** 2 if random else 1.0) / stretched
-    value, matrix, ends, own = _numbers(fitted, scale, float(samples.time_s[0]))
-    hysteretic, viscous, said = split_quality_factors(fitted.minimum.value, own, fixed)
+    value, matrix, ends = _numbers(fitted, scale, float(samples.time_s[0]))
     times = fitted.problem.time_s
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     return result_of(
@@ -471,7 +468,8 @@ def _result(
         points.chosen(inside),
         fitted.problem.model(fitted.minimum.value)[0],
         stretched=stretched,
-        said=[*said, *fitted.start.warnings],
+        said=fitted.start.warnings,
+        fixed=fixed,
         method="waveform",
         baseline=baseline,
         noise_rms_rad=noise,
@@ -479,8 +477,6 @@ def _result(
         chi2_per_dof=chi2_per_dof,
         samples=len(residual),
         turning_points=len(points),
-        quality_factor_hysteretic=hysteretic,
-        quality_factor_viscous=viscous,
         settled=fitted.minimum.converged,
     )
 
@@ -567,8 +563,8 @@ def _held(
 
 def _numbers(
     fitted: _Fitted, scale: float, start_s: float
-) -> tuple[FloatArray, FloatArray, list[tuple[float, float]], FloatArray]:
-    """The seven parameters, their covariance, intervals; and the covariance of the fitted ones."""
+) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
+    """The seven parameters, their covariance, and the intervals of a, b, c."""
     value, held = fitted.minimum.value, fitted.held
     quadratic = fitted.minimum.quadratic
     normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
@@ -578,7 +574,7 @@ def _numbers(
     frequency = 0.5 * value[OMEGA] / math.pi
     numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])
     ends = intervals95(value, normal, gradient, BOUNDS, range(3), held, own)
-    return numbers, jacobian @ own @ jacobian.T, ends, own
+    return numbers, jacobian @ own @ jacobian.T, ends
 
 
 def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
@@ -676,43 +672,3 @@ def _mean_square(
             square += parabola * parabola
         total += product * product / square
     return total / (middles.size - 1)
-
-
-_KNOWN: Final = 0.1
-"""Standard deviation of the share (0 to 1) below which the waveform has told it."""
-_CAVEAT: Final = (
-    "quality_factor_hysteretic and quality_factor_viscous hold given Eq. 8's form: they rest on"
-    " a third harmonic that another form of drag, or the sensor, would swamp"
-)
-
-
-def split_quality_factors(
-    value: FloatArray, covariance: FloatArray, fixed: Mapping[str, float]
-) -> tuple[Estimate | None, Estimate | None, list[str]]:
-    """Quality factors of the two parts of b, where they are held or well known.
-
-    Returns
-    -------
-    hysteretic, viscous
-        None where the record does not tell them.
-    warnings
-        A clause each.
-    """
-    names = ("quality_factor_hysteretic", "quality_factor_viscous")
-    held = {name: Estimate(fixed[name], 0.0, "") for name in names if name in fixed}
-    if held:
-        return held.get(names[0]), held.get(names[1]), []
-    sd = math.sqrt(max(float(covariance[SHARE, SHARE]), 0.0))
-    if not 0.0 < sd < _KNOWN or value[B] <= 0.0:
-        return None, None, []
-    b, share = float(value[B]), float(value[SHARE])
-    variance_b, variance_share = float(covariance[B, B]), float(covariance[SHARE, SHARE])
-    mixed = 2.0 * b * float(covariance[B, SHARE])
-    parts = []
-    for part, sign in ((share, 1.0), (1.0 - share, -1.0)):
-        # Of the product b x part.
-        variance = part**2 * variance_b + sign * part * mixed + b**2 * variance_share
-        rate = Estimate(part * b, math.sqrt(max(variance, 0.0)), "1/s")
-        known = rate.bounds95[0] > 0.0
-        parts.append(quality_of_rate(0.5 * float(value[OMEGA]) / math.pi, rate) if known else None)
-    return parts[0], parts[1], [_CAVEAT]

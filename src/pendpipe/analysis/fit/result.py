@@ -32,6 +32,7 @@ Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
 Restoring = Literal["linear", "sine"]
 TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
+PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
@@ -74,7 +75,7 @@ class FitResult:
     quality_factor_limit
         pi f/b: the Q that the exponential losses alone would give; None for b = 0.
     quality_factor_hysteretic, quality_factor_viscous
-        The parts of b, given Eq. 8's form; None where they were not asked for.
+        The parts of b that are held; None elsewhere: one recording does not tell them apart.
     covariance_order, covariance
         Names and matrix, shape (n, n).
     noise_rms_rad, residual_rms_rad, chi2_per_dof
@@ -282,6 +283,7 @@ def result_of(
     *,
     stretched: float,
     said: Iterable[str],
+    fixed: Mapping[str, float],
     **rest: Any,
 ) -> FitResult:
     """Dress a fit's numbers, compare its law with the decay, and say what the reader should know.
@@ -300,6 +302,8 @@ def result_of(
         By what the variances were multiplied (`misfit`).
     said
         Warnings of the fit itself; the notes of the turning points stand before them.
+    fixed
+        What is held, by name; one recording does not tell the parts of b.
     **rest
         The other fields of `FitResult`.
     """
@@ -314,6 +318,7 @@ def result_of(
     limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
     light, reason = light_of(checks, misfit=stretched, unit=points.unit)
+    rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
         quality_factor_limit=limit,
