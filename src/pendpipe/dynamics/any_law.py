@@ -7,8 +7,8 @@ With x = r cos(psi), v = -omega r sin(psi) and x'' = -omega^2 x + f, the motion 
 
 and its turning points are psi = k pi. Within a half cycle the sign of the velocity is fixed,
 so that f is smooth whatever the friction, and a law is a function of whole arrays: nothing is
-compiled. The amplitude's equation is solved by Newton's method (a scalar linear equation,
-integrated exactly), the time's by iteration, all half cycles together.
+compiled. Both equations are solved by Newton's method, all half cycles together: a change of
+ln r obeys a scalar linear equation, which is integrated exactly, and gives that of t.
 """
 
 import math
@@ -130,6 +130,8 @@ class Motion:
         When.
     upwards
         +1 where the first turning point is positive, else -1.
+    slopes
+        Of d ln r/d psi and of dt/d psi by ln r, at a motion near it.
     """
 
     clock: Clock
@@ -137,6 +139,7 @@ class Motion:
     log_amplitude: FloatArray
     time_s: FloatArray
     upwards: float = 1.0
+    slopes: tuple[FloatArray, FloatArray] | None = None
 
     @cached_property
     def amplitude(self) -> FloatArray:
@@ -235,13 +238,13 @@ def follow(
     origin = math.log(abs(start_rad))
     log_amplitude = guess.log_amplitude + (origin - guess.log_amplitude[0, 0])
     time = guess.time_s + (start_s - guess.time_s[0, 0])
-    motion = Motion(clock, angular_frequency, log_amplitude, time, upwards)
+    motion = Motion(clock, angular_frequency, log_amplitude, time, upwards, guess.slopes)
     jumps, delays = (0.0, 0.0) if reset is None else reset
     # Larger g are but on the way, and lead astray, unless the equilibrium is far off.
     for largest in (_STEEPEST, _LARGEST):
-        motion, settled = _solved(law, motion, origin + jumps, start_s + delays, largest, until_s)
-        g = _pull(law, motion)[: _followed(motion, until_s)]
-        if settled and np.all(np.abs(g) <= largest):
+        motion, pull = _solved(law, motion, origin + jumps, start_s + delays, largest, until_s)
+        g = pull[: _followed(motion, until_s)]
+        if np.all(np.abs(g) <= largest):
             break
     if not np.all(np.abs(g) <= _LARGEST) or np.max(g * clock.cosine[: len(g)]) > _STEEPEST:
         raise NoMotionError("the pendulum does not turn")
@@ -260,29 +263,35 @@ def _solved(
     start_s: FloatArray | float,
     largest: float,
     until_s: float,
-) -> tuple[Motion, bool]:
-    """Iterate a motion until it is that of the law with bounded g; or until that stops it."""
+) -> tuple[Motion, FloatArray]:
+    """Iterate a motion until it is that of the law with bounded g; or until that stops it.
+
+    Returns
+    -------
+    motion, pull
+        The motion, and G of the law along it without the bound; beyond any bound where it stops.
+    """
     clock, omega = motion.clock, motion.angular_frequency
-    steepness: FloatArray | None = None
     before, front, waits = math.inf, -1, 0
     for _ in range(_ROUNDS):
         now = rates(law, motion, largest)
-        if steepness is None:
-            more = rates(law, _larger(motion), largest)
-            steepness = np.asarray((more.loss - now.loss) / _STEP)
+        if motion.slopes is None:
+            motion = replace(motion, slopes=_slopes(law, motion, now, largest))
+        by_log, by_time = motion.slopes
         off = log_start + clock.integral(now.loss) - motion.log_amplitude
-        change = np.clip(_linear(clock, steepness, off), -_STRIDE, _STRIDE)
-        late = start_s + clock.integral(now.pace) - motion.time_s
+        change = np.clip(_linear(clock, by_log, off), -_STRIDE, _STRIDE)
+        late = start_s + clock.integral(now.pace + by_time * change) - motion.time_s
         errors = np.maximum(np.abs(change), omega * np.abs(late)).max(axis=1)
         errors = errors[: _followed(motion, until_s)]
         error = float(np.max(errors))
         motion = replace(
             motion, log_amplitude=motion.log_amplitude + change, time_s=motion.time_s + late
         )
-        # The next change will be smaller by what this one is smaller than the last.
-        smaller = min(error / before, 1.0) if before < math.inf else 1.0
+        # The next change will be smaller by what this one is smaller than the last; with slopes of
+        # a motion near it, hardly by more than ten.
+        smaller = min(max(error / before, 0.1), 1.0) if before < math.inf else 1.0
         if error * smaller < _TOLERANCE:
-            return motion, True
+            return motion, now.pull
         # Half cycles before the first that still changes will change no more.
         last, front = front, int(np.argmax(errors > _SETTLED))
         waits = waits + 1 if front == last else 0
@@ -290,18 +299,22 @@ def _solved(
         if stuck or np.any((now.pull * clock.cosine)[:front] > _STEEPEST):
             if largest == _LARGEST:
                 raise StopsError("the pendulum stops")
-            return motion, False
+            return motion, np.full_like(now.pull, np.inf)
         if not error < 1e3:
             break
         if error > 0.5 * before:
-            steepness = None
+            motion = replace(motion, slopes=None)
         before = error
     raise NoMotionError("the motion can't be followed")
 
 
-def _larger(motion: Motion) -> Motion:
-    """The motion with a little more of ln r, for differences."""
-    return replace(motion, log_amplitude=motion.log_amplitude + _STEP)
+def _slopes(
+    law: Law, motion: Motion, now: Rates, largest: float = _LARGEST
+) -> tuple[FloatArray, FloatArray]:
+    """Return how the rates change with ln r, by differences."""
+    larger = replace(motion, log_amplitude=motion.log_amplitude + _STEP)
+    more = rates(law, larger, largest)
+    return (more.loss - now.loss) / _STEP, (more.pace - now.pace) / _STEP
 
 
 def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:
@@ -322,24 +335,33 @@ class Tangent:
     """
 
     def __init__(self, law: Law, motion: Motion) -> None:
-        self.motion, self.rates = motion, rates(law, motion)
-        other = rates(law, _larger(motion))
-        self._steepness = (other.loss - self.rates.loss) / _STEP
-        self._pace = (other.pace - self.rates.pace) / _STEP
-        growth = motion.clock.integral(self._steepness)
-        self._grown, self._shrunk = np.exp(growth), np.exp(-growth)
+        self.motion, self._law = motion, law
+
+    @cached_property
+    def rates(self) -> Rates:
+        """The rates of the law along the motion."""
+        return rates(self._law, self.motion)
+
+    @cached_property
+    def _slopes(self) -> tuple[FloatArray, FloatArray]:
+        return _slopes(self._law, self.motion, self.rates)
+
+    @cached_property
+    def _grown(self) -> FloatArray:
+        """What a change of ln r at the start has grown to."""
+        return np.exp(self.motion.clock.integral(self._slopes[0]))
 
     def of_start(self) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t by ln r at the start."""
         by_log = self._grown.copy()
-        return by_log, self.motion.clock.integral(self._pace * by_log)
+        return by_log, self.motion.clock.integral(self._slopes[1] * by_log)
 
     def of_rates(self, loss: FloatArray, pace: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t at fixed phase by a change of the rates."""
         clock = self.motion.clock
-        by_log = clock.integral(self._shrunk * loss)
+        by_log = clock.integral(loss / self._grown)
         by_log *= self._grown
-        by_time = self._pace * by_log
+        by_time = self._slopes[1] * by_log
         by_time += pace
         return by_log, clock.integral(by_time)
 
