@@ -168,8 +168,8 @@ def best_fit(
 ) -> Fit | None:
     """Refine from the best of several starts, and from the next best where that gets stuck.
 
-    Where even the best can't reach a chi^2 of `useful`, the others are not tried. None if the model
-    has no motion from any. A start with values of another model is left out.
+    The others are not tried where even the best can't reach a chi^2 of `useful`, or has reached it.
+    None if the model has no motion from any. A start with values of another model is left out.
     """
     fixed, found, begun = tuple(held), None, []
     for start in starts:
@@ -180,7 +180,7 @@ def best_fit(
         with suppress(NoMotionError, np.linalg.LinAlgError):
             refining.go(ROUNDS, useful)
             found = better(found, refining.fit)
-            if refining.fit.converged or refining.hopeless:
+            if refining.fit.converged or refining.hopeless or refining.chi2 < useful < math.inf:
                 break
     return found
 
