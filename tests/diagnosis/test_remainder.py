@@ -10,8 +10,8 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.remainder import Remainder, remainder_of
-from pendpipe.diagnosis.values import parameters_of
+from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
+from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.model import Model
 
 from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, null_fit, other_engine, prepared, white
@@ -57,13 +57,42 @@ def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
     assert large.numbers < 30.0
 
 
-def test_a_misfit_widens_intervals_as_much_as_standard_deviations() -> None:
-    fit, found = left_by(1e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
-    narrow = parameters_of(fit, "rad")
-    wide = parameters_of(replace(fit, error_scale=found.error_scale), "rad")
-    assert found.error_scale > 5.0
-    for name in ("a", "b", "c"):
-        assert wide[name].sd == pytest.approx(found.error_scale * narrow[name].sd)
-        # A bound that another rate meets cuts a little of a wide interval.
-        ratio = np.ptp(wide[name].interval95) / np.ptp(narrow[name].interval95)
-        assert 0.8 * found.error_scale < ratio <= 1.001 * found.error_scale
+def of_a_cycle(wave: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A smooth random function of eight numbers, times a wave."""
+    x = (np.arange(len(wave)) + 0.5) / len(wave)
+    modes = np.cos(np.pi * np.arange(8)[:, None] * x)
+    return np.asarray(3.0 * NOISE_RAD * (rng.standard_normal(8) @ modes) * wave)
+
+
+@pytest.mark.parametrize(
+    ("part", "moved", "still"),
+    [
+        ("amplitude", (A, B, C), (OMEGA, TIME)),
+        ("phase", (OMEGA, TIME), (A, B, C)),
+        ("harmonics", (), (A, B, C)),
+    ],
+)
+def test_errors_are_those_that_a_random_misfit_of_one_part_makes(
+    part: str, moved: tuple[int, ...], still: tuple[int, ...]
+) -> None:
+    """To first order the values move by J^+ r: against the errors stated for each draw."""
+    fit, data, noise = null_fit()
+    turned = fit.at.sampled.phase
+    wave = {"amplitude": np.cos(turned), "phase": np.sin(turned), "harmonics": np.cos(3 * turned)}
+    solve = np.linalg.pinv(fit.jacobian[:, fit.free])
+    rng, pulls, widened = np.random.default_rng(7), [], []
+    for seed in range(80):
+        more = of_a_cycle(wave[part], rng) + white(seed)
+        residual = np.append(noise.whiten(more), 0.0)
+        here = replace(fit, evaluation=replace(fit.evaluation, residual=residual))
+        found = with_errors(here, replace(data, values=fit.at.reading + more), noise)
+        widened.append(np.sqrt(np.diag(found.covariance())[list(fit.free)]))
+        pulls.append(solve @ residual / widened[-1])
+    scatter = dict(zip(fit.free, np.std(pulls, axis=0), strict=True))
+
+    assert max(scatter.values()) < 1.35
+    assert all(scatter[index] > 0.6 for index in moved)
+    noise_alone = np.sqrt(np.diag(fit.covariance())[list(fit.free)])
+    wider = dict(zip(fit.free, np.median(widened, axis=0) / noise_alone, strict=True))
+    assert all(wider[index] > 10.0 for index in moved)
+    assert all(wider[index] < 5.0 for index in still)

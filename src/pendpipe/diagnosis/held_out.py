@@ -124,7 +124,7 @@ def _predicted(
     unmasked = replace(noise, weight=np.ones(len(data)))
     usual = -0.5 * float(np.mean(np.log(noise.variance))) - 0.5 * math.log(2.0 * math.pi)
     found = np.where(used, usual + np.log(unmasked.scale), 0.0)
-    error = np.zeros(len(data))
+    error, largest = np.zeros(len(data)), float(np.ptp(data.values))
     for fold in range(_FOLDS):
         out = block % _FOLDS == fold
         known = data.masked(out | ~used)
@@ -134,7 +134,6 @@ def _predicted(
         except NoMotionError:
             predicted = fit.at.reading
         # A curve may diverge where blocks are missing: limit the error to that of no prediction.
-        largest = 2.0 * fit.at.span.first_amplitude
         off = np.clip(data.residual(predicted), -largest, largest)
         error[out] = off[out]
         found -= np.where(out, 0.5 * _squared_error(off, unmasked, out, used), 0.0)

@@ -53,7 +53,9 @@ class Fit:
     converged
         Whether the last step was negligible.
     error_scale
-        Factor on all standard deviations, for a misfit beyond the noise.
+        Factor on standard deviations for a misfit beyond the noise, in the mean.
+    scatter
+        Covariance of J'r for that misfit, shape (size, size); None where noise alone is left.
     variance
         What other descriptions of the readings add to the variance of the first values.
     """
@@ -62,6 +64,7 @@ class Fit:
     free: tuple[int, ...]
     converged: bool
     error_scale: float = 1.0
+    scatter: FloatArray | None = None
     variance: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -106,8 +109,10 @@ class Fit:
         scale = np.linalg.norm(part, axis=0)
         scale[scale == 0.0] = 1.0
         inverse = np.linalg.pinv(np.linalg.qr(part / scale, mode="r"), rcond=1e-12)
-        matrix[np.ix_(self.free, self.free)] = inverse @ inverse.T / np.outer(scale, scale)
-        matrix *= self.error_scale**2
+        own = inverse @ inverse.T / np.outer(scale, scale)
+        if self.scatter is not None:
+            own = own @ self.scatter[np.ix_(self.free, self.free)] @ own
+        matrix[np.ix_(self.free, self.free)] = own
         diagonal = np.arange(len(self.variance))
         matrix[diagonal, diagonal] += self.variance
         return matrix

@@ -3,14 +3,15 @@
 If chi^2 stays far above the noise, the model is still wrong. The rest is then not noise, which is
 independent from reading to reading, but an unknown function of time, described by a few numbers
 (its significant Fourier coefficients). Names and errors are compared with that function, not with
-the noise.
+the noise: a misfit of the phase widens the error of the frequency, one of the amplitude those of
+the losses.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Final
 
@@ -47,12 +48,15 @@ class Remainder:
     shares
         Parts of `excess` in the offset, the amplitude and the phase of the motion, its higher
         harmonics, and between them.
+    sizes
+        Mean square of the numbers of each of these parts, in units of the noise's; 1 at least.
     """
 
     excess: float
     over_noise: float
     numbers: float
     shares: Mapping[str, float] = field(default_factory=dict)
+    sizes: tuple[float, ...] = ()
 
     @property
     def systematic(self) -> bool:
@@ -84,23 +88,58 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     over = math.sqrt(fit.chi2 / freedom)
     if over <= INCOMPLETE:
         return Remainder(excess, over, float(freedom))
-    series, rest = by_cycle(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
-    powers = [_powers(row) for row in series.T] + [_powers(rest)]
-    known = [float(np.sum(power - 1.0)) for power in powers[:-1]]
-    between = float(np.sum(rest**2)) - (np.count_nonzero(rest) - series.size)
-    parts = np.array([known[0], known[1], known[2], sum(known[3:]), between])
-    parts = np.maximum(parts, 0.0)
-    shares = parts / max(float(parts.sum()), 1e-300)
-    loud = np.concatenate(powers)
-    loud = loud[loud > _SIGNIFICANT_POWER]
-    # Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
-    numbers = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
+    parts = _in_parts(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
+    powers = [np.asarray(dct(part, axis=0, norm="ortho") ** 2).ravel() for part in parts]
+    by_noise = [power.size for power in powers[:-1]]
+    by_noise.append(max(int(np.count_nonzero(parts[-1])) - sum(by_noise), 1))
+    sums = [float(power.sum()) for power in powers]
+    beyond = np.maximum(np.subtract(sums, by_noise), 0.0)
+    shares = beyond / max(float(beyond.sum()), 1e-300)
+    sizes = [
+        max(more / _numbers(power), whole / number, 1.0)
+        for more, power, whole, number in zip(beyond, powers, sums, by_noise, strict=True)
+    ]
     return Remainder(
         excess,
         over,
-        min(max(numbers, _FEWEST_NUMBERS), float(freedom)),
+        min(_numbers(np.concatenate(powers)), float(freedom)),
         dict(zip(_PARTS, shares.tolist(), strict=True)),
+        tuple(sizes),
     )
+
+
+def _numbers(power: FloatArray) -> float:
+    """How many independent numbers have these squared coefficients.
+
+    Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
+    """
+    loud = power[power > _SIGNIFICANT_POWER]
+    found = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
+    return max(found, _FEWEST_NUMBERS)
+
+
+def with_errors(fit: Fit, data: Data, noise: Noise) -> Fit:
+    """Return a fit with errors that allow for what it leaves beyond the noise.
+
+    What is left of each part of the motion (`Remainder`) counts as random, of the size that it
+    has: the values J^+ r then have the covariance J^+ (sum of size P) J^+', where P projects on
+    a part.
+    """
+    left = remainder_of(fit, data, noise)
+    if not left.systematic:
+        return replace(fit, error_scale=1.0, scatter=None)
+    parts = _in_parts(fit.jacobian[:-1], fit.at.sampled.phase)
+    scatter = fit.jacobian.T @ fit.jacobian
+    for size, part in zip(left.sizes, parts, strict=True):
+        columns = part.reshape(-1, part.shape[-1])
+        scatter += (size - 1.0) * columns.T @ columns
+    return replace(fit, error_scale=left.error_scale, scatter=scatter)
+
+
+def _in_parts(residual: FloatArray, phase: FloatArray) -> list[FloatArray]:
+    """Return what lies in each of the parts of the motion, cycle by cycle, and between them."""
+    found, rest = by_cycle(residual, phase)
+    return [found[:, 0], found[:, 1], found[:, 2], found[:, 3:], rest]
 
 
 def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
@@ -113,13 +152,13 @@ def by_cycle(
 ) -> tuple[FloatArray, FloatArray]:
     """Return coefficients of offset, cosine, sine and harmonics in each cycle, and the rest.
 
-    Shape (cycles, 1 + 2 harmonics). Within a cycle the functions are orthonormal, so that noise
-    gives each coefficient the variance 1.
+    Shape (cycles, 1 + 2 harmonics, ...) for a residual of shape (n, ...). Within a cycle the
+    functions are orthonormal, so that noise gives each coefficient the variance 1.
     """
     number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
     ends = np.searchsorted(number, np.arange(number[-1] + 2))
     width, rest = 1 + 2 * harmonics, residual.copy()
-    found = np.zeros((len(ends) - 1, width))
+    found = np.zeros((len(ends) - 1, width, *residual.shape[1:]))
     for cycle, (first, last) in enumerate(pairwise(ends.tolist())):
         size = min(width, (last - first) // 2)
         if size < 1:
@@ -133,7 +172,3 @@ def by_cycle(
         found[cycle, :size] = basis.T @ residual[first:last]
         rest[first:last] -= basis @ found[cycle, :size]
     return found, rest
-
-
-def _powers(row: FloatArray) -> FloatArray:
-    return np.asarray(dct(row, norm="ortho") ** 2)

@@ -31,7 +31,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import Remainder, remainder_of
+from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
 from pendpipe.diagnosis.result import BASELINES
 from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross, loses_phase
 from pendpipe.diagnosis.task import Task, undrawn
@@ -147,7 +147,7 @@ def grown(state: State, task: Task, beginning: Beginning) -> Search:
     remainder = remainder_of(state.fit, state.data, state.noise)
     forensics = task.forensics
     forensics.after(state, task.progress)
-    improved = replace(state.fit, error_scale=remainder.error_scale)
+    improved = with_errors(state.fit, state.data, state.noise)
     assert state.first is not None
     assert state.now is not None
     return Search(
@@ -187,7 +187,7 @@ def _described(state: State, task: Task) -> Fit | None:
     remainder = remainder_of(state.fit, state.data, state.noise)
     while remainder.systematic and not _ends_with_curve(state):
         assert state.now is not None
-        named = replace(state.fit, error_scale=remainder.error_scale)
+        named = with_errors(state.fit, state.data, state.noise)
         if not describe(state, state.now.p_value / CATALOGUE_SHARE, task):
             break
         task.progress(f"describing what is left by {state.steps[-1].winner.name}")
@@ -204,10 +204,7 @@ def _without_curve(state: State) -> Fit | None:
     if len(state.steps) < 2 or not isinstance(last, Curve) or not last.of_anything:
         return None
     without = refit_without(state, state.steps[-1:])
-    if without is None:
-        return None
-    remainder = remainder_of(without, state.data, state.noise)
-    return replace(without, error_scale=remainder.error_scale)
+    return with_errors(without, state.data, state.noise) if without else None
 
 
 def _baseline_alone(state: State, beginning: Beginning) -> Fit:

@@ -28,7 +28,7 @@ from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.moves import price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
-from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import (
     COLOURED_NOISE,
     FILE_NAME,
@@ -547,7 +547,7 @@ class _Answer:
         there = best_fit(model, known, noise, [fit.value], held=self.found.held)
         if there is None:
             return None
-        there = replace(there, error_scale=remainder_of(there, known, noise).error_scale)
+        there = with_errors(there, known, noise)
         noise_sd = np.concatenate([outcome.search.noise.sd for outcome in self.outcomes])
         off = data.residual(there.at.reading) / noise_sd
         others = ~self._of(number) & (data.weight > 0.0)

@@ -299,10 +299,9 @@ def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
         return f"A small misfit remains unexplained ({printed(unexplained)})."
     shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
     where = ", ".join(f"{_percent(share)} {_PARTS[name]}" for name, share in shares if share > 0.05)
-    times, enlarged = _factor(remainder.over_noise), _factor(remainder.error_scale)
     return (
-        f"The remaining residual is still {times} times the noise ({where}), so the model is"
-        f" incomplete: the errors given here are enlarged by a factor of {enlarged}, and the"
+        f"The remaining residual is still {_factor(remainder.over_noise)} times the noise"
+        f" ({where}), so the model is incomplete: the errors given here allow for that, and the"
         " probabilities are lowered accordingly."
     )
 

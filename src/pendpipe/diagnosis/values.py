@@ -85,7 +85,7 @@ def _with_errors(
 
     They hardly depend on the values at the indices `constant`.
     """
-    sds, centre = _sds(fit) / fit.error_scale, of(fit.value)
+    sds, centre = _sds(fit), of(fit.value)
     jacobian = np.zeros((len(centre), len(fit.value)))
     for index in fit.free:
         step = _DERIVATIVE_STEP * float(sds[index])
@@ -111,9 +111,15 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     """Return 95 % intervals that are valid at a bound."""
     low, high = fit.model.bounds()
     held = [index for index in range(len(fit.value)) if index not in fit.free]
-    # A misfit beyond the noise widens the intervals as it widens the standard deviations.
-    normal = fit.jacobian.T @ fit.jacobian / fit.error_scale**2
-    gradient = fit.jacobian.T @ fit.residual / fit.error_scale**2
+    normal, gradient = fit.jacobian.T @ fit.jacobian, fit.jacobian.T @ fit.residual
+    if fit.scatter is not None:
+        # A misfit beyond the noise widens the intervals as it widens the standard deviations.
+        free, narrow = np.ix_(fit.free, fit.free), normal.copy()
+        inverse = np.linalg.pinv(fit.scatter[free], hermitian=True)
+        normal[free] = narrow[free] @ inverse @ narrow[free]
+        gradient = (
+            gradient * normal.diagonal() / np.where(narrow.diagonal() > 0.0, narrow.diagonal(), 1.0)
+        )
     wanted = [index for index in (A, B, C) if index in fit.free]
     found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
     variance = fit.variance if len(fit.variance) else np.zeros(len(fit.value))

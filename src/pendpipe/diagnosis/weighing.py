@@ -21,7 +21,7 @@ from pendpipe.diagnosis.moves import is_further
 from pendpipe.diagnosis.refine import Fit, best_fit, misfit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import FoundEffect
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Fault, Step, is_gross
@@ -119,7 +119,7 @@ def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
     fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
-    return replace(fit, error_scale=remainder_of(fit, found.data, found.noise).error_scale)
+    return with_errors(fit, found.data, found.noise)
 
 
 def with_other_descriptions(law: Fit, found: Search, weighed: Sequence[Weighed]) -> Fit:
@@ -380,13 +380,12 @@ def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search 
     fit = refitted(without, found, sorted(held), best)
     if fit is None:
         return None
-    remainder = remainder_of(fit, found.data, found.noise)
-    fit = replace(fit, error_scale=remainder.error_scale)
+    fit = with_errors(fit, found.data, found.noise)
     return replace(
         found,
         improved=fit,
         steps=_reordered(found.steps, number, effect),
-        remainder=remainder,
+        remainder=remainder_of(fit, found.data, found.noise),
         held=tuple(sorted(held)),
         named=fit,
     )
