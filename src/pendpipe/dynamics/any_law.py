@@ -275,17 +275,16 @@ def _solved(
     before, front, waits = math.inf, -1, 0
     for _ in range(_ROUNDS):
         now = rates(law, motion, largest)
-        if motion.slopes is None:
-            motion = replace(motion, slopes=_slopes(law, motion, now, largest))
-        by_log, by_time = motion.slopes
+        by_log, by_time = motion.slopes or _slopes(law, motion, now, largest)
         off = log_start + clock.integral(now.loss) - motion.log_amplitude
         change = np.clip(_linear(clock, by_log, off), -_STRIDE, _STRIDE)
         late = start_s + clock.integral(now.pace + by_time * change) - motion.time_s
         errors = np.maximum(np.abs(change), omega * np.abs(late)).max(axis=1)
         errors = errors[: _followed(motion, until_s)]
         error = float(np.max(errors))
+        log_amplitude, time_s = motion.log_amplitude + change, motion.time_s + late
         motion = replace(
-            motion, log_amplitude=motion.log_amplitude + change, time_s=motion.time_s + late
+            motion, log_amplitude=log_amplitude, time_s=time_s, slopes=(by_log, by_time)
         )
         # The next change will be smaller by what this one is smaller than the last; with slopes of
         # a motion near it, hardly by more than ten.
