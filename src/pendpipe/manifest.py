@@ -144,12 +144,6 @@ def manifests(home: Path) -> Iterator[Manifest]:
     yield from (read_manifest(home, path.stem) for path in sorted((home / FOLDER).glob("*.json")))
 
 
-def damages_of(home: Path, stage: str, *, hash_all: bool = False) -> tuple[Manifest, list[Damage]]:
-    """Look for damage among a stage's results, its manifest included."""
-    manifest = read_manifest(home, stage)
-    return manifest, manifest.damages(hash_all=hash_all)
-
-
 def histories(home: Path) -> tuple[dict[str, str], list[str]]:
     """Look for damage in a folder of results when a run is planned; nothing is touched.
 
@@ -297,24 +291,21 @@ def check(paths: Iterable[Path]) -> dict[Path, str]:
     return hashes
 
 
-class Index:
+class Index(dict[Path, dict[str, tuple[Manifest, Sum]]]):
     """Finds the manifest that lists a file, reading each folder's manifests once."""
 
-    def __init__(self) -> None:
-        self._homes: dict[Path, dict[str, tuple[Manifest, Sum]]] = {}
+    def __missing__(self, home: Path) -> dict[str, tuple[Manifest, Sum]]:
+        self[home] = {
+            name: (manifest, made)
+            for manifest in manifests(home)
+            for name, made in (manifest.outputs | manifest.extras).items()
+        }
+        return self[home]
 
     def find(self, path: Path) -> tuple[Manifest, Sum] | None:
         """Look in the file's own folder and in the two above it."""
-        for home in path.absolute().parents[:3]:
-            if home not in self._homes:
-                self._homes[home] = {
-                    name: (manifest, made)
-                    for manifest in manifests(home)
-                    for name, made in (manifest.outputs | manifest.extras).items()
-                }
-            if found := self._homes[home].get(_name(path, home)):
-                return found
-        return None
+        found = (self[home].get(_name(path, home)) for home in path.absolute().parents[:3])
+        return next(filter(None, found), None)
 
     def made_from_others(self, path: Path, owner: Manifest) -> Damage | None:
         """Whether a result was made from other files than those that are there now."""

@@ -1,8 +1,7 @@
 """Which code made a result: so that editing the library reruns what depends on it."""
 
-import ast
 import hashlib
-from collections.abc import Iterator
+import re
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -51,51 +50,29 @@ def _files(module: str) -> tuple[Path, ...]:
     return (*source, *sorted(file for file in templates if file.is_file()))
 
 
+_IMPORT: Final = re.compile(r"^ *(?:from (pendpipe[\w.]*) )?import (\([^)]*\)|.*)", re.MULTILINE)
+_BY_NAME: Final = re.compile(r'importlib\.import_module\(\s*(?:f?"([\w.]+)(\{?))?')
+"""With a name known only at run time: each module of that package counts."""
+
+
 @cache
 def _imports(module: str) -> frozenset[str]:
-    """The modules of ours that a module names in its import statements."""
+    """The modules of ours that a module names in its import statements.
+
+    A package that imports its own modules by name writes ``f"{__name__}.{name}"``.
+    """
+    text = _files(module)[0].read_text(encoding="utf-8").replace("{__name__}", module)
     found: set[str] = set()
-    content = _files(module)[0].read_bytes()
-    tree = ast.parse(content)
-    for statement in _statements(tree.body):
-        if isinstance(statement, ast.Import):
-            found.update(alias.name for alias in statement.names)
-        elif isinstance(statement, ast.ImportFrom) and statement.module and not statement.level:
-            names = (f"{statement.module}.{alias.name}" for alias in statement.names)
-            found.update((statement.module, *names))
-    calls = ast.walk(tree) if b"import_module" in content else ()
-    for call in (node for node in calls if isinstance(node, ast.Call)):
-        found.update(_imported_by_name(call, module))
+    for origin, names in _IMPORT.findall(text):
+        listed = re.findall(r"[\w.]+", names)
+        found.update((origin, *(f"{origin}.{name}" for name in listed)) if origin else listed)
+    for start, unknown in _BY_NAME.findall(text):
+        if not start:
+            raise ValueError(f"{module} imports what has no name to follow")
+        found |= _modules_of(start.rpartition(".")[0]) if unknown else {start}
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
-
-
-def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements, however deep; an import is none of an expression's many parts."""
-    for statement in body:
-        yield statement
-        for part in ("body", "orelse", "finalbody"):
-            yield from _statements(getattr(statement, part, []))
-        for part in ("handlers", "cases"):
-            yield from _statements([s for b in getattr(statement, part, []) for s in b.body])
-
-
-def _imported_by_name(call: ast.Call, module: str) -> set[str]:
-    """What ``importlib.import_module(f"pendpipe.commands.{name}")`` may import: each of them.
-
-    A package that imports its own modules writes ``f"{__name__}.{name}"``.
-    """
-    if ast.unparse(call.func) != "importlib.import_module":
-        return set()
-    match call.args[0]:
-        case ast.Constant(value=str(name)):
-            return {name}
-        case ast.JoinedStr(values=[ast.Constant(value=str(start)), *_]):
-            return _modules_of(start.rpartition(".")[0])
-        case ast.JoinedStr(values=[ast.FormattedValue(value=ast.Name(id="__name__")), *_]):
-            return _modules_of(module)
-    raise ValueError(f"no name to follow in {ast.unparse(call)}")
 
 
 def _modules_of(package: str) -> set[str]:

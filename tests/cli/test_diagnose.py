@@ -256,7 +256,7 @@ def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> No
 def test_what_snakemake_deletes_after_a_kill_is_no_damage(tmp_path: Path) -> None:
     """It deletes the declared files of a killed job; made again, they are as undisturbed ones."""
     from pendpipe.figures import OF_EVERY_DIAGNOSIS
-    from pendpipe.manifest import damages_of
+    from pendpipe.manifest import read_manifest
 
     refused = tmp_path / "refused.json"
     refused.write_text(json.dumps({"record": "r", "stage": "acquire", "reason": "no decay"}))
@@ -264,7 +264,7 @@ def test_what_snakemake_deletes_after_a_kill_is_no_damage(tmp_path: Path) -> Non
     assert cli.main(["diagnose", str(tmp_path / "none.csv"), *words]) == 0
     for name in ("diagnosis.json", *(f"{name}.svg" for name in OF_EVERY_DIAGNOSIS)):
         (tmp_path / "diagnosis" / name).unlink()
-    assert not damages_of(tmp_path, "diagnose")[1]
+    assert not read_manifest(tmp_path, "diagnose").damages()
 
 
 def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:

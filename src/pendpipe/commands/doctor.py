@@ -102,12 +102,12 @@ def examine(results: Path) -> list[Finding]:
 def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
     """Results that are not what their stages wrote, or that were never finished."""
     for stage in known:
-        broken, damages = manifest.damages_of(home, stage.stage, hash_all=True)
+        damages = stage.damages(hash_all=True)
         for damage in damages:
             yield Finding("altered", str(damage.path), damage.problem, _RUN)
-        for path in (home / name for name in broken.outputs if not (home / name).is_file()):
+        for path in (home / name for name in stage.outputs if not (home / name).is_file()):
             yield Finding("incomplete", str(path), "it is missing", _RUN)
-        if not broken.outputs and not damages:
+        if not stage.outputs and not damages:
             problem = f"stage {stage.stage} began and did not end"
             yield Finding("incomplete", str(home), problem, "snakemake runs it again")
 

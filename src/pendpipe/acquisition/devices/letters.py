@@ -19,56 +19,42 @@ class SimulatedDI154RS(Dialect, model="DI-154RS", bits=12):
 
     def __init__(self) -> None:
         super().__init__()
-        self._state = "idle"  # or "letter" after NUL, or the letter that wants its argument
-        self._mask = 0b0001
-        self._counter = 0
-        self._baud = 4800
+        self._begun = b""  # NUL, or the letter that wants its argument
+        self._registers = dict.fromkeys(b"SNCDLMBER", 0) | {ord("C"): 0b0001}
 
     @property
     def channels(self) -> tuple[int, ...]:
         """The enabled channels, from 1, in the order of the scan."""
-        return tuple(number + 1 for number in range(4) if self._mask >> number & 1)
+        return tuple(number + 1 for number in range(4) if self._registers[ord("C")] >> number & 1)
 
     @property
     def scan_rate_hz(self) -> float:
         """Scans a second: the bit times of a scan, plus the counter's."""
-        return self._baud / (20 * max(1, len(self.channels)) + self._counter)
+        counter = self._registers[ord("L")] | self._registers[ord("M")] << 8
+        baud = 9600 if self._registers[ord("B")] == 4 else 4800
+        return baud / (20 * max(1, len(self.channels)) + counter)
 
     def respond(self, data: bytes) -> bytes:
         """Take bytes from the host; return the echoes and answers."""
-        out = bytearray()
+        out = b""
         for value in data:
-            byte = bytes([value])
-            if self._state == "idle":
-                if value == 0:
-                    self._state = "letter"
-            elif self._state == "letter":
-                known = byte in (b"S", b"N", b"C", b"D", b"L", b"M", b"B", b"E", b"R")
-                self._state = byte.decode("latin-1") if known else "idle"
-                out += byte if known else b""
-            else:
-                letter, self._state = self._state, "idle"
-                out += byte + self._execute(letter, value)
-        return bytes(out)
+            before, self._begun, byte = self._begun, b"", bytes([value])
+            if before == b"\0" and value in self._registers:
+                self._begun = byte
+                out += byte
+            elif before and before != b"\0":
+                out += byte + self._execute(before, value)
+            elif not before and value == 0:
+                self._begun = byte
+        return out
 
-    def _execute(self, letter: str, argument: int) -> bytes:
+    def _execute(self, letter: bytes, argument: int) -> bytes:
         """Execute a complete command; return what follows the echo."""
-        if letter == "S":
-            self.streaming = argument == ord("1")
+        self._registers[ord(letter)] = argument
+        if letter in (b"S", b"R"):
+            self.streaming = letter == b"S" and argument == ord("1")
             self.starts += self.streaming
-        elif letter == "N":
-            return self.answer_to_identify
-        elif letter == "C":
-            self._mask = argument & 0x0F
-        elif letter == "L":
-            self._counter = self._counter & 0xFF00 | argument
-        elif letter == "M":
-            self._counter = self._counter & 0x00FF | argument << 8
-        elif letter == "B":
-            self._baud = {1: 4800, 4: 9600}.get(argument, self._baud)
-        elif letter == "R":
-            self.streaming = False
-        return b""
+        return self.answer_to_identify if letter == b"N" else b""
 
 
 class SimulatedDI194RS(

@@ -46,21 +46,21 @@ class TextDialect(Dialect):
         if self.streaming and name != "stop":
             return b""
         answer = ""
-        if name in ("start", "stop"):
-            self.streaming = name == "start"
-            self.starts += self.streaming
-            if self.streaming and not self.echoes_start:
-                return b""
-        elif name == "info" and arguments:
-            known = {"0": "DATAQ", "1": self.model.removeprefix("DI-"), **self.information}
-            answer = " " + known.get(arguments[0], "")
-        elif name == "slist" and len(arguments) == 2:
-            place, word = int(arguments[0]), arguments[1]
-            value = int(word[1:], 16) if word[0] == "x" else int(word)
-            # A list is written from its first place on, and ends with its last.
-            self._list[place:] = [] if value == _END_OF_LIST else [value]
-        elif not self._set(name, arguments):
-            return self.unknown
+        match name, arguments:
+            case (("start" | "stop"), _):
+                self.streaming = name == "start"
+                self.starts += self.streaming
+                if self.streaming and not self.echoes_start:
+                    return b""
+            case "info", [number, *_]:
+                known = {"0": "DATAQ", "1": self.model.removeprefix("DI-"), **self.information}
+                answer = " " + known.get(number, "")
+            case "slist", [place, word]:
+                value = int(word[1:], 16) if word[0] == "x" else int(word)
+                # A list is written from its first place on, and ends with its last.
+                self._list[int(place) :] = [] if value == _END_OF_LIST else [value]
+            case _ if not self._set(name, arguments):
+                return self.unknown
         return f"{text}{answer}\r".encode("latin-1")
 
     @abstractmethod
