@@ -21,6 +21,7 @@ from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
 
 from .records import (
+    FREQUENCY_HZ,
     INSTANT_S,
     INTERVAL_S,
     TIME_S,
@@ -131,3 +132,19 @@ def test_each_of_several_names_is_less_certain_than_one() -> None:
     several = replace(found, steps=(step, *others))
     doubted = weigh(several, jumped().beginning, step).weights
     assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)
+
+
+@pytest.mark.parametrize("order", [2.0, 3.0])
+@pytest.mark.parametrize("off", [0.02, 0.3])
+def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
+    order: float, off: float
+) -> None:
+    """A law that nobody knows makes lines at the harmonics, and others anywhere."""
+    second = by_identifier("second-mode")
+    tone = [1e-3, 0.0, (order + off) * FREQUENCY_HZ, 30.0]
+    readings = Model(TIME_S, INTERVAL_S, (second,)).reading(np.append(TRUTH, tone))
+    made = diagnose_recording(recording(readings, 5))
+    (effect,) = made.effects
+    assert effect.identifier == "second-mode"
+    named = 1.0 / (1.0 + np.exp(-2.5) / (2.0 * off))
+    assert effect.probability == pytest.approx(named, abs=0.02)

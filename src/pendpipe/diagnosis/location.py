@@ -56,9 +56,9 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     harmonics = _harmonics(sampled.phase, difference)
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
-    tone = tone_of(after, effect)
+    tone = _last_in(after, effect, "Hz") if effect.spectral else None
     if tone is not None:
-        lines, harmonics = (tone,), ()
+        lines, harmonics = (tone.value,), ()
     found = Location(time, amplitude, phase, lines, harmonics)
     summary = _summary(found, data, sampled.amplitude, opposite_arcs(of_cycle))
     beat = beat_of(after, effect)
@@ -121,19 +121,29 @@ def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
     return None if found is None else (found.value - 1.96 * found.sd, found.value + 1.96 * found.sd)
 
 
-def tone_of(fit: Fit, effect: Effect) -> float | None:
-    """Return the frequency of a tone, Hz."""
-    found = _last_in(fit, effect, "Hz") if effect.spectral else None
-    return None if found is None else found.value
-
-
 def off_harmonics(fit: Fit, effect: Effect) -> bool:
     """Whether an effect is a line off the motion's harmonics: no misfit of the motion makes one."""
-    tone = tone_of(fit, effect)
+    off = _from_harmonic(fit, effect)
+    return off is not None and off.value > _OFF_HARMONIC
+
+
+def near_harmonic_by_chance(fit: Fit, effect: Effect) -> float:
+    """Return the probability that a line is by chance as near a harmonic; 1 for what is no line.
+
+    Of a line anywhere, twice the distance in units of the motion's frequency, with its error. Any
+    law of the motion makes lines at the harmonics.
+    """
+    off = _from_harmonic(fit, effect)
+    return 1.0 if off is None else min(max(2.0 * (off.value + off.sd), 1e-9), 1.0)
+
+
+def _from_harmonic(fit: Fit, effect: Effect) -> Estimate | None:
+    """Return the distance of a line from the nearest harmonic (or from zero), over the motion's."""
+    tone = _last_in(fit, effect, "Hz") if effect.spectral else None
     if tone is None:
-        return False
-    order = tone / (0.5 * float(fit.value[OMEGA]) / math.pi)
-    return abs(order - round(order)) > _OFF_HARMONIC and order > _OFF_HARMONIC
+        return None
+    motion = 0.5 * float(fit.value[OMEGA]) / math.pi
+    return Estimate(abs(math.remainder(tone.value, motion)) / motion, tone.sd / motion, "")
 
 
 def beat_of(fit: Fit, effect: Effect) -> float | None:

@@ -16,7 +16,7 @@ from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, of_one_class, probabilities
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import locate, off_harmonics
+from pendpipe.diagnosis.location import locate, near_harmonic_by_chance, off_harmonics
 from pendpipe.diagnosis.moves import is_further
 from pendpipe.diagnosis.refine import Fit, best_fit, misfit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
@@ -87,6 +87,8 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _clean_charge(found))
     if effect.kind != "unnamed":
         none += _charge_for_several(found)
+    # Any law of the motion that nobody knows makes lines at its harmonics.
+    none -= 2.0 * math.log(near_harmonic_by_chance(found.improved, effect))
     weights = probabilities([own, *mates], none)
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.improved, effect)):
