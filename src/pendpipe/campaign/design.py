@@ -136,13 +136,16 @@ class Design:
     def nuisances(self) -> tuple[Nuisance, ...]:
         """All uncertain inputs; those with sd 0 are exact and are left out."""
         own, sphere, law = self.apparatus, self.apparatus.sphere, self.apparatus.hysteresis
-        wet = [run.fluid for run in self.runs if run.fluid is not None]
-        found = [Nuisance("hysteretic coefficient", "", math.inf)]
-        found += [
-            Nuisance(f"distance of {name} at {place:g} m", "m", own.position_sd_m)
-            for name, place in self.clamps
-        ]
-        found += [
+        fluids = [run.fluid for run in self.runs if run.fluid is not None]
+        fitted = sphere if any(run.sphere for run in self.runs) else None
+        tank = own.tank if fitted and any(run.tank for run in self.runs) else None
+        drags_in_air = self.air is not None and self.air.boundary_layer
+        found = (
+            Nuisance("hysteretic coefficient", "", math.inf),
+            *(
+                Nuisance(f"distance of {name} at {place:g} m", "m", own.position_sd_m)
+                for name, place in self.clamps
+            ),
             Nuisance("zero of the scale", "m", own.scale_zero_sd_m),
             *(
                 Nuisance(f"mass of {name}", "kg", own.weights[name].mass_sd_kg)
@@ -151,26 +154,18 @@ class Design:
             Nuisance("mass of the rod", "kg", own.rod.mass_sd_kg),
             Nuisance("length of the rod", "m", own.rod.length_sd_m),
             Nuisance("exponent of the loss torque", "", law.inertia_exponent_sd),
-        ]
-        if sphere is not None and any(run.sphere for run in self.runs):
-            found += [
-                Nuisance("mass of the sphere", "kg", sphere.mass_sd_kg),
-                Nuisance("radius of the sphere", "m", sphere.diameter_sd_m / 2),
-                Nuisance("lever of the sphere", "m", sphere.distance_sd_m),
-            ]
-            if own.tank is not None and any(run.tank for run in self.runs):
-                found.append(Nuisance("height in the tank", "depths", height_sd(own.tank)))
-        if wet:
-            found.append(Nuisance("thermometer", "K", max(f.temperature_sd_k for f in wet)))
-            found.append(
-                Nuisance("immersed screw", "m", sphere.screw_length_sd_m if sphere else 0.0)
-            )
-        if self.air is not None and self.air.boundary_layer:
-            found.append(Nuisance("air drag", "", AIR_DRAG_RELATIVE_SD))
-        found += [
-            Nuisance(f"loss torque in {name}", "", law.assembly_relative_sd)
-            for name in self.assemblies[1:]
-        ]
+            Nuisance("mass of the sphere", "kg", fitted.mass_sd_kg if fitted else 0.0),
+            Nuisance("radius of the sphere", "m", fitted.diameter_sd_m / 2 if fitted else 0.0),
+            Nuisance("lever of the sphere", "m", fitted.distance_sd_m if fitted else 0.0),
+            Nuisance("height in the tank", "depths", height_sd(tank) if tank else 0.0),
+            Nuisance("thermometer", "K", max((f.temperature_sd_k for f in fluids), default=0.0)),
+            Nuisance("immersed screw", "m", sphere.screw_length_sd_m if fluids and sphere else 0.0),
+            Nuisance("air drag", "", AIR_DRAG_RELATIVE_SD if drags_in_air else 0.0),
+            *(
+                Nuisance(f"loss torque in {name}", "", law.assembly_relative_sd)
+                for name in self.assemblies[1:]
+            ),
+        )
         return tuple(each for each in found if each.sd > 0.0)
 
     @cached_property
@@ -261,21 +256,16 @@ class Design:
         taken to change with temperature as water does.
         """
         columns = []
-        for run in self.runs:
-            if run.fluid is None:
-                columns.append((0.0, 1.0, 20.0, 0.0))
-                continue
-            density, viscosity = fluid_at(run.fluid, run.temperature_c)
-            known = run.fluid.temperature_c
-            about = run.temperature_c if run.temperature_c is not None else known
-            columns.append(
-                (density, viscosity, 20.0 if about is None else about, known is not None)
-            )
-        density, viscosity, about, follows = np.array(columns).T
-        then = np.clip(about + follows * warmer_k, 0.0, 40.0)
-        lighter = physics.water_density(then) / physics.water_density(about)
-        thinner = physics.water_viscosity(then) / physics.water_viscosity(about)
-        return density * lighter, viscosity * thinner
+        warmer_k = np.broadcast_to(warmer_k, (*warmer_k.shape[:-1], len(self.runs)))
+        for number, run in enumerate(self.runs):
+            found = physics.Fluid(0.0, 1.0)
+            if run.fluid is not None:
+                about = run.fluid.temperature_c if run.temperature_c is None else run.temperature_c
+                then = None if about is None else np.clip(about + warmer_k[..., number], 0.0, 40.0)
+                found = fluid_at(run.fluid, then)
+            columns.append(np.broadcast_arrays(*found, warmer_k[..., number])[:2])
+        density, viscosity = np.moveaxis(np.array(columns), (0, 1), (-1, 0))
+        return density, viscosity
 
     @cached_property
     def rod_air_drag(self) -> FloatArray:

@@ -24,6 +24,7 @@ from pendpipe.campaign.fit import (
     predict,
 )
 from pendpipe.estimate import chi_square_p_value
+from pendpipe.templates import render
 
 CLASS_CHI2: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in the class (contract)."""
@@ -481,52 +482,17 @@ def _location(search: CampaignSearch) -> dict[str, Any]:
 def _deciding(runs: Sequence[NextRun]) -> str:
     if not runs:
         return "none is needed: no other effect of the catalogue fits as well"
-    best = runs[0]
-    apart = ", ".join(f"{name} by {sigma:.1f} sigma" for name, sigma in best.then.items())
-    return f"{best.what}: it would reject {apart}"
-
-
-def _share(probability: float) -> str:
-    return f"{probability:.0%}" if probability >= 0.01 else "below 1%"
-
-
-def _chance(p_value: float) -> str:
-    return f"p = {p_value:.2g}" if p_value >= 1e-12 else "p < 1e-12"
+    apart = ", ".join(f"{name} by {sigma:.1f} sigma" for name, sigma in runs[0].then.items())
+    return f"{runs[0].what}: it would reject {apart}"
 
 
 def statement(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> str:
     """One paragraph of plain English."""
-    count = len(search.baseline.design.runs)
-    chance = _chance(search.p_value)
-    if not search.missing:
-        return (
-            f"The {count} records agree with Eq. 16, the loss torque and the stated errors of the"
-            f" apparatus (global {chance})."
-        )
-    unlike = (
-        f"The {count} records do not agree with Eq. 16 and the stated errors of the apparatus"
-        f" (global {chance})"
-    )
-    if not search.found:
-        return f"{unlike}, and no effect of the catalogue explains how they differ."
-    words = [f"{unlike}."]
-    for found, runs in zip(search.found, ranked, strict=True):
-        effect, size = found.leader.last, found.leader.size()
-        words.append(
-            f"Most probable is {effect.name} ({effect.parameter.name.replace('_', ' ')}"
-            f" {size});"
-            f" chi^2 falls by {found.delta_chi2:.0f}."
-        )
-        if found.rivals:
-            names = ", ".join(
-                f"{rival.last.name} ({_share(probability)})" for rival, probability in found.rivals
-            )
-            words.append(f"These records cannot tell it from {names}.")
-            words.append(f"What would decide is {_deciding(runs)}.")
     left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
-    if left < 0.01:
-        words.append(f"Something is left that this does not explain ({_chance(left)}).")
-    return " ".join(words)
+    deciding = map(_deciding, ranked)
+    found = list(zip(search.found, deciding, strict=True))
+    text = render("pendpipe.campaign", "statement.txt", search=search, found=found, left=left)
+    return " ".join(text.split())
 
 
 _STEP = 1e-3

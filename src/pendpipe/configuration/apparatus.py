@@ -74,21 +74,19 @@ def pendulum_parts(
     return parts
 
 
-def fluid_at(fluid: Fluid, temperature_c: float | None) -> physics.Fluid:
-    """Density and viscosity of a fluid at a record's temperature.
+def fluid_at(fluid: Fluid, temperature_c: float | FloatArray | None) -> physics.Fluid:
+    """Density and viscosity of a fluid at a record's temperature, or at several.
 
     Water's change between the temperature where the configured values hold and that of
     the record is taken from the published formulas of `pendpipe.physics.fluid`.
     """
-    density, viscosity = fluid.density_kg_per_m3, fluid.viscosity_pa_s
-    if temperature_c is not None and fluid.temperature_c is not None:
-        density *= float(
-            physics.water_density(temperature_c) / physics.water_density(fluid.temperature_c)
-        )
-        viscosity *= float(
-            physics.water_viscosity(temperature_c) / physics.water_viscosity(fluid.temperature_c)
-        )
-    return physics.Fluid(density, viscosity)
+    if temperature_c is None or fluid.temperature_c is None:
+        return physics.Fluid(fluid.density_kg_per_m3, fluid.viscosity_pa_s)
+    density, viscosity = (
+        of_water(temperature_c) / of_water(fluid.temperature_c)
+        for of_water in (physics.water_density, physics.water_viscosity)
+    )
+    return physics.Fluid(fluid.density_kg_per_m3 * density, fluid.viscosity_pa_s * viscosity)
 
 
 def quadratic_rate(campaign: Campaign, record: Record, built: Pendulum) -> float:
