@@ -116,13 +116,19 @@ def _below(answers: Answers, sign: float) -> bool:
 
 
 def _stiffness(answers: Answers, sign: float) -> bool:
-    """Whether the frequency grows (or falls) with the amplitude, by any torque that says so."""
+    """Whether the frequency grows (or falls) with the amplitude, by any torque that says so.
+
+    Or by the frequency at the smallest swings, which the answer compares with the model's.
+    """
     named = ("cubic-stiffness", "amplitude-linear-stiffness")
     other = {"unnamed-restoring", "keulegan-carpenter-drag", "frequency-drift"}
     if sign < 0:
         other |= {"presliding-friction"}
-    return any(answers.coefficient(each, sign) for each in named) or not other.isdisjoint(
-        answers.names
+    small = _below(answers, -sign)
+    return (
+        small
+        or any(answers.coefficient(each, sign) for each in named)
+        or not other.isdisjoint(answers.names)
     )
 
 

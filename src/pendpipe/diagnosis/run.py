@@ -250,10 +250,9 @@ def diagnose_decay(
     if not fixed:
         # A part of b that is held bounds b here, and not in the fit.
         before = _as_fit_prints(before, part, points, baseline, "linear", place)
+    same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     law = law_of(found, weighed)
-    after = _fitted_model(found.improved, found, law)
-    if not law.model.effects:
-        after = replace(after, parameters=before.parameters)
+    after = before if same else _fitted_model(found.improved, found, law)
     if not fixed and [each.key for each in found.improved.model.effects] == [SINE]:
         after = _as_fit_prints(after, part, points, baseline, "sine", place)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
