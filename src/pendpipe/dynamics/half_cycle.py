@@ -53,10 +53,8 @@ from pendpipe.dynamics.panel import (
     VISCOUS,
     WEIGHT,
     angle_of,
-    complement_for,
     curve,
     horner,
-    log_amplitude,
     multiply,
     place,
     polynomial,
@@ -380,97 +378,66 @@ def _in_time(
 
 
 @kernel
-def even_half_cycle(work: Work, y: float, complement: float, panels: int, row: FloatArray) -> bool:
-    """Solve a half cycle on `panels` equal panels into `row`; return whether these resolve it."""
-    m = work.shape[0]
-    radius = y - m
-    _start(work, radius)
-    change, excess = 0.0, 0.0
-    width, at = work.per_panel, work.head
-    for p in range(panels):
-        node = work.nodes[(panels + p) % SLOTS]
-        if not _solve_panel(
-            work,
-            node,
-            radius * (1.0 + change),
-            p,
-            panels,
-            y,
-            complement,
-            False,
-            row[at + 1 : at + width],
-        ):
-            return False
-        excess += node[EXCESS + DEGREE]
-        if width > 0:
-            row[at] = excess
-            at += width
-        change += node[LOSS + DEGREE] * (1.0 + change)
-    gain = radius * change - 2.0 * m
-    row[0] = -math.log1p(gain / y)
-    if work.shape[CURVATURE] > 0.0:
-        row[0] += 0.5 * math.log1p(-0.25 * gain * (2.0 * y + gain) / curve(work.shape, y) ** 2)
-    row[1] = excess
-    _end(work, radius * (1.0 + change), y, row)
-    return True
-
-
-@kernel
-def direct_half_cycle(
+def half_cycle(
     work: Work,
     time_s: FloatArray,
     out: Matrix,
     row: FloatArray,
     y: float,
+    complement: float,
     begin: float,
     level: int,
     first: int,
     guess: int,
+    even: bool,
 ) -> tuple[float, float, int, int]:
-    """Solve a half cycle on panels as fine as it needs, into `row`, and write its samples.
+    """Solve a half cycle on panels as fine as it needs, and write its samples.
 
-    `begin` is its start in radians since the release, `level` the number of halvings to begin
-    with. Returns the amplitude at its end (negative if the pendulum stops before it reaches
-    its equilibrium), its duration less pi, the index of the next sample, and the number of
-    halvings it began with, which is negative if the pendulum is overdamped.
+    `complement` is that of `panel.place`, `begin` its start in radians since the release, and
+    `level` the number of halvings to begin with; `even` keeps it to these, writes no samples, and
+    leaves all panels in `row`. Returns the amplitude at its end (negative if the pendulum stops
+    before it reaches its equilibrium), its duration less pi, the index of the next sample, and the
+    number of halvings it began with, which is negative if the pendulum is overdamped, or the even
+    panels do not resolve the half cycle.
     """
     m = work.shape[0]
     radius = y - m
-    complement = complement_for(work.shape, log_amplitude(work.shape, y))
     _start(work, radius)
     change, excess, k = 0.0, 0.0, 0
-    coarsest, at = -1, work.head
+    coarsest = -1
     width = work.polynomials * NODE_COUNT
     while k < 1 << level:
         panels = 1 << level
         node = work.nodes[(panels + k) % SLOTS]
+        at = work.head + (k * work.per_panel if even else 0)
+        own = row[at + 1 : at + 1 + width]
+        finest = level >= FINEST
         if not _solve_panel(
-            work,
-            node,
-            radius * (1.0 + change),
-            k,
-            panels,
-            y,
-            complement,
-            level >= FINEST,
-            row[at : at + width],
+            work, node, radius * (1.0 + change), k, panels, y, complement, finest, own
         ):
-            if level >= FINEST:
+            if finest or even:
                 return y, 0.0, first, -1
             level, k = level + 1, 2 * k
             continue
         if coarsest < 0:
             coarsest = level
-        duration = math.pi / panels + node[EXCESS + DEGREE]
-        if width > 0:
+        if width > 0 and not even:
             begins = begin + math.pi * k / panels + excess
-            end = emit(work, time_s, out, row[at : at + width], begins, duration, y, first, guess)
+            duration = math.pi / panels + node[EXCESS + DEGREE]
+            end = emit(work, time_s, out, own, begins, duration, y, first, guess)
             first, guess = end, end - first
         excess += node[EXCESS + DEGREE]
+        if width > 0:
+            row[at] = excess
         change += node[LOSS + DEGREE] * (1.0 + change)
         k += 1
-        if k % 2 == 0 and level > 0:
+        if k % 2 == 0 and level > 0 and not even:
             k, level = k // 2, level - 1
     end_radius = radius * (1.0 + change)
+    gain = radius * change - 2.0 * m
+    row[0] = -math.log1p(gain / y)
+    if work.shape[CURVATURE] > 0.0:
+        row[0] += 0.5 * math.log1p(-0.25 * gain * (2.0 * y + gain) / curve(work.shape, y) ** 2)
+    row[1] = excess
     _end(work, end_radius, y, row)
     return end_radius - m, excess, first, coarsest

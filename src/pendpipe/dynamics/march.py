@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.half_cycle import direct_half_cycle, emit, rest
+from pendpipe.dynamics.half_cycle import emit, half_cycle, rest
 from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.dynamics.layout import (
     ENDINGS,
@@ -24,6 +24,7 @@ from pendpipe.dynamics.panel import (
     PLACED,
     amplitude_at,
     angle_of,
+    complement_for,
     curve,
     log_amplitude,
 )
@@ -226,8 +227,9 @@ def march(
         else:
             if k % 8 == 0 and level > 0:
                 level -= 1  # the damping may have eased
-            after, more, first, level = direct_half_cycle(
-                work, time_s, out, row, y, tau, level, first, guess
+            complement = complement_for(shape, log_y)
+            after, more, first, level = half_cycle(
+                work, time_s, out, row, y, complement, tau, level, first, guess, False
             )
             if level < 0:
                 return ENDINGS * k + OVERDAMPED

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numpy.polynomial.chebyshev import chebpts1
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import analysis, powers_of_chebyshev
-from pendpipe.dynamics.half_cycle import even_half_cycle
+from pendpipe.dynamics.half_cycle import half_cycle
 from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.dynamics.layout import FEW_POINTS, MOST_POINTS, TABLE, Work
 from pendpipe.dynamics.panel import (
@@ -39,6 +40,8 @@ _LOW_POWERS = 4
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
 _FEW_NODES, _MANY_NODES = chebpts1(FEW_POINTS), chebpts1(MOST_POINTS)
 _FEW_ANALYSIS, _MANY_ANALYSIS = analysis(_FEW_NODES), analysis(_MANY_NODES)
+
+_NONE: FloatArray = np.empty(0)
 
 # Entries of a segment's description.
 LOW, HIGH, MIDDLE, INVERSE, POINTS, PANELS = range(6)
@@ -101,11 +104,11 @@ def build(work: Work, rows: Matrix, log_y: float, span: float, panels: int) -> i
     segment[MIDDLE], segment[INVERSE] = log_y - half, 1.0 / half
     segment[POINTS], segment[PANELS] = points, panels
     width = work.head + panels * work.per_panel
-    complement = complement_for(work.shape, log_y)
+    level, complement = int(math.log2(panels)), complement_for(work.shape, log_y)
     nodes = _MANY_NODES if points == MOST_POINTS else _FEW_NODES
     for i in range(points):
         y = amplitude_at(work.shape, log_y - half + half * nodes[i])
-        if not even_half_cycle(work, y, complement, panels, rows[i]):
+        if half_cycle(work, _NONE, rows, rows[i], y, complement, 0.0, level, 0, 0, True)[3] < 0:
             return MORE_PANELS
     # The sine's excess is no work of the losses, and not to be measured by them.
     excess = _EXCESS_TOLERANCE if work.shape[CURVATURE] > 0.0 else 0.0
