@@ -23,7 +23,6 @@ from pendpipe.analysis.fit.by_points import (
     Period,
     clear,
     envelope_and_period,
-    fit_period,
     held_values,
     period_excess,
     share_of,
@@ -241,8 +240,12 @@ class Waveform:
         return change
 
 
-_SURE: Final = 0.7
-"""Phase in rad by which the start may be off: half a radian and some more converges."""
+_SLIP: Final = 0.7
+"""Phase in rad by which the law's turning points may part from the measured ones."""
+_SLIPPED: Final = (
+    "the period changes with the amplitude or the time as Eq. 8's does not:"
+    " {:.2g} rad of phase along the record"
+)
 _STOP: Final = 6.0
 """In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
 
@@ -253,8 +256,6 @@ class Start(NamedTuple):
     value: FloatArray
     before: int
     """Half cycles from the release to the first turning point kept."""
-    reliable: int
-    """How many turning points the start predicts to a fraction of a radian."""
     warnings: tuple[str, ...]
 
 
@@ -279,45 +280,22 @@ def start_values(
     )
     a, b, c, y0, level = (float(number) for number in envelope.value)
     share = share_of(parts, b, baseline)
-    known, reliable, warnings = period, len(points), []
     # What is not known to a fraction of a radian accuses nobody.
     late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
-    if np.max(np.abs(late), initial=0.0) > _SURE and omega is None:
-        reliable, known = _sure_part(points, envelope.amplitude, (a, b, c), share, restoring)
-        warnings.append(
-            "the period changes with the amplitude or the time as Eq. 8's does not:"
-            f" {np.ptp(late):.2g} rad of phase along the record"
-        )
+    slipped = omega is None and np.max(np.abs(late), initial=0.0) > _SLIP
     middle_share = 0.5 if share is None else share
     angle, time, before = _release(
         points,
         (a, b, c, y0),
         middle_share,
-        known,
+        period,
         at_first="amplitude" in fixed or restoring == "sine",
     )
     if restoring == "sine":
         angle = math.copysign(min(abs(angle), TOP), angle)
     offset = float(np.mean(points.level_rad)) - level
-    value = np.array([a, b, c, middle_share, known.angular_frequency, angle, time, offset])
-    return Start(value, before, reliable, tuple(warnings))
-
-
-def _sure_part(
-    points: TurningPoints,
-    amplitudes: FloatArray,
-    rates: tuple[float, float, float],
-    share: float | None,
-    restoring: Restoring,
-) -> tuple[int, Period]:
-    """The longest beginning over which one frequency describes the times, and that."""
-    count = len(points)
-    while True:
-        count = max(4, int(0.7 * count))
-        part = points.first(count)
-        period = fit_period(part, amplitudes[:count], *rates, share=share, restoring=restoring)
-        if np.max(np.abs(period.late_rad)) < 0.5 * _SURE or count == 4:
-            return count, period
+    value = np.array([a, b, c, middle_share, period.angular_frequency, angle, time, offset])
+    return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
 
 
 def _release(
@@ -366,16 +344,11 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     return slice(begin, int(np.searchsorted(samples.time_s, max(last, least), side="right")))
 
 
-_GROWTH: Final = 1.6
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
 _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
-_FEW: Final = 12
-"""Turning points from which a window grows."""
-_LOUD: Final = 4.0
-"""chi^2 of a reading from which a fit with sin x is tried from another window."""
 
 
 class _Fitted(NamedTuple):
@@ -425,16 +398,24 @@ def fit_waveform(
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     held = _held(held_rates, fixed, parts, baseline)
     start = start_values(points, held_rates, fixed, baseline, restoring)
-    fitted = _fit(samples, points, start, held, parts, restoring)
-    # Whether the search came to its end, and noise explains most of what is left.
-    readings, found = len(fitted.problem.values), fitted.minimum
-    explained = found.converged and found.quadratic.chi2 < _LOUD * readings
-    if restoring == "sine" and not explained:
-        # From another window: all at once, or grown from a few swings.
-        few = len(points) if start.reliable < len(points) else _FEW
-        other = _fit(samples, points, start._replace(reliable=few), held, parts, restoring)
-        fitted = min(fitted, other, key=lambda each: each.minimum.quadratic.chi2)
-    return _result(_refined(fitted, samples), samples, points, baseline, fixed)
+    span = usable_span(samples, points, start)
+    problem = Waveform(
+        samples.time_s[span],
+        samples.values[span],
+        points.noise_rms_rad,
+        parts,
+        restoring=restoring,
+    )
+    minimum = minimise(
+        problem.evaluate,
+        start.value,
+        BOUNDS,
+        held=held,
+        tolerance=_TOLERANCE,
+        predict_remaining=problem.predict_remaining,
+    )
+    fitted = _refined(_Fitted(problem, minimum, held, start), samples)
+    return _result(fitted, samples, points, baseline, fixed)
 
 
 def _result(
@@ -481,41 +462,6 @@ def _result(
     )
 
 
-def _fit(
-    samples: Samples,
-    points: TurningPoints,
-    start: Start,
-    held: tuple[int, ...],
-    parts: Mapping[str, float],
-    restoring: Restoring = "linear",
-) -> _Fitted:
-    """Search from the start; grow the window where the phase would slip."""
-    span = usable_span(samples, points, start)
-    value, used = start.value, start.reliable
-    while True:
-        stop = span.stop if used >= len(points) else _after(samples, points, used, span)
-        part = slice(span.start, stop)
-        problem = Waveform(
-            samples.time_s[part],
-            samples.values[part],
-            points.noise_rms_rad,
-            parts,
-            restoring=restoring,
-        )
-        minimum = minimise(
-            problem.evaluate,
-            value,
-            BOUNDS,
-            held=held,
-            tolerance=_TOLERANCE,
-            predict_remaining=problem.predict_remaining,
-        )
-        if used >= len(points):
-            return _Fitted(problem, minimum, held, start)
-        value = minimum.value
-        used = min(len(points), math.ceil(_GROWTH * used))
-
-
 def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     """Take the rounding for what it is, where noise does not make it random.
 
@@ -537,12 +483,6 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
             return fitted
         value = minimum.value
     return fitted._replace(problem=problem, minimum=minimum)
-
-
-def _after(samples: Samples, points: TurningPoints, used: int, span: slice) -> int:
-    """The reading after the `used`-th turning point."""
-    found = int(np.searchsorted(samples.time_s, points.time_s[used - 1], side="right"))
-    return int(min(max(found, span.start + 4 * 8), span.stop))
 
 
 def _held(
