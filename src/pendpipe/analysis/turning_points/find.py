@@ -17,7 +17,7 @@ import numpy as np
 from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
-from pendpipe.analysis.turning_points.long_records import BLOCK, in_blocks
+from pendpipe.analysis.turning_points.long_records import follow
 from pendpipe.analysis.turning_points.measure import (
     HARMONICS,
     Measured,
@@ -360,17 +360,18 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     return turning_points_of(prepare(recording, place), place)
 
 
-def turning_points_of(samples: Samples, place: str | Path = "recording") -> TurningPoints:
-    """As `find_turning_points`, of readings that are prepared already."""
-    if len(samples) > 2 * BLOCK:
-        points = in_blocks(samples, lambda piece: _of_piece(piece, place))
-    else:
-        points = _of_piece(samples, place)
-    return far_points(samples, points)
+def turning_points_of(
+    samples: Samples, place: str | Path = "recording", *, long: int = 1 << 22
+) -> TurningPoints:
+    """As `find_turning_points`, of readings that are prepared already; of `long` ones in a pass."""
+    points = None
+    if len(samples) > long:
+        points = follow(samples, lambda head: _measured(head, place), long // 128)
+    return far_points(samples, _measured(samples, place) if points is None else points)
 
 
-def _of_piece(samples: Samples, place: str | Path) -> TurningPoints:
-    """Measure readings that fit into the memory many times over."""
+def _measured(samples: Samples, place: str | Path) -> TurningPoints:
+    """Measure half cycle by half cycle."""
     rough, stride = rough_half_cycles(samples)
     _refuse_few(samples, len(rough.number), place)
     places, first = _locate(samples, rough, stride)

@@ -1,17 +1,16 @@
-"""Records of many millions of readings, in bounded memory.
+"""Records of many millions of readings, in little time and memory.
 
 A plain, evenly sampled record is followed in one pass by a phase-locked loop of least squares:
 every half cycle is fitted with a cosine and a sine over an odd number of readings about the
 one nearest to its expected turning. There the two are orthogonal, so that the fit is two
 products with tables made once a block; the fraction of a reading between that one and the
 turning is made up for by turning the result, cos(p + q) = cos p cos q - sin p sin q.
-Other records are measured a piece at a time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -23,7 +22,6 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import Matrix, kernel
-from pendpipe.errors import NotAnalysableError
 
 LEVEL_BLOCK = 256
 """Half cycles over which level and period are one number each."""
@@ -231,60 +229,39 @@ def _track(
     return count
 
 
-BLOCK: Final = 1 << 21
-"""Readings in a piece; its working memory is some MB."""
-_OVERLAP: Final = 3.0
-"""Half cycles that neighbouring pieces share, so that none is cut in two."""
-_PIECEWISE: Final = "a long record: the level is one number within a piece only"
+_PIECEWISE: Final = "a long record: the level is one number within some hundred half cycles only"
 _PLAIN: Final = 1.03
 _LARGEST: Final = 0.2
 """Noise about the fitted half cycles over that of neighbours, and amplitude (rad or m): where
 both are small, the half cycles are cosines with their losses, and one pass will do."""
 _SLIGHT: Final = 3e-4
 """Losses over omega below which the half cycles are cosines (Q above 1700)."""
+_FEWEST: Final = 16
+"""Half cycles from which a record is followed, and that may be missing at its end."""
 
 
-def in_blocks(
-    samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int = BLOCK
-) -> TurningPoints:
-    """Measure a long record piece by piece, and join the tables.
+def follow(
+    samples: Samples, measure: Callable[[Samples], TurningPoints], length: int
+) -> TurningPoints | None:
+    """Follow a plain, evenly sampled record in one pass.
 
     Parameters
     ----------
     samples
         The readings.
-    measure_block
-        Measures one piece.
-    block
-        Readings in a piece.
+    measure
+        Measures the beginning.
+    length
+        How many readings that has.
 
     Returns
     -------
     TurningPoints
-        As of the whole; the level is constant within a piece, so it is said to wander.
-        The record ends with the last piece whose motion is seen.
+        As of the whole; the level is constant over some hundred half cycles, so it is said to
+        wander. None where the record isn't plain, or is not so to its end.
     """
-    tracked = _tracked(samples, measure_block, block)
-    if tracked is None:
-        return _joined(list(_pieces(samples, measure_block, block)), samples)
-    half_period = 0.5 / tracked.apparent_frequency_hz
-    if samples.time_s[-1] - tracked.time_s[-1] < 16.0 * half_period:
-        return replace(
-            tracked,
-            stop_s=float(samples.time_s[-1]),
-            samples=len(samples),
-            wanders=True,
-            notes=(*tracked.notes, _PIECEWISE),
-        )
-    return _joined([tracked, *_pieces(samples, measure_block, block, tracked)], samples)
-
-
-def _tracked(
-    samples: Samples, measure_block: Callable[[Samples], TurningPoints], block: int
-) -> TurningPoints | None:
-    """Follow a plain, evenly sampled record in one pass; None if it isn't one."""
     interval = even_interval(samples.time_s)
-    head = None if interval is None else _start(samples, measure_block, block // 64)
+    head = None if interval is None else _start(samples, measure, length)
     if interval is None or head is None:
         return None
     half_period = 0.5 / head.apparent_frequency_hz
@@ -302,9 +279,12 @@ def _tracked(
     values, result = np.ascontiguousarray(samples.values, dtype=np.float64), np.empty(2)
     tables = np.empty((3, int(1.5 * half_period / interval) + 2 * _LANES))
     count = _track(values, np.array(begin), columns, result, np.empty((3, _BATCH)), tables)
-    if count < 16:
+    if count < _FEWEST or columns[0, count - 1] < samples.time_s[-1] - _FEWEST * half_period:
         return None
     noise = max(math.sqrt(result[0] / result[1]), quantisation_rms(samples.step))
+    # The beginning was measured with what harmonics it has.
+    if noise > _PLAIN * head.noise_rms_rad:
+        return None
     columns[[1, 3], :count] *= noise / head.noise_rms_rad
     time, time_sd, angle, angle_sd, level = columns[:, :count]
     # A half cycle alone tells 0.19 of what its readings would say of a level alone.
@@ -319,19 +299,23 @@ def _tracked(
         level_rad=level,
         level_sd_rad=noise / math.sqrt(told),
         noise_rms_rad=noise,
+        stop_s=float(samples.time_s[-1]),
+        samples=len(samples),
+        wanders=True,
+        notes=(*head.notes, _PIECEWISE),
     )
 
 
 def _start(
-    samples: Samples, measure_block: Callable[[Samples], TurningPoints], length: int
+    samples: Samples, measure: Callable[[Samples], TurningPoints], length: int
 ) -> TurningPoints | None:
     """The turning points from which a record is followed; None if it isn't plain there."""
-    first = measure_block(
+    first = measure(
         replace(samples, time_s=samples.time_s[:length], values=samples.values[:length])
     )
     plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
     amplitude = float(first.amplitude_rad[0])
-    if not plain or amplitude > _LARGEST or len(first) < 16:
+    if not plain or amplitude > _LARGEST or len(first) < _FEWEST:
         return None
     losses = float(_rates(first) @ [amplitude, 1.0, 1.0 / amplitude])
     return first if losses / (2.0 * np.pi * first.apparent_frequency_hz) < _SLIGHT else None
@@ -349,77 +333,3 @@ def even_interval(time_s: FloatArray) -> float | None:
     some = time_s[::every]
     off = some - (time_s[0] + interval * every * np.arange(len(some)))
     return interval if float(np.abs(off).max()) < 0.01 * interval else None
-
-
-def _pieces(
-    samples: Samples,
-    measure_block: Callable[[Samples], TurningPoints],
-    block: int,
-    before: TurningPoints | None = None,
-) -> Iterator[TurningPoints]:
-    """Measure each piece; of the overlap, each keeps its own half."""
-    start, overlap, last = 0, 0, -np.inf
-    if before is not None:
-        half_period = float(np.median(np.diff(before.time_s[-64:])))
-        last = float(before.time_s[-1]) + 0.5 * half_period
-        start = int(np.searchsorted(samples.time_s, last))
-    while start < len(samples):
-        stop = min(start + block, len(samples))
-        piece = slice(max(start - overlap, 0), stop)
-        try:
-            points = measure_block(
-                replace(samples, time_s=samples.time_s[piece], values=samples.values[piece])
-            )
-        except NotAnalysableError:
-            if start == 0 and before is None:
-                raise
-            return
-        half_period = float(np.median(np.diff(points.time_s)))
-        end = float(samples.time_s[stop - 1])
-        final = stop == len(samples)
-        keep = (points.time_s > last) & (final | (points.time_s < end - half_period))
-        kept = points.chosen(keep)
-        if len(kept) == 0:
-            return
-        yield kept
-        last = float(kept.time_s[-1]) + 0.5 * half_period
-        overlap = int(_OVERLAP * half_period / (end - float(samples.time_s[piece][0])) * block)
-        start = stop
-
-
-def _joined(pieces: list[TurningPoints], samples: Samples) -> TurningPoints:
-    """Join tables, and number their half cycles on."""
-    numbers, last = [], 0
-    for k, piece in enumerate(pieces):
-        own = piece.half_cycle - piece.half_cycle[0]
-        if k:
-            before = pieces[k - 1]
-            half_period = float(np.median(np.diff(piece.time_s)))
-            gap = float(piece.time_s[0] - before.time_s[-1]) / half_period
-            odd = piece.side[0] != before.side[-1]
-            # The nearest whole number that agrees with the sides.
-            step = 2 * round(0.5 * (gap - odd)) + int(odd)
-            own = own + last + max(step, 2 - int(odd))
-        numbers.append(own)
-        last = int(own[-1])
-    weights = [len(piece) for piece in pieces]
-
-    def mean(name: str) -> float:
-        return float(np.average([getattr(p, name) for p in pieces], weights=weights))
-
-    return replace(
-        pieces[0],
-        half_cycle=np.concatenate(numbers),
-        time_s=np.concatenate([piece.time_s for piece in pieces]),
-        time_sd_s=np.concatenate([piece.time_sd_s for piece in pieces]),
-        angle_rad=np.concatenate([piece.angle_rad for piece in pieces]),
-        angle_sd_rad=np.concatenate([piece.angle_sd_rad for piece in pieces]),
-        level_rad=np.concatenate([piece.level_rad for piece in pieces]),
-        level_sd_rad=mean("level_sd_rad"),
-        level_coupling=mean("level_coupling"),
-        noise_rms_rad=mean("noise_rms_rad"),
-        stop_s=float(samples.time_s[-1]),
-        samples=len(samples),
-        wanders=True,
-        notes=(*pieces[0].notes, _PIECEWISE),
-    )
