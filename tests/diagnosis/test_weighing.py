@@ -13,8 +13,10 @@ from pendpipe.diagnosis.chance import Chance, Trials
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import Outcome
-from pendpipe.diagnosis.weighing import law_of, weigh
+from pendpipe.diagnosis.state import Fault
+from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.curves import CURVES
@@ -148,3 +150,21 @@ def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
     assert effect.identifier == "second-mode"
     named = 1.0 / (1.0 + np.exp(-2.5) / (2.0 * off))
     assert effect.probability == pytest.approx(named, abs=0.02)
+
+
+@pytest.mark.parametrize("none", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("name", ["broadband-drive", "missing-codes"])
+def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
+    name: str, none: float
+) -> None:
+    """It takes what a wrong name leaves; what the codes show it does not touch."""
+    found, probable = jumped().search, np.array([1.0 - none, none])
+    fault = Fault(Finding(name, 1e-9, delta_chi2=100.0), 1e-7)
+    given = [
+        weigh(found, jumped().beginning, step)._replace(weights=probable) for step in found.steps
+    ]
+    sure = [each._replace(weights=np.array([1.0, 0.0])) for each in given]
+    ratio = (
+        fault_named(found, fault, given).probability / fault_named(found, fault, sure).probability
+    )
+    assert ratio == pytest.approx(1.0 - none if name == "broadband-drive" else 1.0)

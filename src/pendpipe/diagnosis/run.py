@@ -328,7 +328,7 @@ def _in_order(
         (number, effect_named(found, step, each))
         for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
     ]
-    faults = [(fault.after, fault_named(found, fault)) for fault in found.faults]
+    faults = [(fault.after, fault_named(found, fault, weighed)) for fault in found.faults]
     # The sort is stable: a fault goes before the effect that followed it.
     order = [each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0])]
     return tuple(_checked(each, found, samples) for each in order)

@@ -191,8 +191,12 @@ def _explained(found: Search, effect: Effect, gain: float) -> float:
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
-def fault_named(found: Search, fault: Fault) -> FoundEffect:
-    """Return a fault of the measurement found by its own test."""
+def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> FoundEffect:
+    """Return a fault of the measurement found by its own test.
+
+    A random cause takes what a wrong name leaves: it is no more probable than each name beside it,
+    with its rivals.
+    """
     from pendpipe.effects.catalogue import by_identifier
 
     finding = fault.finding
@@ -204,6 +208,10 @@ def fault_named(found: Search, fault: Fault) -> FoundEffect:
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
+    if finding.identifier in _RANDOM:
+        beside = zip(found.steps, weighed, strict=True)
+        none = [float(by.weights[-1]) for step, by in beside if not step.winner.drawn]
+        each *= 1.0 - max(none, default=0.0)
     return FoundEffect(
         effect.identifier,
         effect.name,
