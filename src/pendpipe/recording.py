@@ -302,20 +302,18 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
 
 def plain_lines(recording: Recording) -> Iterator[str]:
     """Give the lines of the plain CSV form: metadata, header, a row a sample, all digits."""
-    columns = ["time_s", recording.quantity]
-    rows = [map(repr, recording.time_s.tolist()), map(repr, recording.values.tolist())]
-    if recording.quality is not None:
-        columns.append("quality")
-        rows.append(map(str, recording.quality.tolist()))
-    if recording.radius_excess is not None:
-        columns.append("radius_excess")
-        rows.append(map(repr, recording.radius_excess.tolist()))
-    for key, value in recording.metadata.items():
-        yield f"# {key}: {' '.join(str(value).split())}\n"
-    for number, guess in enumerate(recording.weak_guesses, start=1):
-        yield f"# {_WEAK}{number}: {' '.join(guess.split())}\n"
-    yield ",".join(columns) + "\n"
-    for row in zip(*rows, strict=True):
+    columns = {
+        "time_s": recording.time_s,
+        recording.quantity: recording.values,
+        "quality": recording.quality,
+        "radius_excess": recording.radius_excess,
+    }
+    there = {name: values for name, values in columns.items() if values is not None}
+    guesses = enumerate(recording.weak_guesses, start=1)
+    told = [*recording.metadata.items(), *((f"{_WEAK}{number}", said) for number, said in guesses)]
+    yield from (f"# {key}: {' '.join(str(value).split())}\n" for key, value in told)
+    yield ",".join(there) + "\n"
+    for row in zip(*(map(repr, values.tolist()) for values in there.values()), strict=True):
         yield ",".join(row) + "\n"
 
 

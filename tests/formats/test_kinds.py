@@ -132,19 +132,6 @@ def test_runs_below_one_another_are_not_one_run(tmp_path: Path) -> None:
     assert "2 runs stand below one another" in recording.weak_guesses[0]
 
 
-def test_rows_that_were_interpolated_across_a_gap_are_no_samples(tmp_path: Path) -> None:
-    time, angle = swing(5000, 100.0)
-    drawn = angle.copy()
-    drawn[2000:2101] = np.linspace(angle[2000], angle[2101] - 0.2, 101)
-    recording = read_text(tmp_path, text(time, drawn, head="t (s),theta (rad)\n"))
-    assert any("interpolated, not measured" in note for note in recording.notes)
-    lost = np.flatnonzero(~recording.usable)
-    assert 80 <= len(lost) <= 110
-    assert lost.min() >= 1990
-    assert lost.max() <= 2110
-    assert read_text(tmp_path, text(time, angle, head="t (s),theta (rad)\n")).usable.all()
-
-
 # --- the column ----------------------------------------------------------------------------
 
 
@@ -637,14 +624,6 @@ def test_runs_that_a_column_numbers_stand_side_by_side(tmp_path: Path) -> None:
     recording = read_text(tmp_path, "run,t_s,theta_rad\n" + body)
     same(recording)
     assert any("several runs" in note for note in recording.notes)
-
-
-def test_samples_that_a_radio_numbers_within_a_packet_are_one_recording(tmp_path: Path) -> None:
-    row = np.arange(1500)
-    content = text(TIME[row // 10 * 10], row % 10.0, ANGLE, head="time_s,seq,theta_rad\n")
-    recording = read_text(tmp_path, content)
-    assert len(recording) == 1500
-    np.testing.assert_allclose(recording.values, ANGLE, atol=1e-6)
 
 
 def test_a_flag_beside_times_that_rise_makes_no_long_table(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         columns = [replace(c, role="unknown") if c in plotted else c for c in table.columns]
         table = replace(table, columns=tuple(columns))
     channels = tuple(column for column in table.columns if column is not time)
-    parts = _parts(table, options) if options.reading_column is not None else []
+    parts = _parts(table, options) if options.columns[1] is not None else []
     picked = [find(table, table.columns, part) for part in parts]
     if not parts and options.channel is not None:
         picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
@@ -165,7 +165,7 @@ def _only_falls(values: FloatArray) -> bool:
 
 def _parts(table: Table, options: ReadOptions) -> list[str]:
     """Split ``x,y`` unless a column bears that very name."""
-    key = options.reading_column or ""
+    key = options.columns[1] or ""
     if any(column.name == key for column in table.columns) or "," not in key:
         return [key]
     parts = [part.strip() for part in key.split(",")]
@@ -226,18 +226,18 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
     """
     if any(column.time_s is not None for column in table.columns):
         return None, False
-    if options.time_column is not None:
-        given = find(table, table.columns, options.time_column)
+    if (key := options.columns[0]) is not None:
+        given = find(table, table.columns, key)
         return given, given.role == "index"
     runs = [column for column in table.columns if column.role == "time"]
-    wanted = (options.reading_column or options.channel or "").lower()
+    wanted = (options.columns[1] or options.channel or "").lower()
     if wanted and len(runs) > 1 and not (options.channel is not None and wanted.isdigit()):
         # Runs side by side, each with its own time: the one before the reading is meant.
         meant = [c.number for c in table.columns if wanted in (c.name.lower(), str(c.number))]
         before = [column for column in runs if meant and column.number < meant[0]]
         if before:
             return before[-1], False
-    taken = (options.reading_column or "").lower()
+    taken = (options.columns[1] or "").lower()
     best: tuple[float, Column | None] = (0.0, None)
     counted = len(table.columns) > 2 and _counts_samples(table.columns[0])
     for place, column in enumerate(table.columns, start=-counted):

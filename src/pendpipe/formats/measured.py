@@ -133,9 +133,9 @@ def refuse_text(table: Table, column: Column, remedy: str) -> None:
 
 def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
     """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
-    if options.time_unit is not None:
-        given = unit_of(options.time_unit) or _UNKNOWN
-        problem = f"'{options.time_unit}' is no unit of time"
+    if (asked := options.units[0]) is not None:
+        given = unit_of(asked) or _UNKNOWN
+        problem = f"'{asked}' is no unit of time"
         refuse_if(given.kind != "time", "--unit", problem, "give s, ms, us")
         return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
@@ -190,7 +190,7 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
         base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
         base.time_s = base.time_s - start
-    for repaired in (_count_rows, _keep_last, _spread, _drop_repeats, _first_of_stacked, _sorted):
+    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked):
         if np.diff(base.time_s).min(initial=1.0) <= 0:
             repaired(choice, base)
     steps = np.diff(base.time_s)
@@ -226,21 +226,6 @@ def _values(choice: Choice, base: TimeBase) -> FloatArray:
     return values[base.rows] if len(values) > base.rows.max(initial=0) else np.empty(0)
 
 
-def _spread(choice: Choice, base: TimeBase) -> None:
-    """Spread rows that a radio sends in packets, all of a packet with its time."""
-    stamps, first, many = np.unique(base.time_s, return_index=True, return_counts=True)
-    rising = len(stamps) > 8 and np.all(np.diff(base.time_s) >= 0)
-    values = _values(choice, base)
-    # Rows that are sent twice are copies.
-    alive = len(values) > 0 and np.any(np.diff(values)[np.diff(base.time_s) == 0] != 0)
-    if rising and alive and np.all(many[:-1] == many[0]) and many[-1] <= many[0]:
-        # The last packet lasts as long as the others do.
-        ends = np.append(stamps, stamps[-1] + np.median(np.diff(stamps)))
-        places = np.append(first, first[-1] + many[0])
-        base.time_s = np.interp(np.arange(len(base.time_s)), places, ends)
-        base.notes.append(f"{many[0]} rows have each time: packets, spread up to the next one")
-
-
 def _drop_repeats(choice: Choice, base: TimeBase) -> None:
     """Leave out rows with the time of an earlier row: a logger that sends what it has sent.
 
@@ -272,20 +257,6 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
         " put each into a file of its own for the others"
     )
     base.time_s, base.rows = base.time_s[: starts[0]], base.rows[: starts[0]]
-
-
-def _sorted(choice: Choice, base: TimeBase) -> None:
-    """Sort rows that came out of order (threads, radio), where that makes the motion smooth."""
-    order = np.argsort(base.time_s, kind="stable")
-    steps, values = np.diff(base.time_s[order]), _values(choice, base)
-    if np.all(np.diff(order) == 1) or not len(values):
-        return
-    even = float(np.mean(np.abs(steps - np.median(steps)) <= 0.2 * np.median(steps)))
-    before, after = (float(np.nansum(np.abs(np.diff(some)))) for some in (values, values[order]))
-    if steps.min(initial=1.0) <= 0 or even < 0.9 or after > 0.8 * before:
-        return
-    moved = np.sum(order != np.arange(len(order)))
-    base.keep(order, f"{moved} row(s) out of order: sorted by time")
 
 
 def _rounded(time: FloatArray) -> FloatArray | None:
@@ -432,12 +403,12 @@ def _unit(
     table: Table, choice: Choice, column: Column, options: ReadOptions, time_s: FloatArray
 ) -> _Guess:
     """Find the unit: from the user, from the file, or from the numbers."""
-    if options.reading_unit is not None:
-        given = unit_of(options.reading_unit) or Unit("none", 1.0)
+    if (asked := options.units[1]) is not None:
+        given = unit_of(asked) or Unit("none", 1.0)
         refuse_if(
             given.kind not in _QUANTITIES,
             "--unit",
-            f"'{options.reading_unit}' is not known",
+            f"'{asked}' is not known",
             "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
         )
         return _Guess(given)

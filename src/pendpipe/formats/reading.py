@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.choose import choose
 from pendpipe.formats.measured import TimeBase, readings, refuse_text, time_base
@@ -25,7 +25,6 @@ from pendpipe.formats.samples import (
     clipped_samples,
     find_gaps,
     is_uniform,
-    made_up,
     resolution,
     sample_rate,
 )
@@ -233,18 +232,14 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
     values = _without_marks(found.values[base.rows] / found.factor, notes) * found.factor
     _refuse_absurd(table, base, values)
-    missing, drawn = np.isnan(values), made_up(base.time_s, values)
+    missing = np.isnan(values)
     start = base.time_s[0] if base.time_s.size else 0.0
     for said, note in (
         (missing.any(), f"{missing.sum()} row(s) without a reading, marked missing"),
-        (
-            drawn.any(),
-            f"{_where(base.time_s, drawn)} on a straight line: interpolated, not measured",
-        ),
         (start < 0, f"the times begin at {start:.6g} s, before their zero"),
     ):
         notes += [note] * bool(said)
-    quality = np.where(missing | drawn, MISSING, GOOD).astype(np.uint8)
+    quality = np.where(missing, MISSING, GOOD).astype(np.uint8)
     kept = {key: value for key, value in table.metadata.items() if key in _KEPT}
     marks = {
         f"marker_{number}": f"{mark.sample}; {mark.time_s!r} s; {mark.comment}"
@@ -280,15 +275,6 @@ def _without_marks(values: FloatArray, notes: list[str]) -> FloatArray:
             notes.append(f"{lost.sum()} reading(s) of {mark:g} far from the others: taken as lost")
             values = np.where(lost, np.nan, values)
     return values
-
-
-def _where(time_s: FloatArray, rows: BoolArray) -> str:
-    """Name stretches of rows by their number and their times."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], rows, [False]))))
-    spans = [
-        f"{time_s[a]:.4g} to {time_s[b - 1]:.4g} s" for a, b in edges.reshape(-1, 2)[:3].tolist()
-    ]
-    return f"{rows.sum()} rows ({', '.join(spans)}{', ...' if len(edges) > 6 else ''})"
 
 
 def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:

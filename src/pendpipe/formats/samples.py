@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from scipy.special import ellipk
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 
 _ABSURD: Final = 1e100
 """Beyond this nothing was measured; squares of it are no numbers."""
@@ -109,35 +109,6 @@ def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     lasted = crossings[2:] - crossings[:-2]
     usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
     return lasted[usual], 0.5 * largest[usual]
-
-
-def made_up(time: FloatArray, values: FloatArray) -> BoolArray:
-    """Find rows that were drawn and not measured: a straight line where a swing would bend.
-
-    Over a quarter of a cycle a sine leaves its chord by at least a hundredth of the chord's
-    height; what follows it to a thousandth, and rises by a good part of the amplitude, was
-    interpolated across a gap.
-
-    Returns
-    -------
-    drawn
-        Shape (n,).
-    """
-    drawn = np.zeros(len(values), dtype=bool)
-    swing = swing_of(values)
-    width = round(0.25 * swing.samples_per_cycle)
-    if not swing.clear or width < 10 or width > len(values) // 8 or np.isnan(values).any():
-        return drawn
-    starts = np.arange(0, len(values) - width, max(1, width // 4))
-    clock = np.lib.stride_tricks.sliding_window_view(time, width + 1)[starts]
-    windows = np.lib.stride_tricks.sliding_window_view(values, width + 1)[starts]
-    lasts = clock[:, -1:] - clock[:, :1]
-    rise = windows[:, -1:] - windows[:, :1]
-    off = np.abs(windows - windows[:, :1] - rise * (clock - clock[:, :1]) / lasts).max(axis=1)
-    straight = (off < 1e-3 * np.abs(rise[:, 0])) & (np.abs(rise[:, 0]) > 0.5 * swing.amplitude)
-    for start in starts[straight].tolist():
-        drawn[start : start + width + 1] = True
-    return drawn
 
 
 def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float | None:

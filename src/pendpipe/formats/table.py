@@ -190,29 +190,17 @@ class ReadOptions:
         )
 
     @property
-    def time_column(self) -> str | None:
-        """What stands before the colon of `column`."""
-        return _before(self.column)
+    def columns(self) -> tuple[str | None, str | None]:
+        """The column of times and that of the readings."""
+        return _halves(self.column)
 
     @property
-    def reading_column(self) -> str | None:
-        """What stands after the colon of `column`, or all of it."""
-        return _after(self.column)
-
-    @property
-    def time_unit(self) -> str | None:
-        """What stands before the colon of `unit`."""
-        return _before(self.unit)
-
-    @property
-    def reading_unit(self) -> str | None:
-        """What stands after the colon of `unit`, or all of it."""
-        return _after(self.unit)
+    def units(self) -> tuple[str | None, str | None]:
+        """The unit of times and that of the readings."""
+        return _halves(self.unit)
 
 
-def _before(text: str | None) -> str | None:
-    return text.split(":", 1)[0].strip() or None if text and ":" in text else None
-
-
-def _after(text: str | None) -> str | None:
-    return text.rsplit(":", 1)[-1].strip() or None if text else None
+def _halves(text: str | None) -> tuple[str | None, str | None]:
+    """What stands before a colon, where there is one; and what stands behind it."""
+    parts = [part.strip() or None for part in (text or "").split(":")]
+    return (parts[0] if len(parts) > 1 else None), parts[-1]

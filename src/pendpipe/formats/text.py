@@ -235,23 +235,11 @@ def _bare_cells(lines: list[str]) -> list[str]:
     return lines
 
 
-def _degrees(match: re.Match[str]) -> str:
-    size = int(match[2]) + float(match[3]) / 60 + float(match[4] or 0) / 3600
-    return f"{match[1]}{size:.9g}°"
-
-
-_CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
-    (
-        re.compile(
-            r"(?<![\d.])([+-]?)(\d+)\s?[°º]\s?(\d{1,2}(?:\.\d+)?)\s?['′’]"
-            r"(?:\s?(\d{1,2}(?:\.\d+)?)\s?(?:\"\"?|″|''))?"
-        ),
-        _degrees,
-    ),
+_CLOTHED: Final = (
     (re.compile(r"(?<=\d)\s*(?:±|\+/?-)\s*\d+(?:\.\d+|,\d+(?=[^,]*[;\t]|[^,]*$))?"), ""),
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
 )
-"""Degrees and minutes (``-12°05'30"``); errors (``± 0.1``); rows that end in ``;``."""
+"""Errors (``± 0.1``); rows that end in ``;``."""
 
 
 def _in_rows(lines: list[str]) -> list[str]:

@@ -149,7 +149,7 @@ def _last(name: str) -> str:
 
 def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
     lengths = {name: len(values) for name, values in columns.items()}
-    asked = (options.reading_column, options.channel)
+    asked = (options.columns[1], options.channel)
     wanted = [n for name, n in lengths.items() if name in asked or _last(name) == asked[0]]
     timed = [n for name, n in lengths.items() if role_of(_last(name)) == "time"]
     paired = [n for n in timed if list(lengths.values()).count(n) > 1]
