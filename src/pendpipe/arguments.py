@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import math
 import sys
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -107,6 +109,22 @@ SHARED: Final[Flags] = {
 def shared(*names: str, **more: Any) -> Flags:
     """Look up arguments that other commands have as well."""
     return {name: SHARED[name] | more for name in names}
+
+
+def number_within(low: float, high: float = math.inf) -> Callable[[str], float]:
+    """Make a type of argparse: a number between two limits, themselves left out."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
+        if not low < value < high:
+            limits = f"lie between {low:g} and {high:g}" if high < math.inf else "be positive"
+            raise argparse.ArgumentTypeError(f"it must {limits} (it is {text})")
+        return value
+
+    return read
 
 
 def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:

@@ -8,15 +8,13 @@ anything else that swings (counts, pixels, m/s^2, light), in the unit that ``# u
 gives: Q, period and relative decay need no constant of the sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,7 +183,7 @@ class Recording:
                 f"{place}, metadata {key}", f"'{text}' is no number", f"write '# {key}: 3.85'"
             ) from None
 
-    def between(self, start_s: float | None, stop_s: float | None) -> Recording:
+    def between(self, start_s: float | None, stop_s: float | None) -> Self:
         """Return the samples with ``start_s <= time_s <= stop_s`` (either may be open)."""
         low = -np.inf if start_s is None else start_s
         high = np.inf if stop_s is None else stop_s
@@ -200,7 +198,7 @@ class Recording:
 
     def as_motion(
         self, volts_per_radian: float | None = None, place: str | Path = "recording"
-    ) -> Recording:
+    ) -> Self:
         """Return the same recording in radians where the sensor's constant is known.
 
         Angles are counted from where the pendulum hangs, without jumps (`from_below`).

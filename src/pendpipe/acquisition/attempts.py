@@ -8,14 +8,13 @@ import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import (
-    COMPLETE,
     NothingRecordedError,
     RawRecording,
     append_event,
@@ -26,35 +25,6 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
 _STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """A raw file with at least one scan.
-
-    Parameters
-    ----------
-    path, raw
-        The file and its content.
-    """
-
-    path: Path
-    raw: RawRecording
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether it ended with all that was asked for."""
-        return self.raw.event("stopped").get("reason") in COMPLETE
-
-    @property
-    def is_saved(self) -> bool:
-        """Whether a recording was made from it and written (see `mark_saved`)."""
-        return bool(self.raw.event("saved"))
-
-    @property
-    def recorded_at(self) -> str:
-        """When it began, UTC."""
-        return str(self.raw.header["recorded_at"])
 
 
 def new_path(start: str | Path) -> Path:
@@ -90,7 +60,7 @@ def paths_beside(out: Path) -> list[Path]:
     return [path for path in out.parent.glob("*") if pattern.fullmatch(path.name)]
 
 
-def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
+def read_attempts(paths: Iterable[Path]) -> list[RawRecording]:
     """Read the attempts that hold at least one scan, the oldest first.
 
     Raises
@@ -98,7 +68,7 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
     InputError
         If one of them is being recorded now, or none holds a scan and one is damaged.
     """
-    found: list[Attempt] = []
+    found: list[RawRecording] = []
     damages: list[InputError] = []
     for path in sorted(path for path in paths if path.is_file()):
         refuse_if(
@@ -115,17 +85,19 @@ def read_attempts(paths: Iterable[Path]) -> list[Attempt]:
         except InputError as fault:
             damages.append(fault)
         else:
-            found.append(Attempt(path, raw))
+            found.append(raw)
     if damages and not found:
         raise damages[0]
     # A name has its time stamp down to microseconds; OUT.raw, the first of all, has none.
-    return sorted(found, key=lambda one: (one.recorded_at, *re.findall(_STAMP, one.path.name)))
+    return sorted(
+        found, key=lambda raw: (str(raw.header["recorded_at"]), *re.findall(_STAMP, raw.path.name))
+    )
 
 
-def choose(attempts: Sequence[Attempt]) -> Attempt:
+def choose(attempts: Sequence[RawRecording]) -> RawRecording:
     """Return the newest complete attempt; if none is complete, the longest."""
     complete = [attempt for attempt in attempts if attempt.is_complete]
-    return complete[-1] if complete else max(attempts, key=lambda one: len(one.raw.data))
+    return complete[-1] if complete else max(attempts, key=lambda attempt: len(attempt.data))
 
 
 def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Recording:

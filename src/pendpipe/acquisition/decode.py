@@ -7,8 +7,6 @@ trace but one: everything after them arrives late, and stays so. Other delays (a
 and the pieces that were not held up are as early as before.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +19,7 @@ import numpy as np
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.drivers.base import Driver
 from pendpipe.acquisition.drivers.decoders import Decoder, Loss
-from pendpipe.acquisition.raw import COMPLETE, Hole, NothingRecordedError, RawRecording, read_raw
+from pendpipe.acquisition.raw import Hole, NothingRecordedError, RawRecording, read_raw
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
@@ -36,6 +34,64 @@ _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
 _NEEDED: Final = ("model", "port", "channels", "rate_hz", "recorded_at")
 _TEXTS: Final = ("model", "port", "recorded_at")
 _MOST_CHANNELS: Final = 64
+
+
+@dataclass(frozen=True)
+class Segment:
+    """The scans of one stream.
+
+    Parameters
+    ----------
+    counts
+        Shape (scans, channels).
+    losses
+        Those met in it, in order.
+    arrival_s, scans_made
+        By ``arrival_s[i]`` the device had made ``scans_made[i]`` scans since the first
+        good one, shape (n,).
+    limit_s
+        Whole scans lost for less than this leave no trace.
+    """
+
+    counts: AnyArray
+    losses: tuple[Loss, ...]
+    arrival_s: FloatArray
+    scans_made: FloatArray
+    limit_s: float
+
+
+@dataclass(frozen=True)
+class TimeBase:
+    """The scan rate of a recording, by the device's word and by the recorder's clock.
+
+    Parameters
+    ----------
+    nominal_hz
+        What the device's divisors say.
+    measured_hz, measured_sd_hz
+        As measured by the recorder's clock, with its standard deviation; NaN when too little
+        arrived to tell.
+    """
+
+    nominal_hz: float
+    measured_hz: float = math.nan
+    measured_sd_hz: float = math.nan
+
+    @property
+    def chosen(self) -> Literal["nominal", "measured"]:
+        """Which of the two the times are made with.
+
+        The nominal one, unless the measured one differs from it by more than six of its own
+        standard deviations: a quartz is better than a host's time stamps over one record,
+        but a wrong divisor or a false formula is seen by them at once.
+        """
+        away = abs(self.measured_hz - self.nominal_hz)
+        return "measured" if away > _RATE_TRUST * self.measured_sd_hz else "nominal"
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate that the times are made with."""
+        return self.measured_hz if self.chosen == "measured" else self.nominal_hz
 
 
 def decode_recording(
@@ -261,7 +317,7 @@ def _notes(
         ),
         (not stopped, f"the recording was cut short: the {extent} that had arrived are kept"),
         (
-            stopped and stopped.get("reason") not in COMPLETE,
+            stopped and not raw.is_complete,
             f"ended early: {stopped.get('reason')} ({extent} kept)",
         ),
         (
@@ -275,30 +331,6 @@ def _notes(
 
 _NEAR: Final = 64
 """Arrivals on either side of a break that fix its extent."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """The scans of one stream.
-
-    Parameters
-    ----------
-    counts
-        Shape (scans, channels).
-    losses
-        Those met in it, in order.
-    arrival_s, scans_made
-        By ``arrival_s[i]`` the device had made ``scans_made[i]`` scans since the first
-        good one, shape (n,).
-    limit_s
-        Whole scans lost for less than this leave no trace.
-    """
-
-    counts: AnyArray
-    losses: tuple[Loss, ...]
-    arrival_s: FloatArray
-    scans_made: FloatArray
-    limit_s: float
 
 
 def split(raw: RawRecording, driver: type[Driver]) -> list[Segment]:
@@ -422,40 +454,6 @@ _BESIDE_STEP: Final = 5
 """Stretches on either side whose median tells the height of a step."""
 _FEWEST_SCANS: Final = 1.5
 _SPREADS: Final = 8.0
-
-
-@dataclass(frozen=True)
-class TimeBase:
-    """The scan rate of a recording, by the device's word and by the recorder's clock.
-
-    Parameters
-    ----------
-    nominal_hz
-        What the device's divisors say.
-    measured_hz, measured_sd_hz
-        As measured by the recorder's clock, with its standard deviation; NaN when too little
-        arrived to tell.
-    """
-
-    nominal_hz: float
-    measured_hz: float = math.nan
-    measured_sd_hz: float = math.nan
-
-    @property
-    def chosen(self) -> Literal["nominal", "measured"]:
-        """Which of the two the times are made with.
-
-        The nominal one, unless the measured one differs from it by more than six of its own
-        standard deviations: a quartz is better than a host's time stamps over one record,
-        but a wrong divisor or a false formula is seen by them at once.
-        """
-        away = abs(self.measured_hz - self.nominal_hz)
-        return "measured" if away > _RATE_TRUST * self.measured_sd_hz else "nominal"
-
-    @property
-    def rate_hz(self) -> float:
-        """The rate that the times are made with."""
-        return self.measured_hz if self.chosen == "measured" else self.nominal_hz
 
 
 def measure_rate(

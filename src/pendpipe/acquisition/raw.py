@@ -208,6 +208,8 @@ class RawRecording:
         Bytes of the file that are part of no sound frame.
     holes
         What is missing in `data`, in order.
+    path
+        The file.
     """
 
     header: Mapping[str, Any]
@@ -217,6 +219,12 @@ class RawRecording:
     events: tuple[Mapping[str, Any], ...]
     damaged_bytes: int
     holes: tuple[Hole, ...] = ()
+    path: Path = Path()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it ended with all that was asked for."""
+        return self.event("stopped").get("reason") in COMPLETE
 
     def event(self, kind: str) -> Mapping[str, Any]:
         """Return the last event of a kind; empty when there was none."""
@@ -278,6 +286,7 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
         tuple(events),
         len(content) - begin - sound,
         tuple(holes),
+        Path() if isinstance(source, bytes) else Path(source),
     )
 
 

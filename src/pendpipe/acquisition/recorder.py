@@ -1,7 +1,5 @@
 """The recorder: bytes off the wire are kept first, over breaks of the line, and decoded later."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import deque
@@ -71,6 +69,132 @@ class AcquisitionRequest:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise InputError(name, f"{value:g} is no positive number", "give one above 0")
+
+
+_REFRESH_S = 0.2
+_MEMORY_S = 5.0
+"""The amplitude shown is that of the last seconds, of the recorder's clock."""
+
+
+class ProgressLine:
+    """Elapsed time, scans, rate, amplitude now and losses, rewritten in place.
+
+    Parameters
+    ----------
+    stream
+        Where to write, usually standard error; nothing is written if it is no terminal.
+    duration_s
+        What was asked for.
+    """
+
+    def __init__(self, stream: TextIO, duration_s: float) -> None:
+        self._stream = stream
+        self._duration_s = duration_s
+        self._shown = 0.0
+        self._scans = self._lost = self._breaks = 0
+        self._recent: deque[tuple[float, AnyArray]] = deque()
+        self._step = 0.0
+
+    def begin(self, step_volts: float) -> None:
+        """Show a stream of counts of so many volts each; another one after a break."""
+        self._breaks += self._step > 0.0
+        self._recent.clear()
+        self._step = step_volts
+
+    def update(self, elapsed_s: float, scans: Scans) -> None:
+        """Show further scans, by `elapsed_s` of the recorder's clock."""
+        if not self._stream.isatty():
+            return
+        self._scans += len(scans)
+        self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
+        if len(scans):
+            self._recent.append((elapsed_s, scans.counts[:, 0]))
+        while len(self._recent) > 1 and self._recent[0][0] < elapsed_s - _MEMORY_S:
+            self._recent.popleft()
+        if time.monotonic() - self._shown > _REFRESH_S:
+            self._shown = time.monotonic()
+            self._write(f"\r{self.text(elapsed_s)}\x1b[K")
+
+    def text(self, elapsed_s: float) -> str:
+        """The line without its control characters."""
+        amplitude = 0.0
+        if self._recent:
+            recent = np.concatenate([counts for _, counts in self._recent])
+            amplitude = 0.5 * self._step * float(int(recent.max()) - int(recent.min()))
+        rate = self._scans / elapsed_s if elapsed_s > 0 else 0.0
+        return (
+            f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
+            f"amplitude {amplitude:.3f} V, {self._lost} lost"
+            + (f", {self._breaks} break(s)" if self._breaks else "")
+        )
+
+    def end(self) -> None:
+        """Close the display."""
+        if self._shown:
+            self._write("\n")
+
+    def _write(self, text: str) -> None:
+        """Show it, unless the terminal has gone: that must not end a recording."""
+        with suppress(OSError):
+            self._stream.write(text)
+            self._stream.flush()
+
+
+_WINDOW_S: Final = 20.0
+"""Seconds that are judged at a time: a few swings of the slowest pendulum on a bench."""
+_LARGE: Final = 10.0
+"""So many times the noise must the motion have been before its end can be seen."""
+_REACHED: Final = 2.0
+_WINDOWS: Final = 2
+"""In so many windows, one after the other, must it be small."""
+_FEWEST: Final = 32
+
+
+class NoiseWatch:
+    """Tell from a stream of readings that the amplitude has reached the noise.
+
+    Parameters
+    ----------
+    rate_hz
+        Readings a second.
+
+    Notes
+    -----
+    In a window of 20 s the noise is the root mean square of the third differences over
+    sqrt(20) (a motion slow against the readings has next to none; white noise of standard
+    deviation s has sqrt(20) s), or what rounding leaves, 1/sqrt(12) of a count, if that is
+    more. The amplitude is sqrt(2) times the standard deviation about a straight line, the
+    noise taken off in squares. The end is reached when it was below twice the noise in two
+    windows, after it had been above ten times: a pendulum not yet released has not decayed.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._size = max(_FEWEST, round(_WINDOW_S * rate_hz))
+        self._kept: list[AnyArray] = []
+        self._count = self._small = 0
+        self._large = False
+
+    def feed(self, counts: AnyArray) -> bool:
+        """Take further readings, shape (n,); return whether the end is reached."""
+        self._kept.append(counts)
+        self._count += len(counts)
+        if self._count < self._size:
+            return False
+        joined = np.concatenate(self._kept).astype(np.float64)
+        while len(joined) >= self._size:
+            self._judge(joined[: self._size])
+            joined = joined[self._size :]
+        self._kept, self._count = [joined], len(joined)
+        return self._small >= _WINDOWS
+
+    def _judge(self, window: AnyArray) -> None:
+        noise = math.sqrt(max(float(np.mean(np.diff(window, 3) ** 2)) / 20.0, 1.0 / 12.0))
+        place = np.linspace(-1.0, 1.0, len(window))
+        slope = float(np.sum(place * window) / np.sum(place**2))
+        left = window - np.mean(window) - slope * place
+        amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
+        self._large = self._large or amplitude > _LARGE * noise
+        self._small = self._small + 1 if self._large and amplitude < _REACHED * noise else 0
 
 
 class Session:
@@ -367,129 +491,3 @@ def _header(
         "clock_scale": clock.scale,
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-
-
-_REFRESH_S = 0.2
-_MEMORY_S = 5.0
-"""The amplitude shown is that of the last seconds, of the recorder's clock."""
-
-
-class ProgressLine:
-    """Elapsed time, scans, rate, amplitude now and losses, rewritten in place.
-
-    Parameters
-    ----------
-    stream
-        Where to write, usually standard error; nothing is written if it is no terminal.
-    duration_s
-        What was asked for.
-    """
-
-    def __init__(self, stream: TextIO, duration_s: float) -> None:
-        self._stream = stream
-        self._duration_s = duration_s
-        self._shown = 0.0
-        self._scans = self._lost = self._breaks = 0
-        self._recent: deque[tuple[float, AnyArray]] = deque()
-        self._step = 0.0
-
-    def begin(self, step_volts: float) -> None:
-        """Show a stream of counts of so many volts each; another one after a break."""
-        self._breaks += self._step > 0.0
-        self._recent.clear()
-        self._step = step_volts
-
-    def update(self, elapsed_s: float, scans: Scans) -> None:
-        """Show further scans, by `elapsed_s` of the recorder's clock."""
-        if not self._stream.isatty():
-            return
-        self._scans += len(scans)
-        self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
-        if len(scans):
-            self._recent.append((elapsed_s, scans.counts[:, 0]))
-        while len(self._recent) > 1 and self._recent[0][0] < elapsed_s - _MEMORY_S:
-            self._recent.popleft()
-        if time.monotonic() - self._shown > _REFRESH_S:
-            self._shown = time.monotonic()
-            self._write(f"\r{self.text(elapsed_s)}\x1b[K")
-
-    def text(self, elapsed_s: float) -> str:
-        """The line without its control characters."""
-        amplitude = 0.0
-        if self._recent:
-            recent = np.concatenate([counts for _, counts in self._recent])
-            amplitude = 0.5 * self._step * float(int(recent.max()) - int(recent.min()))
-        rate = self._scans / elapsed_s if elapsed_s > 0 else 0.0
-        return (
-            f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
-            f"amplitude {amplitude:.3f} V, {self._lost} lost"
-            + (f", {self._breaks} break(s)" if self._breaks else "")
-        )
-
-    def end(self) -> None:
-        """Close the display."""
-        if self._shown:
-            self._write("\n")
-
-    def _write(self, text: str) -> None:
-        """Show it, unless the terminal has gone: that must not end a recording."""
-        with suppress(OSError):
-            self._stream.write(text)
-            self._stream.flush()
-
-
-_WINDOW_S: Final = 20.0
-"""Seconds that are judged at a time: a few swings of the slowest pendulum on a bench."""
-_LARGE: Final = 10.0
-"""So many times the noise must the motion have been before its end can be seen."""
-_REACHED: Final = 2.0
-_WINDOWS: Final = 2
-"""In so many windows, one after the other, must it be small."""
-_FEWEST: Final = 32
-
-
-class NoiseWatch:
-    """Tell from a stream of readings that the amplitude has reached the noise.
-
-    Parameters
-    ----------
-    rate_hz
-        Readings a second.
-
-    Notes
-    -----
-    In a window of 20 s the noise is the root mean square of the third differences over
-    sqrt(20) (a motion slow against the readings has next to none; white noise of standard
-    deviation s has sqrt(20) s), or what rounding leaves, 1/sqrt(12) of a count, if that is
-    more. The amplitude is sqrt(2) times the standard deviation about a straight line, the
-    noise taken off in squares. The end is reached when it was below twice the noise in two
-    windows, after it had been above ten times: a pendulum not yet released has not decayed.
-    """
-
-    def __init__(self, rate_hz: float) -> None:
-        self._size = max(_FEWEST, round(_WINDOW_S * rate_hz))
-        self._kept: list[AnyArray] = []
-        self._count = self._small = 0
-        self._large = False
-
-    def feed(self, counts: AnyArray) -> bool:
-        """Take further readings, shape (n,); return whether the end is reached."""
-        self._kept.append(counts)
-        self._count += len(counts)
-        if self._count < self._size:
-            return False
-        joined = np.concatenate(self._kept).astype(np.float64)
-        while len(joined) >= self._size:
-            self._judge(joined[: self._size])
-            joined = joined[self._size :]
-        self._kept, self._count = [joined], len(joined)
-        return self._small >= _WINDOWS
-
-    def _judge(self, window: AnyArray) -> None:
-        noise = math.sqrt(max(float(np.mean(np.diff(window, 3) ** 2)) / 20.0, 1.0 / 12.0))
-        place = np.linspace(-1.0, 1.0, len(window))
-        slope = float(np.sum(place * window) / np.sum(place**2))
-        left = window - np.mean(window) - slope * place
-        amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
-        self._large = self._large or amplitude > _LARGE * noise
-        self._small = self._small + 1 if self._large and amplitude < _REACHED * noise else 0

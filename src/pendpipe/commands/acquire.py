@@ -9,7 +9,6 @@ pendpipe acquire --serve di2108 --signal config/model.toml
 """
 
 import argparse
-import math
 import signal
 import sys
 import threading
@@ -20,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from pendpipe.arguments import ALTERNATIVES, Flags, load, shared, under
+from pendpipe.arguments import ALTERNATIVES, Flags, load, number_within, shared, under
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_writable
 
@@ -39,7 +38,11 @@ _OWN: Final[Flags] = {
     "--channel": {"type": int, "help": "as printed on the box (1)"},
     "--rate": {"type": float, "default": 60.0, "metavar": "HZ", "help": "scans a second (60)"},
     "--duration": {"type": float, "default": 60.0, "metavar": "S", "help": "length (60)"},
-    "--samples": {"type": int, "metavar": "N", "help": "length, instead of --duration"},
+    "--samples": {
+        "type": number_within(0),
+        "metavar": "N",
+        "help": "length, instead of --duration",
+    },
     "--until-noise": {
         "action": "store_true",
         "help": "end when the amplitude has reached the noise",
@@ -62,7 +65,11 @@ _OWN: Final[Flags] = {
     },
     "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
     "--seed": {"type": int, "default": 0, "help": "of the simulated noise (0)"},
-    "--clock-scale": {"type": float, "default": 1.0, "help": "simulated seconds in a real one (1)"},
+    "--clock-scale": {
+        "type": number_within(0),
+        "default": 1.0,
+        "help": "simulated seconds in a real one (1)",
+    },
     "--signal": {
         "metavar": "TOML",
         "help": "with --serve: what it reads, as for pendpipe simulate",
@@ -129,21 +136,17 @@ def _record(arguments: argparse.Namespace) -> None:
     if out.is_file() or not out.exists():  # else it is a device or a pipe
         check_writable(out.parent)
     if arguments.samples is not None:
-        refuse_if(
-            arguments.samples < 1, "--samples", "it must be positive", "give a whole number above 0"
-        )
         arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
-    earlier: list[attempts.Attempt] = []
-    if not (arguments.recover or arguments.anew):
-        kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
-        earlier = attempts.read_attempts(kept)
+    kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
+    no_earlier_one = arguments.recover or arguments.anew
+    earlier = [] if no_earlier_one else attempts.read_attempts(kept)
     if arguments.recover:
         raw = Path(arguments.recover)
-    elif earlier and not earlier[-1].is_saved:
+    elif earlier and not earlier[-1].event("saved"):
         raw = earlier[-1].path
         print(
-            f"pendpipe: {out}: made from {raw}, recorded {earlier[-1].recorded_at} and not yet "
-            "written; nothing was recorded now (call again, or give --anew)",
+            f"pendpipe: {out}: made from {raw}, recorded {earlier[-1].header['recorded_at']} and "
+            "not yet written; nothing was recorded now (call again, or give --anew)",
             file=sys.stderr,
         )
     else:
@@ -235,7 +238,7 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         acquire_simulated(
             kind,
             example_signal(arguments.seed, constant),
-            clock_scale=_clock_scale(arguments),
+            clock_scale=arguments.clock_scale,
             volts_per_radian=constant,
             **options,
         )
@@ -266,23 +269,12 @@ def _serve(arguments: argparse.Namespace) -> None:
         signal_volts = simulated_volts(read_model(arguments.signal), arguments.signal)
     kind = arguments.serve.removeprefix("simulated:")
     with SimulatedDevice(
-        kind, signal_volts, clock_scale=_clock_scale(arguments), link=arguments.link
+        kind, signal_volts, clock_scale=arguments.clock_scale, link=arguments.link
     ) as device:
         print(device.port, flush=True)
         with suppress(KeyboardInterrupt):
             while device.failure is None:
                 time.sleep(0.05)
-
-
-def _clock_scale(arguments: argparse.Namespace) -> float:
-    scale = float(arguments.clock_scale)
-    refuse_if(
-        not (math.isfinite(scale) and scale > 0),
-        "--clock-scale",
-        "it must be positive",
-        "give 1 for real time",
-    )
-    return scale
 
 
 def _list(port: str | None) -> None:

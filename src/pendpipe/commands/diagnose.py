@@ -16,7 +16,15 @@ from typing import Any, Final
 
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
+from pendpipe.arguments import (
+    FILES,
+    Flags,
+    number_within,
+    print_answer,
+    print_json,
+    read_motion,
+    shared,
+)
 from pendpipe.diagnosis import Outcome, diagnose_decay, diagnose_recording
 from pendpipe.diagnosis.result import FILE_NAME, not_analysable
 from pendpipe.errors import DamagedError, InputError, refuse_if
@@ -35,20 +43,10 @@ _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 """
 
 
-def _probability(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number between 0 and 1") from None
-    if not 0.0 < value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text} does not lie between 0 and 1")
-    return value
-
-
 _OWN: Final[Flags] = {
     "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"},
     "--level": {
-        "type": _probability,
+        "type": number_within(0, 1),
         "default": 0.01,
         "metavar": "P",
         "help": "false-alarm probability for a recording that lacks nothing (%(default)s)",

@@ -21,7 +21,15 @@ from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import FILES, Flags, print_answer, print_json, read_motion, shared
+from pendpipe.arguments import (
+    FILES,
+    Flags,
+    number_within,
+    print_answer,
+    print_json,
+    read_motion,
+    shared,
+)
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import write_json
 
@@ -32,9 +40,13 @@ _OWN: Final[Flags] = {
         "metavar": "FILE",
         "help": "draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
     },
-    "--length": {"type": float, "metavar": "M", "help": "length of a simple pendulum, m: prints g"},
+    "--length": {
+        "type": number_within(0),
+        "metavar": "M",
+        "help": "length of a simple pendulum, m: prints g",
+    },
     "--gravity": {
-        "type": float,
+        "type": number_within(0),
         "metavar": "G",
         "help": "g in m/s^2: prints the equivalent length",
     },
@@ -141,13 +153,6 @@ def _print(arguments: argparse.Namespace, result: FitResult) -> None:
     """Print the summary."""
     from pendpipe.analysis.fit.result import gravity_line, lines
 
-    for option, value in (("--length", arguments.length), ("--gravity", arguments.gravity)):
-        refuse_if(
-            value is not None and not 0.0 < value < float("inf"),
-            option,
-            f"{value} is no length or acceleration",
-            "give one above 0",
-        )
     printed = lines(result, law=result.light != "red" or arguments.accept)
     if arguments.length or arguments.gravity:
         length_m, gravity = arguments.length, arguments.gravity

@@ -3,8 +3,6 @@
 Below the dialects stand the layout (the signs between cells and in numbers), the rows, the header.
 """
 
-from __future__ import annotations
-
 import csv
 import datetime as dt
 import re
@@ -409,6 +407,17 @@ class Layout:
         return cells + (", decimal commas" if self.decimal == "," else "")
 
 
+@dataclass(frozen=True)
+class Header:
+    """Names and units (one a column, ``""`` where absent), interval, remarks."""
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    interval_s: float | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
 def is_blank(cell: str) -> bool:
     """Say whether a cell stands for no reading."""
     return _BLANK.fullmatch(cell) is not None
@@ -786,17 +795,6 @@ _SAMPLING: Final = re.compile(
 )
 """``Sampling: 50 Hz``, ``sampling: 20 ms``: the unit alone tells which it is."""
 _VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]*)", re.I)
-
-
-@dataclass(frozen=True)
-class Header:
-    """Names and units (one a column, ``""`` where absent), interval, remarks."""
-
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    interval_s: float | None = None
-    metadata: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
 
 
 def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:

@@ -1,7 +1,5 @@
 """A recording to a file: the plain CSV form, or WinDaq's HiRes form (.WDH)."""
 
-from __future__ import annotations
-
 import math
 import re
 from datetime import UTC, datetime

@@ -4,14 +4,12 @@ The motion with any effects of the catalogue, to the stop; the instrument: an id
 faults without a signature (jitter, glitches, ...).
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -96,7 +94,7 @@ class Model(Section):
     )
 
     @model_validator(mode="after")
-    def _converter_has_a_sensor(self) -> Model:
+    def _converter_has_a_sensor(self) -> Self:
         if self.converter is not None and self.sensor is None:
             raise ValueError("a converter needs a sensor before it")
         return self

@@ -129,7 +129,8 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     notes = "".join(f"; {note}" for note in recording.notes)
     print(
         f"{record.record}: {len(recording)} samples from {used.path.name}, "
-        f"recorded {used.recorded_at}{kept}{notes}" + ("" if used.is_complete else f"; {again}")
+        f"recorded {used.header['recorded_at']}{kept}{notes}"
+        + ("" if used.is_complete else f"; {again}")
     )
 
 

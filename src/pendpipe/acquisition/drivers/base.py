@@ -5,8 +5,6 @@ is wrong with the line or the setting is an `InputError`, with the port as place
 defines how its commands are sent; every model is entered into `DRIVERS` where its class is defined.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +15,7 @@ from pendpipe.acquisition.drivers.decoders import Decoder, SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError, refuse_if
 
-DRIVERS: Final[dict[str, type[Driver]]] = {}
+DRIVERS: Final[dict[str, "type[Driver]"]] = {}
 """The driver of each model, by the name used on the command line (``di154rs``, ``di2108``)."""
 
 
