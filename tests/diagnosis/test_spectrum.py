@@ -17,7 +17,7 @@ def scanned(readings: FloatArray) -> tuple[ToneScan, FloatArray]:
     """A scan of readings for steady tones, and the chi^2 of each frequency."""
     fit, data, noise = null_fit()
     basis = np.linalg.qr(fit.jacobian[:, list(fit.free)])[0]
-    scan = tone_scan(data, noise, basis, np.ones(len(data)), Band(0.1))
+    scan = tone_scan(data, noise, basis, np.inf, Band(0.1))
     whitened = np.append(noise.whiten(readings), 0.0)
     whitened -= basis @ (basis.T @ whitened)
     return scan, scan.scores(noise.adjoint(whitened[:-1]))

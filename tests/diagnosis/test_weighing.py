@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnosis import diagnose_recording
-from pendpipe.diagnosis.chance import Chance, Trials
-from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.detect import Chance, Lead, Trials
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding

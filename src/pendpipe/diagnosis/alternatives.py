@@ -13,8 +13,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from pendpipe.diagnosis import Progress
-from pendpipe.diagnosis.chance import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials
-from pendpipe.diagnosis.detect import detect, prepare
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials, detect, prepare
 from pendpipe.diagnosis.evidence import SIZE_CHARGE, Rival
 from pendpipe.diagnosis.moves import FURTHER
 from pendpipe.diagnosis.refine import Fit, best_fit, refine

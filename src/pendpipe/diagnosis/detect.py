@@ -1,4 +1,8 @@
-"""Detection: the best score of every effect on a fit's residual, and the global p-value."""
+"""Detection: the best score of every effect on a fit's residual, and the global p-value.
+
+How often chance alone does as well anywhere in the catalogue (the look-elsewhere effect) is counted
+on white residuals.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,34 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.chance import DRAWS, FEW_DRAWS, Chance, Trials, draw_chance
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.scores import Bank, build_bank
-from pendpipe.diagnosis.spectrum import Band, ToneScan, ToneScans, tone_scan
+from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values
+from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import plane_band_hz
+
+CATALOGUE_SHARE: Final = 0.5
+"""Part of the significance level for the scan of the catalogue."""
+RED_NOISE_SHARE: Final = 0.2
+"""Part of it for the test whether red noise is an effect."""
+TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
+"""Part of it that the tests of the measurement share."""
+SMALLEST: Final = 1e-12
+"""Smaller p-values rest on tails of the noise that nobody has tested."""
+DRAWS: Final = 256
+FEW_DRAWS: Final = 64
+"""Draws for a first look: they determine the number of trials to 20 %."""
+_DRAWS_AT_ONCE: Final = 32
+"""Draws computed together: few enough for the processor's cache."""
+_TAIL_SHARE: Final = 0.4
+"""Part of the draws, those of the smallest p-values, that determines the number of trials."""
+_TRIALS_EXPONENT: Final = 0.5
+"""Exponent of ln p in the number of trials: a scan over one continuous shape has trials
+proportional to the root of the threshold in chi^2 (Rice's formula), about -2 ln p."""
+
 
 _DECAY_TIMES: Final = (0.06, 0.25)
 """Decay times of the decaying tones in the scan, over the record's duration."""
@@ -29,6 +52,51 @@ _FEWEST_CYCLES: Final = 3.0
 """Fewest cycles of a tone in the record; slower ones are drifts."""
 _LOWEST_MODE: Final = 1.3
 """Lowest frequency of a decaying second mode, over the motion's."""
+
+
+@dataclass(frozen=True)
+class Trials:
+    """The effective number of independent trials of a scan.
+
+    P(smallest local p-value < p) = 1 - (1 - p)^m(p), with m = first (ln p/ln usual)^growth
+    for p below usual: the rarer the event, the more trials a scan over continuous shapes has.
+    """
+
+    first: float
+    growth: float
+    usual: float = 0.05
+    """The p-value at which the trials were counted."""
+
+    def number_at(self, log_local: float) -> float:
+        """Return the number of trials at a local p-value of exp(`log_local`)."""
+        rarer = max(log_local / math.log(self.usual), 1.0)
+        return float(max(self.first * rarer**self.growth, 1.0))
+
+    def global_p_value(self, local: float) -> float:
+        """Return the probability that chance gives such a local p-value anywhere in the scan."""
+        if local <= 0.0:
+            return 0.0
+        trials = self.number_at(math.log(local))
+        return float(-math.expm1(trials * math.log1p(-min(local, 1.0 - 1e-15))))
+
+
+@dataclass(frozen=True)
+class Chance:
+    """Trials of the scans, counted on white residuals.
+
+    Parameters
+    ----------
+    everywhere
+        Trials of the whole catalogue.
+    own
+        Trials of each effect by itself, by identifier.
+    draws
+        Number of draws.
+    """
+
+    everywhere: Trials
+    own: dict[str, Trials]
+    draws: int = DRAWS
 
 
 @dataclass(frozen=True)
@@ -72,33 +140,85 @@ class Detection:
 
 @dataclass(frozen=True)
 class Scanner:
-    """The derivatives by all effects of a catalogue along one fit."""
+    """The derivatives by all effects of a catalogue along one fit.
+
+    Parameters
+    ----------
+    bank
+        Of the effects that are no tones.
+    noise
+        Of the readings.
+    spectral, scans
+        The effects that are tones, and the scans for them, steady or decaying.
+    """
 
     bank: Bank
-    tones: ToneScans
-    spectral: tuple[Effect, ...]
-    duration_s: float
+    noise: Noise
+    spectral: tuple[Effect, ...] = ()
+    scans: tuple[ToneScan, ...] = ()
+
+    def tones(self, residual: FloatArray) -> list[FloatArray]:
+        """Return each scan's chi^2 of a whitened, projected residual (with the prior's entry)."""
+        if not self.scans:
+            return []
+        weights = self.noise.adjoint(residual[:-1])
+        return [scan.scores(weights) for scan in self.scans]
 
 
 def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Scanner:
     """Compute the derivatives by all effects."""
     spectral = tuple(effect for effect in effects if effect.spectral)
-    others = [effect for effect in effects if effect not in spectral]
-    bank = build_bank(fit, noise, others)
+    bank = build_bank(fit, noise, [effect for effect in effects if effect not in spectral])
     scans: list[ToneScan] = []
     if spectral and data.uniform:
-        duration = float(data.time_s[-1] - data.time_s[0])
+        since = data.time_s - data.time_s[0]
         own = fit.value[OMEGA] / (2.0 * math.pi)
-        steady = Band(_FEWEST_CYCLES / duration, own, plane_band_hz(fit.at.span))
-        scans.append(tone_scan(data, noise, bank.basis, np.ones(len(data)), steady))
-        since = (data.time_s - data.time_s[0]) / (data.time_s[-1] - data.time_s[0])
+        steady = Band(_FEWEST_CYCLES / float(since[-1]), own, plane_band_hz(fit.at.span))
+        scans.append(tone_scan(data, noise, bank.basis, math.inf, steady))
         scans += [
-            tone_scan(data, noise, bank.basis, np.exp(-since / dying), Band(_LOWEST_MODE * own))
-            for dying in _DECAY_TIMES
+            tone_scan(data, noise, bank.basis, part * float(since[-1]), Band(_LOWEST_MODE * own))
+            for part in _DECAY_TIMES
         ]
-    return Scanner(
-        bank, ToneScans(noise, tuple(scans)), spectral, float(data.time_s[-1] - data.time_s[0])
-    )
+    return Scanner(bank, noise, spectral, tuple(scans))
+
+
+def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
+    """Count trials: draw white residuals, project them as the fit does, and scan them.
+
+    The tail of the smallest p-value is extrapolated with a slowly growing number of trials, as
+    by Gross and Vitells for continuous scans.
+
+    Parameters
+    ----------
+    scanner
+        The effects' derivatives, and the scans for tones.
+    seed, draws
+        Of the generator; the number of draws.
+    """
+    generator, bank = np.random.default_rng(seed), scanner.bank
+    rows = bank.rows()
+    largest: list[list[FloatArray]] = []
+    loudest: list[FloatArray] = []
+    for _ in range(math.ceil(draws / _DRAWS_AT_ONCE)):
+        white = generator.standard_normal((_DRAWS_AT_ONCE, len(bank.basis))).T
+        white -= bank.basis @ (bank.basis.T @ white)
+        scores = bank.scores(white)
+        largest.append([scores[indices].max(axis=0) for indices in rows.values()])
+        tone = np.zeros(_DRAWS_AT_ONCE)
+        for scores in scanner.tones(white):
+            tone = np.maximum(tone, scores.max(axis=0))
+        loudest.append(tone)
+    # All shapes of one effect have the same degrees of freedom.
+    found = {
+        name: local_p_values(np.concatenate(parts)[None], bank.freedom[rows[name][:1]])[0]
+        for name, parts in zip(rows, zip(*largest, strict=True), strict=True)
+    }
+    own = {
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local)
+        for name, local in found.items()
+    }
+    smallest = np.min([np.exp(-0.5 * np.concatenate(loudest)), *found.values()], axis=0)
+    return Chance(_trials(smallest), own, draws)
 
 
 def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None) -> Detection:
@@ -115,19 +235,16 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     """
     bank = scanner.bank
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    smallest = 1.0
-    scores = bank.scores(residual) if bank.candidates else np.zeros(0)
-    if bank.candidates:
-        smallest = float(bank.p_values(scores).min())
-    tones = scanner.tones.scores(residual)
-    for scan, found in zip(scanner.tones.scans, tones, strict=True):
-        smallest = min(smallest, float(scan.p_values(found).min()))
+    scores, tones = bank.scores(residual), scanner.tones(residual)
+    local = [scan.p_values(found) for scan, found in zip(scanner.scans, tones, strict=True)]
+    smallest = min(
+        [1.0, *(float(each.min()) for each in (bank.p_values(scores), *local) if len(each))]
+    )
     few = None if known is None else known.chance
-    chance = few or draw_chance(bank, scanner.tones, seed, FEW_DRAWS)
+    chance = few or draw_chance(scanner, seed, FEW_DRAWS)
     if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _CLEARLY_CHANCE:
-        chance = draw_chance(bank, scanner.tones, seed)
-    leads = _bank_leads(bank, scores, chance.own)
-    leads += _tone_leads(scanner, tones)
+        chance = draw_chance(scanner, seed)
+    leads = [*_bank_leads(bank, scores, chance.own), *_tone_leads(scanner, tones, local)]
     leads.sort(key=lambda lead: (lead.p_value, -lead.score))
     return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
 
@@ -136,7 +253,7 @@ def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
     """Score effects that were not scanned, on a fit's residual."""
     bank = build_bank(fit, noise, effects)
     residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    return _bank_leads(bank, bank.scores(residual), {}) if bank.candidates else []
+    return _bank_leads(bank, bank.scores(residual), {})
 
 
 def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[Lead]:
@@ -151,22 +268,41 @@ def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[
     return leads
 
 
-def _tone_leads(scanner: Scanner, tones: Sequence[FloatArray]) -> list[Lead]:
+def _tone_leads(
+    scanner: Scanner, tones: Sequence[FloatArray], local: Sequence[FloatArray]
+) -> list[Lead]:
     """Return the strongest tone, steady or decaying, for each effect that is a tone."""
     leads = []
     for effect in scanner.spectral:
         found = []
-        for scan, dying, scores in zip(
-            scanner.tones.scans, (None, *_DECAY_TIMES), tones, strict=False
-        ):
-            p_values = scan.p_values(scores)
+        for scan, scores, p_values in zip(scanner.scans, tones, local, strict=True):
             # Beyond 10^-308 all p-values are zero: there the scores decide.
             index = int(np.lexsort((-scores, p_values))[0])
-            score = float(scores[index])
-            decay = math.inf if dying is None else dying * scanner.duration_s
-            shape = effect.tone(float(scan.frequency_hz[index]), decay)
+            shape = effect.tone(float(scan.frequency_hz[index]), scan.decay_s)
             if shape is not None:
-                local = Trials(0.5 * len(scores), 0.0).global_p_value(float(p_values[index]))
-                found.append(Lead(effect, tuple(shape), score, local))
+                trials = Trials(0.5 * len(scores), 0.0)
+                p_value = trials.global_p_value(float(p_values[index]))
+                found.append(Lead(effect, tuple(shape), float(scores[index]), p_value))
         leads += sorted(found, key=lambda lead: (lead.p_value, -lead.score))[:1]
     return leads
+
+
+def _trials(smallest: FloatArray) -> Trials:
+    """Estimate the number of trials from the smallest p-values of many draws: 1 - F = (1 - p)^m."""
+    ordered = np.sort(smallest)
+    draws = len(ordered)
+    rank = (np.arange(1, draws + 1) - 0.3) / (draws + 0.4)
+    trials = np.log1p(-rank) / np.log1p(-np.minimum(ordered, 1.0 - 1e-12))
+    part = slice(max(2, draws // 50), int(_TAIL_SHARE * draws))
+    middle = float(np.exp(np.mean(np.log(trials[part]))))
+    at = float(np.exp(np.mean(np.log(ordered[part]))))
+    return Trials(max(middle, 1.0), _TRIALS_EXPONENT, min(at, 0.5))
+
+
+def printed(p_value: float) -> str:
+    """Return a p-value as it is printed: below 1e-12 it would rest on untested tails.
+
+    >>> printed(0.0312), printed(0.0)
+    ('p = 0.031', 'p < 1e-12')
+    """
+    return f"p = {p_value:.2g}" if p_value >= SMALLEST else f"p < {SMALLEST:.0e}"

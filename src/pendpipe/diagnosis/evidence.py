@@ -11,9 +11,8 @@ import numpy as np
 from scipy.special import chdtrc, chdtri
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.chance import Chance, Trials
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.detect import Chance, Lead, Trials
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit

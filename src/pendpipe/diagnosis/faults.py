@@ -15,8 +15,8 @@ import numpy as np
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis import Progress
-from pendpipe.diagnosis.chance import TESTS_SHARE
 from pendpipe.diagnosis.data import Data, at_even_times
+from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit

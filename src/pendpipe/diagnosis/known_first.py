@@ -13,8 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
-from pendpipe.diagnosis.chance import CATALOGUE_SHARE
-from pendpipe.diagnosis.detect import Lead
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.refine import Fit, best_fit, better, fit_in_growing_window
 from pendpipe.diagnosis.refits import LOST_PHASE_RAD

@@ -80,7 +80,7 @@ class Bank:
         signed = [c.first for c in self.candidates if c.effect.one_sided]
         products[signed] = np.maximum(products[signed], 0.0)
         squares = products.astype(np.float64) ** 2
-        starts = [candidate.first for candidate in self.candidates]
+        starts = np.array([candidate.first for candidate in self.candidates], dtype=np.intp)
         return np.asarray(np.add.reduceat(squares, starts, axis=0))
 
     def p_values(self, scores: FloatArray) -> FloatArray:

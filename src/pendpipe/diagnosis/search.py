@@ -12,9 +12,8 @@ from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_noise
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.chance import CATALOGUE_SHARE, printed
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import Detection, more_leads
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, more_leads, printed
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse

@@ -37,8 +37,10 @@ class ToneScan:
 
     Parameters
     ----------
+    decay_s
+        Decay time of the tone; inf where it is steady.
     envelope
-        What multiplies the tone, shape (n,).
+        What multiplies it, shape (n,).
     frequency_hz
         Shape (m,).
     inverse
@@ -48,6 +50,7 @@ class ToneScan:
         Variance of the logarithm of the noise at each frequency, shape (m,).
     """
 
+    decay_s: float
     envelope: FloatArray
     frequency_hz: FloatArray
     inverse: FloatArray
@@ -97,26 +100,9 @@ class ToneScan:
         return np.asarray(found.T)
 
 
-@dataclass(frozen=True)
-class ToneScans:
-    """Scans with several envelopes and the same noise."""
-
-    noise: Noise
-    scans: tuple[ToneScan, ...] = ()
-
-    def scores(self, residual: FloatArray) -> list[FloatArray]:
-        """Return each scan's chi^2 of a whitened, projected residual (with the prior's entry)."""
-        if not self.scans:
-            return []
-        weights = self.noise.adjoint(residual[:-1])
-        return [scan.scores(weights) for scan in self.scans]
-
-
-def tone_scan(
-    data: Data, noise: Noise, basis: FloatArray, envelope: FloatArray, band: Band
-) -> ToneScan:
+def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band: Band) -> ToneScan:
     """Prepare a scan: project the model's tangent space out of a tone at each frequency."""
-    count = len(data)
+    count, envelope = len(data), np.exp((data.time_s[0] - data.time_s) / decay_s)
     size = int(2 ** np.ceil(np.log2(_OVERSAMPLING * count)))
     frequency = np.asarray(np.fft.rfftfreq(size, data.interval_s)[1:], dtype=np.float64)
     keep = slice(1, len(frequency) + 1)
@@ -152,4 +138,4 @@ def tone_scan(
     )
     safe = np.where(seen, determinant, 1.0)
     inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
-    return ToneScan(envelope, frequency, inverse, noise.log_variance_at(cosine), size)
+    return ToneScan(decay_s, envelope, frequency, inverse, noise.log_variance_at(cosine), size)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from pendpipe.diagnosis.chance import printed
+from pendpipe.diagnosis.detect import printed
 from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate

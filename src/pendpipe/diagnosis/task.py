@@ -7,8 +7,7 @@ from copy import copy
 from dataclasses import dataclass
 
 from pendpipe.diagnosis import Progress
-from pendpipe.diagnosis.chance import CATALOGUE_SHARE
-from pendpipe.diagnosis.detect import detect, prepare
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, detect, prepare
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.state import State
