@@ -289,8 +289,12 @@ def fit(
         fixed=fixed,
         place=place,
     )
-    cuts = (*(cut._asdict() for cut in points.cuts), *result.cuts)
-    return replace(result, cuts=cuts, points=points, decay=decay)
+    return replace(
+        result,
+        cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
+        points=points,
+        decay=decay,
+    )
 
 
 def diagnose(

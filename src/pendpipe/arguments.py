@@ -140,8 +140,9 @@ def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
             groups[heading] = parser.add_mutually_exclusive_group()
         elif heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
-        of_argparse = {key: value for key, value in options.items() if key != "heading"}
-        groups[heading].add_argument(name, **of_argparse)
+        groups[heading].add_argument(
+            name, **{key: value for key, value in options.items() if key != "heading"}
+        )
 
 
 def read_options(arguments: argparse.Namespace) -> ReadOptions:

@@ -312,8 +312,11 @@ class Index(dict[Path, dict[str, tuple[Manifest, Sum]]]):
         for name, was in owner.inputs.items():
             found = self.find(owner.home / name)
             if found is not None and found[1].sha256 != was:
-                problem = f"it was made from another {Path(name).name} than the one there now"
-                return Damage(path, problem, sha256(path)[:8])
+                return Damage(
+                    path,
+                    f"it was made from another {Path(name).name} than the one there now",
+                    sha256(path)[:8],
+                )
         return None
 
 

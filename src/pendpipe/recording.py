@@ -122,8 +122,12 @@ class Recording:
             metadata["volts_per_radian"] = repr(float(volts_per_radian))
         if values is None:
             found = ", ".join(name for name, _ in given) or "none"
-            problem = f"exactly one quantity is needed, not {found}"
-            refuse_if(len(given) != 1, "Recording", problem, "give angle_rad=...")
+            refuse_if(
+                len(given) != 1,
+                "Recording",
+                f"exactly one quantity is needed, not {found}",
+                "give angle_rad=...",
+            )
             quantity, values = given[0]
         elif given or quantity not in QUANTITIES:
             raise InputError(

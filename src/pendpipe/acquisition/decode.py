@@ -136,10 +136,13 @@ def decode_recording(
     if kept is not None and len(segments) == 1:
         gone = _lost([loss for loss in segments[0].losses if loss.reason == "damage"])
         segments = [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
-    if not segments:
-        raise NothingRecordedError(
-            place, "no scan was recorded", "check the device, and record again"
-        )
+    refuse_if(
+        not segments,
+        place,
+        "no scan was recorded",
+        "check the device, and record again",
+        NothingRecordedError,
+    )
     longest = max(segments, key=lambda segment: len(segment.arrival_s))
     time_base = measure_rate(
         longest.arrival_s,
@@ -194,8 +197,12 @@ def _check_description(place: str, raw: RawRecording) -> None:
         ),
     )
     for wrong, fault in faults:
-        problem = f"the description of the recording is damaged ({fault})"
-        refuse_if(wrong, place, problem, "give another copy")
+        refuse_if(
+            wrong,
+            place,
+            f"the description of the recording is damaged ({fault})",
+            "give another copy",
+        )
 
 
 def _join(
@@ -388,8 +395,9 @@ def _decode(
         place = min(len(counts), max(1, round(float(good[loss.first_arrival - 1]))))
         losses = (*losses, Loss(place, 0, loss.scans, suspect_before=True, reason="clock"))
         made[loss.first_arrival :] += loss.scans
-    ordered = tuple(sorted(losses, key=lambda loss: loss.after_scan))
-    return Segment(counts, ordered, arrival_s, made, limit_s)
+    return Segment(
+        counts, tuple(sorted(losses, key=lambda loss: loss.after_scan)), arrival_s, made, limit_s
+    )
 
 
 def _scans_of(

@@ -67,8 +67,12 @@ class AcquisitionRequest:
     def __post_init__(self) -> None:
         for name in ("rate_hz", "duration_s", "range_volts"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InputError(name, f"{value:g} is no positive number", "give one above 0")
+            refuse_if(
+                value is not None and not (math.isfinite(value) and value > 0),
+                name,
+                f"{value} is no positive number",
+                "give one above 0",
+            )
 
 
 _REFRESH_S = 0.2
@@ -117,10 +121,8 @@ class ProgressLine:
 
     def text(self, elapsed_s: float) -> str:
         """The line without its control characters."""
-        amplitude = 0.0
-        if self._recent:
-            recent = np.concatenate([counts for _, counts in self._recent])
-            amplitude = 0.5 * self._step * float(int(recent.max()) - int(recent.min()))
+        recent = [counts.astype(np.int64) for _, counts in self._recent]
+        amplitude = 0.5 * self._step * float(np.ptp(np.concatenate(recent))) if recent else 0.0
         rate = self._scans / elapsed_s if elapsed_s > 0 else 0.0
         return (
             f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
@@ -190,8 +192,7 @@ class NoiseWatch:
     def _judge(self, window: AnyArray) -> None:
         noise = math.sqrt(max(float(np.mean(np.diff(window, 3) ** 2)) / 20.0, 1.0 / 12.0))
         place = np.linspace(-1.0, 1.0, len(window))
-        slope = float(np.sum(place * window) / np.sum(place**2))
-        left = window - np.mean(window) - slope * place
+        left = window - np.polyval(np.polyfit(place, window, 1), place)
         amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
         self._large = self._large or amplitude > _LARGE * noise
         self._small = self._small + 1 if self._large and amplitude < _REACHED * noise else 0
@@ -335,8 +336,12 @@ class Session:
                     self._line = Line(self._line.port, self._driver.baudrate)
                 self._line.set_baudrate(self._driver.baudrate)
                 # Another device, or an answer that was damaged: it is asked again.
-                another = self._introduce() != (self.identity, self.setup)
-                refuse_if(another, self._line.port, "another device answers", "ask it again")
+                refuse_if(
+                    self._introduce() != (self.identity, self.setup),
+                    self._line.port,
+                    "another device answers",
+                    "ask it again",
+                )
                 writer.event(self._elapsed_s(), event="restarted", reason=reason)
                 self._instrument.start()
             except InputError:

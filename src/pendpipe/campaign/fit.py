@@ -145,8 +145,12 @@ class JointFit:
     def size(self, position: int = -1, about: float = 0.0) -> Estimate:
         """The size of an added effect, by default of the last; `about` is what it adds to."""
         effect = self.added[position].effect
-        number = range(len(self.design.nuisances), len(self.unknowns))[position]
-        return self.estimate(number, effect.parameter.unit, effect.expected, about)
+        return self.estimate(
+            range(len(self.design.nuisances), len(self.unknowns))[position],
+            effect.parameter.unit,
+            effect.expected,
+            about,
+        )
 
     @property
     def last(self) -> CampaignEffect:

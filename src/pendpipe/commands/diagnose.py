@@ -203,8 +203,9 @@ def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -
     if arguments.turning_points is None:
         return diagnose_recording(recording, **more)
     points = read_turning_points(arguments.turning_points)
-    part = recording.between(points.start_s, points.stop_s)
-    return diagnose_decay(part, points, whole=recording, **more)
+    return diagnose_decay(
+        recording.between(points.start_s, points.stop_s), points, whole=recording, **more
+    )
 
 
 def _write(arguments: argparse.Namespace, outcome: Outcome) -> dict[str, Any]:

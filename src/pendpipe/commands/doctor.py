@@ -108,8 +108,12 @@ def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
         for path in (home / name for name in stage.outputs if not (home / name).is_file()):
             yield Finding("incomplete", str(path), "it is missing", _RUN)
         if not stage.outputs and not damages:
-            problem = f"stage {stage.stage} began and did not end"
-            yield Finding("incomplete", str(home), problem, "snakemake runs it again")
+            yield Finding(
+                "incomplete",
+                str(home),
+                f"stage {stage.stage} began and did not end",
+                "snakemake runs it again",
+            )
 
 
 def _stale(home: Path) -> Iterator[Finding]:

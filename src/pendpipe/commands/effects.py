@@ -23,5 +23,8 @@ def run(arguments: argparse.Namespace) -> None:
         for each in CATALOGUE
     ]
     listed = "\n".join(f"{each.identifier:<22}{each.kind:<13}{each.name}" for each in CATALOGUE)
-    content = {"schema_version": 1, "effects": entries}
-    print_answer(arguments, content, listed if arguments.list else page().removesuffix("\n"))
+    print_answer(
+        arguments,
+        {"schema_version": 1, "effects": entries},
+        listed if arguments.list else page().removesuffix("\n"),
+    )

@@ -202,8 +202,7 @@ def _check_names(place: Path, records: list[Record]) -> None:
     """Refuse two records of one name, also where only the case differs (Windows)."""
     counts = Counter(entry.record.lower() for entry in records)
     again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
-    if again:
-        raise InputError(place, f"the record '{again[-1]}' stands twice", "rename one")
+    refuse_if(again, place, f"the record '{''.join(again[-1:])}' stands twice", "rename one")
 
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
@@ -238,9 +237,13 @@ def read_configuration(path: str | Path) -> dict[str, Any]:
     place = Path(path)
     text = read_text(place, "configuration", "see config/README.md", "YAML")
     content = read_json(place) if place.suffix == ".json" else _yaml(place, text)
-    if not isinstance(content, dict):
-        raise InputError(place, "this is no mapping of keys to values", "see config/README.md")
-    return content
+    refuse_if(
+        not isinstance(content, dict),
+        place,
+        "this is no mapping of keys to values",
+        "see config/README.md",
+    )
+    return dict(content)
 
 
 def _yaml(place: Path, text: str) -> Any:

@@ -20,6 +20,7 @@ from pendpipe.formats.table import (
     NotThisFormatError,
     ReadOptions,
     Table,
+    damaged_if,
     most_unpacked,
     next_reader_if,
 )
@@ -52,8 +53,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = archive.namelist()
         whole = sum(part.file_size for part in archive.infolist())
-        if whole > most_unpacked(len(data)):
-            raise ValueError(f"it unpacks to {whole >> 20} MB")
+        damaged_if(whole > most_unpacked(len(data)), f"it unpacks to {whole >> 20} MB")
         if any(name.startswith("xl/") for name in names):
             _refuse_too_many_cells(archive)
             return _of_sheets(place, _sheets_of_excel(data), options)
@@ -117,8 +117,7 @@ def _sheets_of_opendocument(archive: zipfile.ZipFile) -> _Sheets:
     row: list[str] = []
     cells = 0
     for nodes, (at, node) in enumerate(ET.iterparse(archive.open("content.xml"), ("start", "end"))):
-        if cells + nodes // 4 > _MOST_CELLS:
-            raise ValueError(f"it has more than {_MOST_CELLS} cells")
+        damaged_if(cells + nodes // 4 > _MOST_CELLS, f"it has more than {_MOST_CELLS} cells")
         if at == "start":
             continue
         kind = node.tag.rpartition("}")[2]
@@ -174,10 +173,11 @@ def _refuse_too_many_cells(archive: zipfile.ZipFile) -> None:
         with archive.open(name) as sheet:
             while chunk := sheet.read(1 << 20):
                 cells += chunk.count(b"<c ") + chunk.count(b"<c>") + chunk.count(b"<si>")
-                if cells > _MOST_CELLS:
-                    raise ValueError(f"it has more than {_MOST_CELLS} cells")
-                if re.search(rb'<c [^>]*r="[A-Z]{3}|<row [^>]*r="\d{8}', chunk):
-                    raise ValueError("a cell stands beyond column ZZ, or beyond the last row")
+                damaged_if(cells > _MOST_CELLS, f"it has more than {_MOST_CELLS} cells")
+                damaged_if(
+                    re.search(rb'<c [^>]*r="[A-Z]{3}|<row [^>]*r="\d{8}', chunk),
+                    "a cell stands beyond column ZZ, or beyond the last row",
+                )
 
 
 def _is_number(cell: Any) -> bool:
@@ -234,11 +234,14 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     refuse_if(not found, place, "the project holds no samples", "export the data as CSV")
     # Runs side by side are of unlike length: the shorter end in empty cells.
     values = np.array([*zip_longest(*(each[2] for each in found), fillvalue=np.nan)], np.float64)
-    columns = tuple(
-        Column(title.strip(), unit.strip(), np.ascontiguousarray(values[:, number]), number + 1)
-        for number, (title, unit, _) in enumerate(found)
+    return Table(
+        place=place,
+        format=name,
+        columns=tuple(
+            Column(title.strip(), unit.strip(), np.ascontiguousarray(values[:, number]), number + 1)
+            for number, (title, unit, _) in enumerate(found)
+        ),
     )
-    return Table(place=place, format=name, columns=columns)
 
 
 def _number(text: str | None) -> float:

@@ -83,18 +83,17 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     if column is not None and not choice.counts:
         return _from_column(table, choice, column, reading, options)
     counted = f" ('{column.label}' only counts)" if column is not None else ""
-    if table.interval_s is None:
-        raise InputError(
-            table.place,
-            f"there is no time column and no sample rate{counted}",
-            "give --sample-rate, or name the time with --column TIME:READING",
-        )
-    note = f"no time column: times from the header's {1 / table.interval_s:g} Hz"
-    if column is None:
-        return TimeBase(every.astype(np.float64) * table.interval_s, every, [note])
-    time_s = (column.values - column.values[0]) * table.interval_s
-    base = TimeBase(time_s, every, [f"{note} and '{column.label}'"])
-    return _in_order(table, choice, base, table.interval_s)
+    interval_s = table.interval_s or np.nan
+    refuse_if(
+        table.interval_s is None,
+        table.place,
+        f"there is no time column and no sample rate{counted}",
+        "give --sample-rate, or name the time with --column TIME:READING",
+    )
+    number = every.astype(np.float64) if column is None else column.values - column.values[0]
+    note = f"no time column: times from the header's {1 / interval_s:g} Hz"
+    note += f" and '{column.label}'" if column is not None else ""
+    return _in_order(table, choice, TimeBase(number * interval_s, every, [note]), interval_s)
 
 
 def _from_column(
@@ -107,10 +106,12 @@ def _from_column(
         filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
     refuse_text(table, column, "correct or drop the row")
     bad = np.flatnonzero(~np.isfinite(column.values) & filled)
-    if bad.size:
-        raise InputError(
-            table.where(int(bad[0])), "the time is missing or NaN", "correct or drop the row"
-        )
+    refuse_if(
+        bad.size,
+        table.where(int(bad.min(initial=len(filled) - 1))),
+        "the time is missing or NaN",
+        "correct or drop the row",
+    )
     factor, note, weak = _time_unit(column, reading, options)
     if weak and table.interval_s is not None:
         # A clock without a unit ticks in some decimal part of a second.
@@ -135,8 +136,7 @@ def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[f
     """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
     if (asked := options.units[0]) is not None:
         given = unit_of(asked) or _UNKNOWN
-        problem = f"'{asked}' is no unit of time"
-        refuse_if(given.kind != "time", "--unit", problem, "give s, ms, us")
+        refuse_if(given.kind != "time", "--unit", f"'{asked}' is no unit of time", "give s, ms, us")
         return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
@@ -280,8 +280,11 @@ def _rounded(time: FloatArray) -> FloatArray | None:
     changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
     tried = [_frames(time, digit, (1.0 + c) * float(np.median(np.diff(early)))) for c in changes]
     # Fewest frames in all is the longest interval.
-    counted = [even for even in tried if even is not None]
-    return max(counted, key=lambda even: np.diff(even).min(), default=None)
+    return max(
+        [even for even in tried if even is not None],
+        key=lambda even: np.diff(even).min(),
+        default=None,
+    )
 
 
 def _last_digit(time: FloatArray) -> FloatArray:
@@ -328,8 +331,9 @@ def _keep_last(choice: Choice, base: TimeBase) -> None:
     count = float(np.median(jumps)) if len(jumps) and np.all(np.diff(base.time_s) >= 0) else 0.0
     if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:
         last = np.append(np.diff(base.time_s) > 0, True)
-        merged = f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
-        base.keep(last, merged)
+        base.keep(
+            last, f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
+        )
 
 
 _RADIAN = Unit("angle", 1.0, "rad")
@@ -395,8 +399,14 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
     stated = f"'{column.label}' {guess.why}"
     if guess.why and not guess.weak:
         notes = (stated, *notes)
-    weak = (f"{stated} (--unit)",) if guess.weak else ()
-    return Readings(values, _QUANTITIES[unit.kind], unit.factor, unit.name, notes, weak)
+    return Readings(
+        values,
+        _QUANTITIES[unit.kind],
+        unit.factor,
+        unit.name,
+        notes,
+        (f"{stated} (--unit)",) if guess.weak else (),
+    )
 
 
 def _unit(
@@ -640,5 +650,6 @@ def _position(x: Column, y: Column) -> Readings:
     down, sign = (-1.0, "-") if float(np.nanmedian(y.values)) < 0 else (1.0, "")
     note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
     angle, radius = np.arctan2(x.values, down * y.values), np.hypot(x.values, y.values)
-    excess = radius / np.nanmedian(radius) - 1.0
-    return Readings(angle, "angle_rad", 1.0, "rad", (note,), radius_excess=excess)
+    return Readings(
+        angle, "angle_rad", 1.0, "rad", (note,), radius_excess=radius / np.nanmedian(radius) - 1.0
+    )

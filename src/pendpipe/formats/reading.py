@@ -343,8 +343,9 @@ def table_of_plain(place: Path, recording: Recording) -> Table:
         resolution=recording.resolution,
         limits=limits,
     )
-    markers = tuple(markers_of(recording))
-    return Table(place, "plain", (column,), markers=markers, notes=recording.notes)
+    return Table(
+        place, "plain", (column,), markers=tuple(markers_of(recording)), notes=recording.notes
+    )
 
 
 def markers_of(recording: Recording) -> list[Marker]:

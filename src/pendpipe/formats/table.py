@@ -27,6 +27,18 @@ def next_reader_if(wrong: object, reason: str) -> None:
         raise NotThisFormatError(reason)
 
 
+def damaged_if(wrong: object, problem: str) -> None:
+    """Refuse what contradicts itself, or would fill the memory, as a library would.
+
+    Raises
+    ------
+    ValueError
+        Where `wrong` is true; who has the file's name turns it into a user error.
+    """
+    if wrong:
+        raise ValueError(problem)
+
+
 def most_unpacked(size: int) -> int:
     """How many bytes a packed file of so many may hold; what holds more is no recording."""
     return max(256 << 20, 100 * size)

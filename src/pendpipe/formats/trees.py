@@ -26,6 +26,7 @@ from pendpipe.formats.table import (
     NotThisFormatError,
     ReadOptions,
     Table,
+    damaged_if,
     most_unpacked,
     next_reader_if,
 )
@@ -267,8 +268,8 @@ def _of_tdms(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
     log_manager.set_level(logging.CRITICAL)
     with TdmsFile.open(io.BytesIO(data)) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
-        if sum(map(len, channels)) > len(data):
-            raise ValueError("it promises more samples than it has bytes")
+        promised = sum(map(len, channels))
+        damaged_if(promised > len(data), "it promises more samples than it has bytes")
         tree: dict[str, Any] = {channel.name: channel[:] for channel in channels}
         told = {channel.name: channel.properties for channel in channels}
     units = {name: str(each.get("unit_string", "")) for name, each in told.items()}
@@ -296,11 +297,16 @@ def _of_sound(place: Path, data: bytes, form: str, _options: ReadOptions) -> Tab
         if strength.mean() > blocks.mean(axis=1).std() and swing_of(strength[:, 0]).clear:
             values, rate = strength, rate / stretch
             notes = (f"a tone whose strength swings: that, every {_STRETCH_S:g} s, is the reading",)
-    columns = tuple(
-        Column(f"channel {number}", "1", column, number)
-        for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
+    return Table(
+        place,
+        form,
+        tuple(
+            Column(f"channel {number}", "1", column, number)
+            for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
+        ),
+        interval_s=1.0 / rate,
+        notes=notes,
     )
-    return Table(place, form, columns, interval_s=1.0 / rate, notes=notes)
 
 
 _STORED: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"} | {
@@ -319,12 +325,6 @@ _LAST_TYPE_4: Final = 51
 """Of version 4: an array of bytes that is a text."""
 
 
-def _damaged_if(wrong: object, problem: str) -> None:
-    """Refuse a file whose tags contradict one another."""
-    if wrong:
-        raise ValueError(problem)
-
-
 def is_matlab(data: bytes) -> bool:
     """Say whether a file is one of version 5 to 7 by its head; version 7.3 is HDF5."""
     head = data[:10] == b"MATLAB 5.0" or data[126:128] in (b"IM", b"MI")
@@ -340,7 +340,7 @@ def tree_of(data: bytes) -> dict[str, Any]:
         When a size or a type can't be true.
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128], "")
-    _damaged_if(not order, "its header is damaged")
+    damaged_if(not order, "its header is damaged")
     most, tree = most_unpacked(len(data)), {}
     for kind, content in _elements(data, order, 128):
         if kind == _COMPRESSED:
@@ -348,7 +348,7 @@ def tree_of(data: bytes) -> dict[str, Any]:
             unpacked = unpacker.decompress(content, most)
             many = len(unpacked) >= most
             fault = f"are more than {most >> 20} MB" if many else "are cut short"
-            _damaged_if(not unpacker.eof, f"its compressed data {fault}")
+            damaged_if(not unpacker.eof, f"its compressed data {fault}")
             most -= len(unpacked)
             kind, content = next(_elements(unpacked, order), (0, b""))
         name, value = _array(kind, content, order)
@@ -363,8 +363,9 @@ def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes
         start, small = at + 8, kind >> 16
         if 0 < small <= 4:  # so few bytes stand in the tag itself
             start, kind, size = at + 4, kind & 0xFFFF, small
-        too_long = f"an element of {size} bytes does not fit at byte {at}"
-        _damaged_if(start + size > len(data), too_long)
+        damaged_if(
+            start + size > len(data), f"an element of {size} bytes does not fit at byte {at}"
+        )
         yield kind, data[start : start + size]
         at = start + size + (0 if kind == _COMPRESSED else -(start + size - at) % 8)
 
@@ -372,7 +373,7 @@ def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes
 def _element(parts: Iterator[tuple[int, bytes]], order: str, *kinds: int) -> AnyArray:
     """Read the next element, which must be of one of these types."""
     kind, content = next(parts, (0, b""))
-    _damaged_if(kind not in kinds, f"an element of type {kind} stands where {kinds} is due")
+    damaged_if(kind not in kinds, f"an element of type {kind} stands where {kinds} is due")
     return np.frombuffer(content, order + _STORED[kind])
 
 
@@ -381,14 +382,16 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
 
     ``None`` stands for what holds no readings: complex numbers, functions, objects.
     """
-    wrong = kind != _MATRIX or depth > _DEEPEST
-    _damaged_if(wrong, f"an element of type {kind} stands where an array is due")
+    damaged_if(
+        kind != _MATRIX or depth > _DEEPEST,
+        f"an element of type {kind} stands where an array is due",
+    )
     if not content:
         return "", None
     parts = _elements(content, order)
     flags, shape = _element(parts, order, 6), _element(parts, order, 5).tolist()
     name = _element(parts, order, 1, 2, 16).tobytes().decode("latin-1")
-    _damaged_if(not len(flags) or min(shape, default=-1) < 0, f"an array has the size {shape}")
+    damaged_if(not len(flags) or min(shape, default=-1) < 0, f"an array has the size {shape}")
     group, count = int(flags[0]) & 0xFF, prod(shape)
     if group in _NUMERIC:
         values = _element(parts, order, *_STORED).reshape(shape, order="F")
@@ -401,12 +404,11 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
     if group == _STRUCT:
         width = int(_element(parts, order, 5).sum())
         names = _element(parts, order, 1).tobytes().decode("latin-1")
-        uneven = width < 1 or len(names) % width
-        _damaged_if(uneven, "the names of a structure's fields are damaged")
+        damaged_if(width < 1 or len(names) % width, "the names of a structure's fields are damaged")
         fields = [names[at : at + width].partition("\0")[0] for at in range(0, len(names), width)]
     held = [_array(*each, order, depth + 1)[1] for each in islice(parts, count * len(fields))]
     due = count * len(fields)
-    _damaged_if(len(held) < due, f"{len(held)} arrays stand where {due} are due")
+    damaged_if(len(held) < due, f"{len(held)} arrays stand where {due} are due")
     entries = np.empty(len(held) // max(len(fields), 1), dtype=object)
     for place in range(len(entries)):
         some = held[place * len(fields) : (place + 1) * len(fields)]

@@ -153,8 +153,10 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     """
     suffix = place.suffix.lower()
     size, notes = _size(data)
-    other = not size and suffix not in SUFFIXES
-    next_reader_if(other, "the mark 0x8001 at the end of a WinDaq header is missing")
+    next_reader_if(
+        not size and suffix not in SUFFIXES,
+        "the mark 0x8001 at the end of a WinDaq header is missing",
+    )
     refuse_if(
         not size,
         place,
@@ -196,8 +198,12 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     entries = np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table)
     channels = [_channel(place, number, each) for number, each in enumerate(entries, start=1)]
     # A scan without a word would let a damaged header claim any number of scans.
-    bare = packed and min(channel.divisor for channel in channels) > 1
-    refuse_if(bare, place, "no channel of this packed file is in every scan", _ANOTHER_COPY)
+    refuse_if(
+        packed and min(channel.divisor for channel in channels) > 1,
+        place,
+        "no channel of this packed file is in every scan",
+        _ANOTHER_COPY,
+    )
     return WindaqHeader(
         told,
         size,
@@ -641,8 +647,9 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
         del rows[last]
     refuse_if(not rows, place, "there is no whole scan", "record again, or give another file")
     odd = next((number for number, row in rows.items() if not row or len(row) != width), 0)
-    problem = f"'{scans.get(odd, '')[:60]}' is no whole scan"
-    refuse_if(odd, f"{place}, line {odd}", problem, "drop the row")
+    refuse_if(
+        odd, f"{place}, line {odd}", f"'{scans.get(odd, '')[:60]}' is no whole scan", "drop the row"
+    )
     rates = re.findall(r"srate\s+(?:x([0-9a-f]{1,8})|(\d{1,9}))", text)
     srate = int(rates[-1][0] or rates[-1][1], 16 if rates[-1][0] else 10) if rates else 0
     if not srate and options.sample_rate is None:
@@ -656,7 +663,13 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
         Column(f"channel {n}", "V", volts, n, resolution=_VOLTS_PER_COUNT, limits=limits)
         for n, volts in enumerate(_VOLTS_PER_COUNT * np.array([*rows.values()], float).T, start=1)
     )
-    interval_s = srate / _CLOCK_HZ or None
     return Table(
-        place, "di149-ascii", columns, np.array([*rows]), interval_s, (), metadata, tuple(notes)
+        place,
+        "di149-ascii",
+        columns,
+        np.array([*rows]),
+        srate / _CLOCK_HZ or None,
+        (),
+        metadata,
+        tuple(notes),
     )

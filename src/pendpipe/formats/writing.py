@@ -65,15 +65,19 @@ def on_grid(place: str | Path, recording: Recording) -> tuple[IntArray, float, _
         "this form has no times: write OUT.csv instead",
     )
     pauses = [(int(at) + 1, float(steps[at]) - interval_s) for at in breaks]
-    notes = []
-    if pauses:
-        notes.append(
-            f"{len(pauses)} gap(s) of {sum(missing for _, missing in pauses):.6g} s in all"
-            " are pauses, each with an event that gives its length"
-        )
-    if worst > _WORTH_SAYING:
-        notes.append(f"times moved by up to {worst:.2g} of an interval, onto an even grid")
-    return rows, interval_s, pauses, notes
+    in_all_s = sum(missing for _, missing in pauses)
+    notes = (
+        (
+            pauses,
+            f"{len(pauses)} gap(s) of {in_all_s:.6g} s in all"
+            " are pauses, each with an event that gives its length",
+        ),
+        (
+            worst > _WORTH_SAYING,
+            f"times moved by up to {worst:.2g} of an interval, onto an even grid",
+        ),
+    )
+    return rows, interval_s, pauses, [note for said, note in notes if said]
 
 
 _LOWEST, _HIGHEST = -32768, 32767

@@ -398,8 +398,9 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
         metadata["effects"] = ", ".join(one.effect.identifier for one in given)
     sensor, converter = model.sensor, model.converter
     if sensor is None:
-        read = instrument.spoilt(angle)
-        return Recording(time, read, "angle_rad", metadata=metadata, radius_excess=along)
+        return Recording(
+            time, instrument.spoilt(angle), "angle_rad", metadata=metadata, radius_excess=along
+        )
     noise = sensor.noise_volts * random.standard_normal(len(time))
     angle += instrument.coloured(noise, rate) / sensor.volts_per_radian
     volts = sensor.offset_volts + sensor.volts_per_radian * instrument.spoilt(angle)

@@ -49,8 +49,12 @@ def acquire_record(
     if record.source == "simulated":
         recording = _simulated(campaign, record)
     elif record.source.startswith("dataq:"):
-        again = f"pendpipe acquire --campaign {place} --record {name} --anew records it anew"
-        _instrument(record, out, again, anew=anew)
+        _instrument(
+            record,
+            out,
+            f"pendpipe acquire --campaign {place} --record {name} --anew records it anew",
+            anew=anew,
+        )
         return
     else:
         recording = _file(record)
@@ -116,9 +120,12 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
                 f"record {record.record}", "its length is unknown", "give stop_s in seconds"
             )
         port = record.source.removeprefix("dataq:")
-        path = new_path(f"{folder}/")
         record_from(
-            port, channels=[channel or 1], rate_hz=RATE_HZ, duration_s=record.stop_s, raw_path=path
+            port,
+            channels=[channel or 1],
+            rate_hz=RATE_HZ,
+            duration_s=record.stop_s,
+            raw_path=new_path(f"{folder}/"),
         )
         attempts = read_attempts(folder.glob("*.raw"))
     used = choose(attempts)

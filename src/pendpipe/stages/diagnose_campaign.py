@@ -62,7 +62,10 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
     if found is None:
         from pendpipe.diagnosis.result import not_analysable
 
-        reason = "it takes three records with a geometry, two of them with a sphere in a fluid"
-        return not_analysable(BASELINE, reason, provenance)
+        return not_analysable(
+            BASELINE,
+            "it takes three records with a geometry, two of them with a sphere in a fluid",
+            provenance,
+        )
     level = campaign.configuration.diagnose.level
     return campaign_diagnosis(search(*found, level=level), provenance)

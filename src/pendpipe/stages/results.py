@@ -62,8 +62,9 @@ def read_results(campaign: Campaign) -> list[RecordResult]:
 def _read(folder: Path, record: Record) -> RecordResult:
     path = folder / "fit.json"
     refused = read_json(path).get("refused")
-    fit = None if refused else read_fit(path)
-    return RecordResult(record, fit, read_json(folder / "calibration.json"), refused)
+    return RecordResult(
+        record, None if refused else read_fit(path), read_json(folder / "calibration.json"), refused
+    )
 
 
 def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordResult]:
@@ -151,8 +152,9 @@ def _theory(
 ) -> dict[str, FloatArray] | None:
     apparatus = campaign.configuration.apparatus
     assert apparatus is not None
-    plain = apparatus.added_mass == "plain"
-    return theory_curve(parts, fluid, apparatus.gravity_m_per_s2, plain_added_mass=plain)
+    return theory_curve(
+        parts, fluid, apparatus.gravity_m_per_s2, plain_added_mass=apparatus.added_mass == "plain"
+    )
 
 
 def _moved(geometries: Sequence[Geometry]) -> dict[str, FloatArray]:

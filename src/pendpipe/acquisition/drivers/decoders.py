@@ -172,8 +172,12 @@ class SyncBitDecoder:
         return Scans(self._counts(words.reshape(-1, len(self._marks))), tuple(losses))
 
     def _loss(self, after_scan: int, discarded: int, suspect: bool) -> Loss:
-        lost = -(-discarded // self.bytes_per_scan)
-        return Loss(after_scan, discarded, lost, suspect_before=suspect and after_scan > 0)
+        return Loss(
+            after_scan,
+            discarded,
+            -(-discarded // self.bytes_per_scan),
+            suspect_before=suspect and after_scan > 0,
+        )
 
 
 _STOP_CODE: Final = re.compile(rb"stop 0[123]")

@@ -129,8 +129,11 @@ class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RAN
         """End a stream of an earlier run and ask the device who it is."""
         self.stop()
         number = self._ask(b"A", b"1")
-        model = self.model if number == "2450" else f"device that calls itself {number!r}"
-        return Identity(model, self._ask(b"A", b"2"), self._ask(b"N", b"Z"))
+        return Identity(
+            self.model if number == "2450" else f"device that calls itself {number!r}",
+            self._ask(b"A", b"2"),
+            self._ask(b"N", b"Z"),
+        )
 
     def _set(self, channels: tuple[int, ...], rate_hz: float, range_volts: float) -> float:
         count = len(channels)

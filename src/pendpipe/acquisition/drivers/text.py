@@ -121,8 +121,9 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
     def _divisors(self, rate_hz: float) -> tuple[int, int, int]:
         """Find srate, dec and deca whose rate is nearest to `rate_hz`."""
         low, high = self.divisors
-        slowest = _CDC_HZ / (high * self.decimations * self.further_decimations)
-        self._refuse_rate(rate_hz, slowest, _CDC_HZ / low)
+        self._refuse_rate(
+            rate_hz, _CDC_HZ / (high * self.decimations * self.further_decimations), _CDC_HZ / low
+        )
         product = _CDC_HZ / rate_hz
         further = math.ceil(product / (high * self.decimations))
         further = min(self.further_decimations, max(1, further))
