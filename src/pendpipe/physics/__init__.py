@@ -6,7 +6,6 @@ The equations are used in their corrected forms; each docstring names its number
 
 from pendpipe.physics.confinement import (
     Confined,
-    sloshing_frequency,
     sphere_between_planes,
     sphere_in_tank,
 )
@@ -121,7 +120,6 @@ __all__ = [
     "rates_from_energy_constants",
     "restoring_torque",
     "rotation_of_sphere",
-    "sloshing_frequency",
     "sphere_between_planes",
     "sphere_in_tank",
     "sphere_volume",

@@ -17,15 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pendpipe.physics._floats import FloatArray
-from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 ComplexArray = npt.NDArray[np.complex128]
-Surface = Literal["film", "slip", "release"]
-"""What covers the fluid: a lid or a rigid film (no slip), a flat surface without shear stress
-(what gravity holds flat, far below the first sloshing mode), or one without any stress at all
-(far above it)."""
-
-TankSurface = Literal["film", "slip", "release", "free"]
+Surface = Literal["film", "slip"]
+"""What covers the fluid: a lid or a rigid film (no slip), or a flat surface without shear stress:
+what gravity holds flat, far below the first sloshing mode."""
 
 _DECAY: Final = 40.0
 """Plane waves are followed until they have decayed by e^-40."""
@@ -72,7 +68,7 @@ def sphere_between_planes(
     surface_m
         Distance of the surface from the sphere's centre in m; None: unbounded above.
     surface
-        ``"film"`` (a lid, or a contaminated surface), ``"slip"`` or ``"release"``.
+        ``"film"`` (a lid, or a contaminated surface) or ``"slip"``.
     order
         Number of multipole orders.
 
@@ -116,39 +112,28 @@ def sphere_in_tank(
     length_m: float,
     width_m: float,
     off_centre_m: float = 0.0,
-    surface: TankSurface = "free",
-    angular_frequency_per_s: float = 0.0,
+    surface: Surface = "slip",
     order: int = 16,
 ) -> Confined:
     """Return the force on a sphere that swings along a rectangular tank, about its centre.
 
-    Floor and surface act as in `sphere_between_planes`. Side walls and sloshing send back a
-    flow that is nearly uniform over the sphere: ``u = -kappa (U - u)``, so that the dipole of
-    the potential grows by ``1/(1 - kappa)``. The images of the dipole in the side walls give
+    Floor and surface act as in `sphere_between_planes`. Side walls send back a flow that is nearly
+    uniform over the sphere: ``u = -kappa (U - u)``, so that the dipole of the potential grows by
+    ``1/(1 - kappa)``. The images of the dipole in the side walls give
 
     ``kappa = -2 p (a^3/H) S``, ``S = sum' (-1)^n (y^2 - x^2)/(x^2 + y^2)^2``
 
     at x = n L, and y = m W for even m, m W - 2 e for odd m, with e off the centre. Here p is the
-    dipole over U a^3 (-1/2 unbounded), and each sloshing mode of wave numbers k_x = (2 n + 1) pi/L,
-    k_y = m pi/W adds
-
-    ``-8 pi p a^3 (2 - delta_m0) cos^2(k_y (W/2 + e)) k_x^2 cosh^2(k h)/(L W k sinh kH cosh kH)
-    omega^2/(omega_k^2 - omega^2)``, ``omega_k^2 = g k tanh kH``
-
-    where h is the distance of the floor.
+    dipole over U a^3 (-1/2 unbounded).
 
     Parameters
     ----------
-    radius_m, floor_m, depth_m, surface_m
+    radius_m, floor_m, depth_m, surface_m, surface
         As in `sphere_between_planes`.
     length_m, width_m
         The tank's size along and across the swing, in m.
     off_centre_m
         Distance of the sphere from the middle, across the swing.
-    surface
-        ``"film"``, ``"slip"``, ``"release"``, or ``"free"``: slip, and the sloshing modes.
-    angular_frequency_per_s
-        omega in rad/s; only a free surface needs it.
     order
         Number of multipole orders.
 
@@ -166,9 +151,9 @@ def sphere_in_tank(
     -----
     Side walls count as potential flow sees them, farther than half the depth (what is left of
     other modes there is e^(-pi W/H)); their own boundary layers are left out (about 1 % of the
-    drag), and so is the damping of the sloshing modes: no use within some 5 % of a mode.
+    drag).
 
-    The images and modes: Lamb, Hydrodynamics, sections 98 and 228.
+    The images: Lamb, Hydrodynamics, section 98.
 
     Examples
     --------
@@ -176,22 +161,15 @@ def sphere_in_tank(
 
     >>> tank = {"surface_m": 0.025, "length_m": 0.23, "width_m": 0.11}
     >>> lid = sphere_in_tank(0.019, 0.025, 0.00079, surface="film", **tank)
-    >>> free = sphere_in_tank(0.019, 0.025, 0.00079, angular_frequency_per_s=3.242, **tank)
-    >>> round(lid.drag_factor, 2), round(free.drag_factor, 2)
-    (1.35, 1.34)
+    >>> clean = sphere_in_tank(0.019, 0.025, 0.00079, **tank)
+    >>> round(lid.drag_factor, 2), round(clean.drag_factor, 2)
+    (1.35, 1.31)
     """
     if radius_m >= min(length_m, width_m - 2.0 * abs(off_centre_m)) / 2.0:
         raise ValueError("the side walls have to be outside the sphere")
-    lid = "slip" if surface == "free" else surface
-    dipole, alpha = _dipole(radius_m, floor_m, depth_m, surface_m, lid, order)
-    if surface == "release":
-        return _confined(dipole, alpha)
-    height = floor_m + surface_m
-    sent_back = 2.0 / height * _side_images(length_m, width_m, off_centre_m)
-    if surface == "free":
-        sides = length_m, width_m, off_centre_m
-        sent_back += _sloshing(sides, height, floor_m, angular_frequency_per_s)
-    return _confined(dipole / (1.0 + dipole * radius_m**3 * sent_back), alpha)
+    dipole, alpha = _dipole(radius_m, floor_m, depth_m, surface_m, surface, order)
+    images = 2.0 / (floor_m + surface_m) * _side_images(length_m, width_m, off_centre_m)
+    return _confined(dipole / (1.0 + dipole * radius_m**3 * images), alpha)
 
 
 def _dipole(
@@ -232,54 +210,6 @@ def _side_images(length_m: float, width_m: float, off_centre_m: float) -> float:
     rows = np.sinh(scale * x) ** -2.0 + (np.sinh(scale * x + 1j * aside) ** -2.0).real
     own = 1.0 / 3.0 + 1.0 / np.sin(aside) ** 2
     return float(scale**2 * (own + 2.0 * (signs * rows).sum()))
-
-
-def _sloshing(
-    sides: tuple[float, float, float], height_m: float, floor_m: float, angular_frequency: float
-) -> float:
-    """Return what the sloshing modes send back, per dipole; sides are L, W and e."""
-    length_m, width_m, off_centre_m = sides
-    above = height_m - floor_m
-    modes = np.arange(2 * int(_DECAY * max(length_m, width_m) / (2.0 * np.pi * above)) + 3)
-    along = (2 * modes + 1)[:, None] * np.pi / length_m
-    across = modes * np.pi / width_m
-    k = np.hypot(along, across)
-    height, level = k * height_m, k * floor_m
-    # cosh^2(k h)/(sinh kH cosh kH), without its large exponentials
-    shape = np.exp(-2.0 * k * above) * (1.0 + np.exp(-2.0 * level)) ** 2
-    shape /= 1.0 - np.exp(-4.0 * height)
-    own = STANDARD_GRAVITY_M_PER_S2 * k * np.tanh(height)
-    there = np.where(modes > 0, 2.0, 1.0) * np.cos(across * (width_m / 2.0 + off_centre_m)) ** 2
-    response = angular_frequency**2 / (own - angular_frequency**2)
-    terms = 8.0 * np.pi * there * along**2 / (length_m * width_m * k) * shape * response
-    return float(terms.sum())
-
-
-def sloshing_frequency(length_m: float, depth_m: float, mode: int = 1) -> float:
-    """Return the frequency of a tank's sloshing mode along its length.
-
-    ``omega^2 = g k tanh(k H)`` with ``k = mode pi/length`` (Lamb, Hydrodynamics, section 228).
-
-    Parameters
-    ----------
-    length_m, depth_m
-        The tank's length along the swing, and the depth of the fluid, in m.
-    mode
-        1 is the lowest; a sphere at the centre that swings along the length drives odd ones.
-
-    Returns
-    -------
-    float
-        In Hz.
-
-    Examples
-    --------
-    >>> [round(sloshing_frequency(0.23, depth), 2) for depth in (0.03, 0.05)]
-    [1.15, 1.42]
-    """
-    wave_number = mode * np.pi / length_m
-    squared = STANDARD_GRAVITY_M_PER_S2 * wave_number * np.tanh(wave_number * depth_m)
-    return float(np.sqrt(squared) / (2.0 * np.pi))
 
 
 def _confined(dipole: complex, alpha: complex) -> Confined:
@@ -451,34 +381,24 @@ def _reflected(
     right_across = np.zeros((k.size, count, size), dtype=np.complex128)
     gap = floor + (above or 0.0)
 
-    def conditions(kind: str, w: Any, d: Any, t: Any, rate: Any, flat: Any) -> tuple[Any, Any, Any]:
-        """Return what has to vanish on a plane; `rate` is d/dz, `flat` marks the potential."""
-        if kind == "film":
-            return w, d, t
+    def conditions(kind: str, w: Any, d: Any, t: Any, rate: Any) -> tuple[Any, Any, Any]:
+        """Return what has to vanish on a plane; `rate` is d/dz."""
         wave = k[:, None]
-        if kind == "slip":
-            return w, rate * d / wave, rate * t / wave
-        stress = 2.0 * rate * w + flat * alpha**2 * w / rate
-        return stress / (wave + abs(alpha)), (rate * d - wave * w) / wave, rate * t / wave
+        return (w, d, t) if kind == "film" else (w, rate * d / wave, rate * t / wave)
 
     rates = np.stack([k.astype(complex), gamma], axis=1)
-    flat = np.array([1.0, 0.0])
     of_column = np.repeat([0, 1, 1], order)
     for row, (distance, side, kind) in enumerate(planes):
         for column, (_, sign, _) in enumerate(planes):
             fade = np.exp(-rates * gap) if row != column else np.ones_like(rates)
             w = np.stack([np.ones_like(gamma), k / gamma], axis=1) * fade
-            vertical, along, turned = conditions(
-                kind, w, -sign * fade, fade[:, 1:], sign * rates, flat
-            )
+            vertical, along, turned = conditions(kind, w, -sign * fade, fade[:, 1:], sign * rates)
             matrix[:, 2 * row, 2 * column : 2 * column + 2] = vertical
             matrix[:, 2 * row + 1, 2 * column : 2 * column + 2] = along
             # The transverse wave is vortical.
-            across[:, row, column] = conditions(
-                kind, fade[:, 1:], fade[:, 1:], fade[:, 1:], sign * rates[:, 1:], 0.0
-            )[2][:, 0]
+            across[:, row, column] = turned[:, -1]
         incoming = _plane_waves(order, alpha, k, gamma, distance, side)
-        found = conditions(kind, *incoming, -side * rates[:, of_column], flat[of_column])
+        found = conditions(kind, *incoming, -side * rates[:, of_column])
         right[:, 2 * row], right[:, 2 * row + 1], right_across[:, row] = (-each for each in found)
     waves = np.linalg.solve(matrix, right)
     turned = np.linalg.solve(across, right_across)
