@@ -16,8 +16,6 @@ from pendpipe.arrays import BoolArray, FloatArray
 
 _SLACK: Final = 1e-9
 """Rounding error of the gradient."""
-_SINGULAR: Final = 1e12
-"""Of the scaled inverse: beyond, it is mostly rounding."""
 
 
 class Bounds(NamedTuple):
@@ -54,16 +52,18 @@ def bounded_step(
     """
     free = [j for j in range(len(gradient)) if j not in held]
     step, part = np.zeros(len(gradient)), normal[np.ix_(free, free)]
-    step[free] = solved(part, gradient[free])
+    # Parameters differ by many orders of size.
+    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    scaled, right = part * scale[:, None] * scale, gradient[free] * scale
+    step[free] = np.linalg.lstsq(scaled, right, rcond=1e-14)[0] * scale
     if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
         return step
-    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
     # A hair for what the readings do not tell apart.
-    scaled = part * scale[:, None] * scale + 1e-13 * np.eye(len(free))
-    root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
+    root = np.asarray(np.linalg.cholesky(scaled + 1e-13 * np.eye(len(free))), dtype=np.float64)
     within = Bounds(bounds.lower[free] / scale, bounds.upper[free] / scale)
-    right = np.asarray(np.linalg.solve(root, gradient[free] * scale), dtype=np.float64)
-    step[free] = bounded_least_squares(root.T, right, *within) * scale
+    white = np.asarray(np.linalg.solve(root, right), dtype=np.float64)
+    best = bounded_least_squares(root.T, white, *within)
+    step[free] = best * scale
     return bounds.clip(step)
 
 
@@ -117,16 +117,6 @@ def _first_met(
     return met, max(float(share[met]), 0.0)
 
 
-def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve a positive definite system whose parameters differ by many orders of size."""
-    scale = 1.0 / np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
-    scaled = matrix * scale[:, None] * scale
-    try:
-        return np.asarray(np.linalg.solve(scaled, right * scale) * scale)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(scaled, right * scale, rcond=1e-14)[0] * scale)
-
-
 def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     """Invert the normal matrix; rows and columns of what is held are zero.
 
@@ -134,22 +124,11 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     the truth lies, so they are those of the free estimate.
     """
     free = [j for j in range(len(normal)) if j not in held]
-    part = normal if len(free) == len(normal) else normal[np.ix_(free, free)]
+    part = normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
     scales = scale[:, None] * scale
-    scaled = part * scales
-    try:
-        inverse = np.linalg.inv(scaled)
-        sound = bool(np.abs(inverse).max(initial=0.0) < _SINGULAR)
-    except np.linalg.LinAlgError:
-        sound = False
-    if not sound:
-        inverse = np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
-    inverse *= scales
-    if len(free) == len(normal):
-        return np.asarray(inverse)
     result = np.zeros_like(normal)
-    result[np.ix_(free, free)] = inverse
+    result[np.ix_(free, free)] = scales * np.linalg.pinv(part * scales, rcond=1e-14, hermitian=True)
     return result
 
 
