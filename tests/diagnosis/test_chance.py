@@ -28,7 +28,7 @@ def bank_of(columns: FloatArray) -> Bank:
     effect, count = by_identifier("offset-drift"), columns.shape[1]
     candidates = tuple(Candidate(effect, (float(k),), k, 1) for k in range(count))
     nothing = np.zeros((len(columns), 0))
-    return Bank(nothing, columns.astype(np.float32), candidates, np.ones(count), np.zeros(count))
+    return Bank(nothing, columns.astype(np.float32), candidates, np.zeros(count))
 
 
 @pytest.mark.parametrize("number", [1, 7, 100])

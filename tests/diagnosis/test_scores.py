@@ -13,7 +13,13 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values, tangent_basis
+from pendpipe.diagnosis.scores import (
+    Bank,
+    build_bank,
+    local_p_values,
+    products_and_lengths,
+    tangent_basis,
+)
 from pendpipe.diagnosis.task import applicable
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
@@ -79,7 +85,8 @@ def test_an_effect_scores_its_size_times_its_columns_length(name: str) -> None:
     rows, worth = bank.rows()[name], WORTH[name]
     row = rows[len(rows) // 2]
     candidate = bank.candidates[row]
-    size = worth / bank.lengths[row]
+    _, (length,) = products_and_lengths(fit, noise, candidate.effect, [candidate.shape])
+    size = worth / length
     truth = np.concatenate([TRUTH, [size], candidate.shape])
     readings = fit.model.adding(candidate.effect).reading(truth)
     moved = Data(data.time_s, readings, INTERVAL_S, True, data.weight)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -58,9 +58,6 @@ class Bank:
         Shape (n + 1, k), float32: a candidate's columns are orthonormal among themselves.
     candidates
         The effects and shapes to which the columns belong.
-    lengths
-        Length of each candidate's first column for a unit of its size, shape (candidates,):
-        it converts a score to a size.
     log_scale_variance
         Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
     """
@@ -68,7 +65,6 @@ class Bank:
     basis: FloatArray
     columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
-    lengths: FloatArray
     log_scale_variance: FloatArray
 
     def scores(self, residual: FloatArray) -> FloatArray:
@@ -122,16 +118,52 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     """
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
-    kept = _Kept(tangent_basis(fit), noise, most)
+    basis, filled = tangent_basis(fit), 0
+    columns = np.empty((most, len(basis)), dtype=np.float32)
+    candidates, unsure = [], [np.zeros(0)]
     for effect, rows in zip(effects, shapes, strict=True):
-        if isinstance(effect, ReleasedParameter):
-            kept.add(effect, rows, effect.sensitivity(fit)[None])
-            continue
-        some = max(_COLUMNS_AT_ONCE // effect.sizes, 1)
+        some = max(_COLUMNS_AT_ONCE // max(effect.sizes, 1), 1)
         for first in range(0, len(rows), some):
             part = rows[first : first + some]
-            kept.add(effect, part, whitened(fit, noise, effect, part))
-    return kept.bank()
+            seen, own, units = _beside(basis, effect, part, whitened(fit, noise, effect, part))
+            if not own:
+                continue
+            flat = units.reshape(-1, len(basis))
+            columns[filled : filled + len(flat)] = flat
+            unsure.append(noise.log_scale_variance(flat).reshape(units.shape[:2]).mean(axis=1))
+            for shape in own:
+                candidates.append(Candidate(seen, shape, filled, units.shape[1]))
+                filled += units.shape[1]
+    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure))
+
+
+def _beside(
+    basis: FloatArray,
+    effect: Effect,
+    shapes: Sequence[tuple[float, ...]],
+    columns: FloatArray,
+) -> tuple[Effect, list[tuple[float, ...]], NDArray[Any]]:
+    """Project out the model's tangent space, and return what is seen of each shape.
+
+    Returns
+    -------
+    effect
+        A curve with the combinations of its basis functions that the record resolves; else as it
+        was.
+    shapes, units
+        Those of which something is seen, and their orthonormal columns, shape (shapes, width,
+        n + 1).
+    """
+    left = columns - (columns @ basis) @ basis.T
+    least = _VISIBLE * np.linalg.norm(columns, axis=1)
+    if isinstance(effect, Curve):
+        effect, left = _visible(effect, left)
+        least = np.zeros(len(left))
+    unit, mixing = np.linalg.qr(left.reshape(len(shapes), -1, len(basis)).transpose(0, 2, 1))
+    lengths = np.diagonal(mixing, axis1=1, axis2=2)
+    rows = np.swapaxes(unit * np.sign(lengths)[:, None], 1, 2).astype(np.float32)
+    seen = np.all(np.abs(lengths) > least.reshape(lengths.shape), axis=1) & (lengths.size > 0)
+    return effect, [shapes[k] for k in np.flatnonzero(seen).tolist()], rows[seen]
 
 
 def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
@@ -141,9 +173,11 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
 
 
 def whitened(
-    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[tuple[float, ...]]
+    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
 ) -> FloatArray:
     """Derivatives of the whitened readings by each size of each shape, shape (columns, n + 1)."""
+    if isinstance(effect, ReleasedParameter):
+        return effect.sensitivity(fit)[None]
     small = effect.small(fit.at.span)
     changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
     raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
@@ -152,97 +186,6 @@ def whitened(
     rows = np.zeros((len(raw), len(fit.jacobian)))
     rows[:, :-1] = noise.whiten(raw.T).T
     return rows
-
-
-class _Kept:
-    """Collects the unit columns that differ from the model's own."""
-
-    def __init__(self, basis: FloatArray, noise: Noise, most: int) -> None:
-        self.basis, self._noise = basis, noise
-        self._single = basis.astype(np.float32)
-        self._rows = np.empty((most, len(basis)), dtype=np.float32)
-        self._filled = 0
-        self._candidates: list[Candidate] = []
-        self._lengths: list[float] = []
-        self._log_scale_variance: list[float] = []
-
-    def add(self, effect: Effect, shapes: Sequence[tuple[float, ...]], columns: FloatArray) -> None:
-        """Project out the model's tangent space, and keep the rest at unit length."""
-        if isinstance(effect, Curve):
-            self._add_curve(effect, shapes[0], columns)
-            return
-        before = np.sqrt(np.einsum("kn,kn->k", columns, columns))
-        before[before == 0.0] = np.inf
-        unit = (columns / before[:, None]).astype(np.float32)
-        length = self._project(unit)
-        # A second projection removes the rounding errors of single precision.
-        self._project(unit)
-        width = len(columns) // len(shapes)
-        seen = (length > _VISIBLE).reshape(-1, width).all(axis=1)
-        for second in range(1, width):
-            for first in range(second):
-                seen &= _orthogonal(unit[first::width], unit[second::width])
-        if width > 1:
-            # The difference of two almost parallel rows is small, so that rounding matters again.
-            self._project(unit)
-        unsure = self._noise.log_scale_variance(unit)
-        for index in np.flatnonzero(seen).tolist():
-            own = slice(index * width, (index + 1) * width)
-            size = float(length[own][0] * before[own][0])
-            self._keep(effect, shapes[index], unit[own], size, unsure[own])
-
-    def _project(self, unit: NDArray[np.float32]) -> FloatArray:
-        """Project out the basis in place and normalise; return the length that remained."""
-        unit -= (unit @ self._single) @ self._single.T
-        left = np.sqrt(np.einsum("kn,kn->k", unit, unit))
-        unit /= np.where(left > 0.0, left, 1.0)[:, None]
-        return np.asarray(left, dtype=np.float64)
-
-    def _add_curve(self, curve: Curve, shape: tuple[float, ...], columns: FloatArray) -> None:
-        left = columns - (columns @ self.basis) @ self.basis.T
-        left -= (left @ self.basis) @ self.basis.T
-        curve, part = _visible(curve, left)
-        if len(part):
-            unit = np.linalg.qr(part.T)[0].T
-            unsure = self._noise.log_scale_variance(unit)
-            self._keep(curve, shape, unit, float(np.linalg.norm(part[0])), unsure)
-
-    def _keep(
-        self,
-        effect: Effect,
-        shape: tuple[float, ...],
-        unit: NDArray[Any],
-        length: float,
-        unsure: FloatArray,
-    ) -> None:
-        first, last = self._filled, self._filled + len(unit)
-        self._rows[first:last] = unit
-        self._filled = last
-        self._candidates.append(Candidate(effect, shape, first, len(unit)))
-        self._lengths.append(length)
-        self._log_scale_variance.append(float(unsure.mean()))
-
-    def bank(self) -> Bank:
-        """Return everything that was kept."""
-        columns = self._rows[: self._filled].T
-        return Bank(
-            self.basis,
-            columns,
-            tuple(self._candidates),
-            np.array(self._lengths),
-            np.array(self._log_scale_variance),
-        )
-
-
-def _orthogonal(first: NDArray[np.float32], second: NDArray[np.float32]) -> BoolArray:
-    """Project unit rows out of others in place; return where something remains."""
-    apart = np.ones(len(first), dtype=bool)
-    for _ in range(2):
-        second -= np.einsum("kn,kn->k", first, second)[:, None] * first
-        left = np.sqrt(np.einsum("kn,kn->k", second, second))
-        apart &= left > _VISIBLE
-        second /= np.where(left > 0.0, left, 1.0)[:, None]
-    return apart
 
 
 def _sizes(
@@ -307,16 +250,7 @@ def products_and_lengths(
         lengths of that; shape (shapes,). The size is product/length^2, and lowers chi^2 by
         (product/length)^2.
     """
-    span = base.at.span
-    small = effect.small(span)
-    sizes = np.zeros(effect.sizes)
-    changed = sizes.copy()
-    changed[0] = small
-    changes = [(np.append(sizes, shape), np.append(changed, shape)) for shape in shapes]
-    pendulum = base.model.pendulum(base.value)
-    raw = responses(effect, changes, base.at, pendulum).T / small
-    columns = np.zeros((len(raw) + 1, len(shapes)))
-    columns[:-1] = noise.whiten(raw)
+    columns = whitened(base, noise, effect, shapes)[:: effect.sizes]
     basis = tangent_basis(base)
-    columns -= basis @ (basis.T @ columns)
-    return columns.T @ base.residual, np.linalg.norm(columns, axis=0)
+    columns -= (columns @ basis) @ basis.T
+    return columns @ base.residual, np.linalg.norm(columns, axis=1)
