@@ -116,7 +116,7 @@ def acquire(
         What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
     **options
         Of `pendpipe.acquisition.recorder.record`: ``raw_path`` (a new file that keeps the bytes),
-        ``range_volts``, ``until_noise``, ``reconnect_s``, ``volts_per_radian``; and, where it is
+        ``range_volts``, ``reconnect_s``, ``volts_per_radian``; and, where it is
         simulated, ``clock_scale``.
 
     Returns

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import io
-import math
 import os
 import random
 import signal
@@ -17,7 +16,7 @@ import pytest
 from pendpipe.acquisition.decode import decode_recording, find_clock_losses
 from pendpipe.acquisition.drivers.decoders import Scans
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
-from pendpipe.acquisition.recorder import NoiseWatch, ProgressLine
+from pendpipe.acquisition.recorder import ProgressLine
 from pendpipe.acquisition.simulated import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
@@ -29,41 +28,6 @@ resource = pytest.importorskip("resource", reason="this system has no limit on a
 
 def slow(time_s: FloatArray) -> FloatArray:
     return np.asarray(5.0 * np.sin(0.02 * time_s))
-
-
-@pytest.mark.parametrize("noise_counts", [0.0, 1.0, 20.0])
-def test_the_noise_is_reached_when_the_decay_has_come_down_to_it(noise_counts: float) -> None:
-    """A exp(-t/tau) meets twice the noise at tau ln(A/2s), give or take a window or three."""
-    noise = np.random.default_rng(1)
-    rate_hz, tau_s, amplitude = 60.0, 200.0, 2e4
-    time_s = np.arange(0.0, 4000.0, 1 / rate_hz)
-    counts = amplitude * np.exp(-time_s / tau_s) * np.cos(2 * math.pi * 0.7 * time_s)
-    counts = np.rint(counts + noise.normal(0.0, noise_counts, len(counts))).astype(np.int16)
-    watch = NoiseWatch(rate_hz)
-    ended_s = next(
-        t
-        for t in np.arange(10.0, 4000.0, 10.0)
-        if watch.feed(counts[round((t - 10) * rate_hz) : round(t * rate_hz)])
-    )
-    sd = math.hypot(noise_counts, 1 / math.sqrt(12.0))
-    assert ended_s == pytest.approx(tau_s * math.log(amplitude / (2 * sd)), abs=80.0)
-
-
-def test_a_pendulum_not_yet_released_has_not_decayed() -> None:
-    watch = NoiseWatch(60.0)
-    assert not any(watch.feed(np.zeros(600, dtype=np.int16)) for _ in range(50))
-
-
-def test_a_recording_ends_at_the_noise() -> None:
-    def decay(time_s: FloatArray) -> FloatArray:
-        return np.asarray(4.0 * np.exp(-time_s / 20.0) * np.cos(4.0 * time_s))
-
-    recording = acquire_simulated(
-        "di154", decay, rate_hz=60.0, duration_s=2000.0, clock_scale=200.0, until_noise=True
-    )
-    # 20 ln(4 V / (2 * 4.9 mV/sqrt 12)) = 145 s, and two windows of 20 s.
-    assert 120.0 < recording.time_s[-1] < 250.0
-    assert not recording.notes
 
 
 @pytest.mark.parametrize("lost", [30, 100])

@@ -139,7 +139,8 @@ def kept_in(raw_path: Path, out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as fault:
-        problem = f"it can't be written ({fault.strerror or fault})"
-        raise InputError(out, problem, f"make room; {kept}") from None
+        raise InputError(
+            out, f"it can't be written ({fault.strerror or fault})", f"make room; {kept}"
+        ) from None
     except InputError as fault:
         raise InputError(fault.place, fault.problem, f"{fault.remedy}; {kept}") from None

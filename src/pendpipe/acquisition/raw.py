@@ -46,7 +46,7 @@ _HEAD_1: Final = struct.Struct("<0scId")
 _CHECK: Final = struct.Struct("<I")
 _SYNC_S: Final = 1.0
 COMPLETE: Final = ("scans", "time", "noise")
-"""Reasons for which a recording ends when it has what was asked for."""
+"""Reasons for which a recording ends when it has what was asked for (the last of older files)."""
 
 
 class NothingRecordedError(InputError):

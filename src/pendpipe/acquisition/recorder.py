@@ -51,8 +51,6 @@ class AcquisitionRequest:
         Seconds of the recorder's clock.
     range_volts
         The signal stays within plus and minus it; the box's usual range when not given.
-    until_noise
-        End also when the amplitude (of the first channel) has reached the noise.
     reconnect_s
         Seconds of the host for which a lost or silent device is waited for.
     """
@@ -61,7 +59,6 @@ class AcquisitionRequest:
     rate_hz: float
     duration_s: float
     range_volts: float | None = None
-    until_noise: bool = False
     reconnect_s: float = 30.0
 
     def __post_init__(self) -> None:
@@ -70,7 +67,7 @@ class AcquisitionRequest:
             refuse_if(
                 value is not None and not (math.isfinite(value) and value > 0),
                 name,
-                f"{value} is no positive number",
+                f"{value or 0:g} is no positive number",
                 "give one above 0",
             )
 
@@ -142,62 +139,6 @@ class ProgressLine:
             self._stream.flush()
 
 
-_WINDOW_S: Final = 20.0
-"""Seconds that are judged at a time: a few swings of the slowest pendulum on a bench."""
-_LARGE: Final = 10.0
-"""So many times the noise must the motion have been before its end can be seen."""
-_REACHED: Final = 2.0
-_WINDOWS: Final = 2
-"""In so many windows, one after the other, must it be small."""
-_FEWEST: Final = 32
-
-
-class NoiseWatch:
-    """Tell from a stream of readings that the amplitude has reached the noise.
-
-    Parameters
-    ----------
-    rate_hz
-        Readings a second.
-
-    Notes
-    -----
-    In a window of 20 s the noise is the root mean square of the third differences over
-    sqrt(20) (a motion slow against the readings has next to none; white noise of standard
-    deviation s has sqrt(20) s), or what rounding leaves, 1/sqrt(12) of a count, if that is
-    more. The amplitude is sqrt(2) times the standard deviation about a straight line, the
-    noise taken off in squares. The end is reached when it was below twice the noise in two
-    windows, after it had been above ten times: a pendulum not yet released has not decayed.
-    """
-
-    def __init__(self, rate_hz: float) -> None:
-        self._size = max(_FEWEST, round(_WINDOW_S * rate_hz))
-        self._kept: list[AnyArray] = []
-        self._count = self._small = 0
-        self._large = False
-
-    def feed(self, counts: AnyArray) -> bool:
-        """Take further readings, shape (n,); return whether the end is reached."""
-        self._kept.append(counts)
-        self._count += len(counts)
-        if self._count < self._size:
-            return False
-        joined = np.concatenate(self._kept).astype(np.float64)
-        while len(joined) >= self._size:
-            self._judge(joined[: self._size])
-            joined = joined[self._size :]
-        self._kept, self._count = [joined], len(joined)
-        return self._small >= _WINDOWS
-
-    def _judge(self, window: AnyArray) -> None:
-        noise = math.sqrt(max(float(np.mean(np.diff(window, 3) ** 2)) / 20.0, 1.0 / 12.0))
-        place = np.linspace(-1.0, 1.0, len(window))
-        left = window - np.polyval(np.polyfit(place, window, 1), place)
-        amplitude = math.sqrt(2.0 * max(0.0, float(np.mean(left**2)) - noise**2))
-        self._large = self._large or amplitude > _LARGE * noise
-        self._small = self._small + 1 if self._large and amplitude < _REACHED * noise else 0
-
-
 class Session:
     """One recording with one instrument, kept as it comes.
 
@@ -230,7 +171,6 @@ class Session:
         self._progress = progress or ProgressLine(StringIO(), request.duration_s)
         self._received = 0
         self._by_clock = False  # the clock ends it, not the count of scans
-        self._watch: NoiseWatch | None = None
         self.identity, self.setup = self._introduce()
 
     def close(self) -> None:
@@ -239,8 +179,9 @@ class Session:
 
     def run(self, stream: IO[bytes], header: Mapping[str, object]) -> None:
         """Keep everything from start to end, with its time; a break ends or resumes it."""
-        bytes_per_s = self.setup.rate_hz * self._decoder.bytes_per_scan
-        writer = RawWriter(stream, header, bytes_per_s=bytes_per_s)
+        writer = RawWriter(
+            stream, header, bytes_per_s=self.setup.rate_hz * self._decoder.bytes_per_scan
+        )
         # Taken before the start, so that a device can only seem late, never early.
         self._origin_s = self._clock.now()
         reason = ""
@@ -284,8 +225,6 @@ class Session:
         request = self._request
         identity = self._instrument.identify()
         setup = self._instrument.configure(request.channels, request.rate_hz, request.range_volts)
-        if request.until_noise:
-            self._watch = self._watch or NoiseWatch(setup.rate_hz)
         self._decoder = self._driver.decoder(len(setup.channels))
         self._progress.begin(setup.range_volts / 2 ** (self._driver.bits - 1))
         return identity, setup
@@ -307,8 +246,7 @@ class Session:
             if data:
                 writer.data(elapsed_s, data)
                 self._received += len(data)
-            decoded = self._decoder.feed(data)
-            self._progress.update(elapsed_s, decoded)
+            self._progress.update(elapsed_s, self._decoder.feed(data))
             enough = self._received >= wanted
             if enough and elapsed_s < 0.9 * (scans - 1) / self.setup.rate_hz:
                 self._by_clock = True
@@ -320,8 +258,6 @@ class Session:
                 return f"the device ended its stream with '{self._decoder.ended}'"
             if enough and not self._by_clock:
                 return "scans"
-            if self._watch and self._watch.feed(decoded.counts[:, 0]):
-                return "noise"
             if len(data) < _BACKLOG:
                 time.sleep(poll_s)
 
@@ -365,7 +301,6 @@ def record(
     source: str | None = None,
     progress: ProgressLine | None = None,
     range_volts: float | None = None,
-    until_noise: bool = False,
     reconnect_s: float = 30.0,
 ) -> Recording:
     """Record from the device on a port, and decode.
@@ -397,9 +332,6 @@ def record(
         A display to keep up to date.
     range_volts
         The signal stays within plus and minus it: the smallest range that holds it is taken.
-    until_noise
-        End also when the amplitude of the first channel has reached the noise, see
-        `noise.NoiseWatch`.
     reconnect_s
         For so many seconds of the host a device that was unplugged, fell silent or
         overflowed is looked for again; what was missed is a gap.
@@ -417,17 +349,15 @@ def record(
         holds by then is good.
     """
     request = AcquisitionRequest(
-        tuple(channels), rate_hz, duration_s, range_volts, until_noise, max(0.0, reconnect_s)
+        tuple(channels), rate_hz, duration_s, range_volts, max(0.0, reconnect_s)
     )
     clock = clock or ScaledClock()
     kind = find_driver(driver or identify(port).model)
-    line = Line(port, kind.baudrate)
-    try:
-        session = Session(line, kind, request, clock, progress)
-    except BaseException:
-        line.close()
-        raise
-    with closing(session), _opened(raw_path) as stream:
+    with (
+        Line(port, kind.baudrate) as line,
+        closing(Session(line, kind, request, clock, progress)) as session,
+        _opened(raw_path) as stream,
+    ):
         header = _header(port, session.identity, session.setup, request, clock)
         told = header | {"volts_per_radian": volts_per_radian, "source": source}
         kept = {key: value for key, value in told.items() if value is not None}

@@ -43,10 +43,6 @@ _OWN: Final[Flags] = {
         "metavar": "N",
         "help": "length, instead of --duration",
     },
-    "--until-noise": {
-        "action": "store_true",
-        "help": "end when the amplitude has reached the noise",
-    },
     "--range-volts": {"type": float, "metavar": "V", "help": "the signal stays within +-V"},
     "--reconnect": {
         "type": float,
@@ -221,7 +217,6 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         "raw_path": raw,
         "progress": ProgressLine(sys.stderr, arguments.duration),
         "range_volts": arguments.range_volts,
-        "until_noise": arguments.until_noise,
         "reconnect_s": arguments.reconnect,
     }
     if arguments.device:

@@ -180,8 +180,9 @@ class Stream:
         codes: IntArray = np.zeros((block, len(self._signals)), dtype=np.int64)
         for column, signal in enumerate(self._signals):
             if signal is not None:
-                volts = signal(time_s)
-                codes[:, column] = convert(volts, self._dialect.bits, self._dialect.range_volts)
+                codes[:, column] = convert(
+                    signal(time_s), self._dialect.bits, self._dialect.range_volts
+                )
         self._ready += self._dialect.encode(codes)
         self._computed += block
 
