@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from scipy.special import gammainc, gammaincc, log_ndtr, ndtr, xlogy
+from scipy.special import gammaincc, log_ndtr, ndtr, xlogy
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
@@ -187,7 +186,7 @@ class Counts(NamedTuple):
     found, expected
         Observed and expected numbers.
     chance
-        Two-sided p-value of each number; 1 where too few are expected to tell.
+        Probability of as few; 1 where too few are expected to tell.
     """
 
     code: IntArray
@@ -200,14 +199,12 @@ class Counts(NamedTuple):
         """Count the readings of each code, and compare with the expectations.
 
         `readings` are places in `code`; `expected` has the shape (errors, k), its middle row
-        without error. The p-values are those of Poisson distributions: P(N <= found) at the
-        smallest expectation, P(N >= found) at the largest.
+        without error. The p-values are those of Poisson distributions, P(N <= found) at the
+        smallest expectation.
         """
         found = np.bincount(readings, minlength=len(code)).astype(np.float64)
-        low, high = expected.min(axis=0), expected.max(axis=0)
-        fewer, more = gammaincc(found + 1.0, low), gammainc(found, high)
-        told = np.minimum(2.0 * np.minimum(fewer, more), 1.0)
-        chance = np.where(low > _FEWEST_EXPECTED, told, 1.0)
+        least = expected.min(axis=0)
+        chance = np.where(least > _FEWEST_EXPECTED, gammaincc(found + 1.0, least), 1.0)
         return cls(code, found, expected[len(expected) // 2], chance)
 
     def chosen(self, which: BoolArray | slice) -> Counts:
@@ -227,63 +224,41 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
 
     Each number is tested against a Poisson distribution (readings scatter less, so the p-value is
     never underestimated) whose mean may lie anywhere within a small common error of the angles.
-    Single codes, whole bits, and codes that are equal modulo a power of two are tested; the
-    p-value counts all of them.
+    Codes that are equal modulo a power of two are tested together, and single ones; the p-value
+    counts all of them.
     """
     coded = None if data.time_noise else read_codes(data, fit, samples)
-    if coded is None or len(coded.code) < 100:
+    if coded is None or len(coded.code) < 100 or np.ptp(coded.code) < 2:
         return nothing("missing-codes")
-    expected = _expectations(coded)
-    comb, (bit, part, by_bit) = worst_comb(coded.code, expected), _stuck_bits(coded, expected)
-    codes = int(coded.code.min()) - 1 + np.arange(expected.shape[1])
-    # All but those at the ends.
-    counts = Counts.of(codes, coded.code - codes[0], expected).chosen(slice(2, -2))
-    chance = np.minimum(counts.chance * len(counts.code), 1.0)
-    by_code = float(chance.min(initial=1.0))
-    p_value = min(1.0, 3.0 * min(by_code, by_bit, comb.p_value))
-    if p_value > 0.01:
-        return Finding("missing-codes", p_value, summary="codes occur as often as expected")
-    if comb.p_value < min(by_code, by_bit):
-        codes = codes[1:-1][codes[1:-1] % comb.period == comb.residue.code]
-        lead = f"every {comb.period}th code (from {codes[0]}"
-        found = _rare(data, coded, codes, comb.residue, lead)
-        more = {"period": Estimate(float(comb.period), 0.0, "")}
-        return replace(found, p_value=p_value, parameters={**found.parameters, **more})
-    bad = counts.chosen(chance < _SIGNIFICANT)
-    seldom = bad.chosen(bad.found < bad.expected)
-    named = ", ".join(map(str, seldom.code[:5])) + (", ..." if len(seldom.code) > 5 else "")
-    found = _rare(data, coded, seldom.code, seldom, f"{len(seldom.code)} code(s) ({named}")
-    found = replace(found, p_value=p_value, delta_chi2=bad.gain)
-    if by_bit > by_code:
-        return found
-    half = Estimate(0.5, 0.5 / math.sqrt(len(coded.code)), "")
-    return replace(
-        found,
-        delta_chi2=max(bad.gain, -2.0 * math.log(max(p_value, 1e-300))),
-        parameters={**found.parameters, "bit": Estimate(float(bit), 0.0, ""), "share": half},
-        summary=f"bit {bit} of the converter is stuck or unreliable: {100 * part:.0f} % of the"
-        " readings lie in one half of its codes",
-    )
-
-
-def _rare(data: Data, coded: Coded, codes: IntArray, counts: Counts, lead: str) -> Finding:
-    """Describe codes that occur too seldom; `lead` says which."""
+    comb = worst_comb(coded.code, _expectations(coded))
+    if comb.p_value > 0.01:
+        return Finding("missing-codes", comb.p_value, summary="codes occur as often as expected")
+    counts, codes, readings = comb.counts, comb.codes, len(coded.code)
     found, expected = float(counts.found.sum()), float(counts.expected.sum())
-    readings = len(coded.code)
     missing, sd = expected - found, math.sqrt(max(expected, 1.0))
+    parameters = {
+        "share": Estimate(missing / readings, sd / readings, ""),
+        "number": Estimate(float(len(codes)), 0.0, ""),
+        "found": Estimate(found, math.sqrt(max(found, 1.0)), ""),
+        "expected": Estimate(expected, 0.0, ""),
+    }
+    named = ", ".join(map(str, codes[:5])) + (", ..." if len(codes) > 5 else "")
+    lead = ""
+    if comb.period:
+        parameters["period"] = Estimate(float(comb.period), 0.0, "")
+        lead = f"{len(counts.code)} in every {comb.period} codes: "
+        if 2 * len(counts.code) == comb.period:
+            bit = comb.period.bit_length() - 2
+            parameters["bit"] = Estimate(float(bit), 0.0, "")
+            lead = f"bit {bit} of the converter is stuck or unreliable: "
     return Finding(
         "missing-codes",
-        1.0,
+        comb.p_value,
         counts.gain,
-        parameters={
-            "share": Estimate(missing / readings, sd / readings, ""),
-            "number": Estimate(float(len(codes)), 0.0, ""),
-            "found": Estimate(found, math.sqrt(max(found, 1.0)), ""),
-            "expected": Estimate(expected, 0.0, ""),
-        },
-        location=Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
-        summary=f"{lead}, in steps of {coded.lattice.step:.4g} {data.unit}) occurred {found:.0f}"
-        f" times where {expected:.0f} were expected",
+        parameters,
+        Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
+        summary=f"{lead}{len(codes)} code(s) ({named}, in steps of {coded.lattice.step:.4g}"
+        f" {data.unit}) occurred {found:.0f} times where {expected:.0f} were expected",
     )
 
 
@@ -315,63 +290,31 @@ def _expected(position: FloatArray, first: int, size: int, spread: float) -> Flo
     return np.asarray(np.maximum(smooth[start : start + size * fine : fine], 0.0))
 
 
-def _stuck_bits(coded: Coded, expected: FloatArray) -> tuple[int, float, float]:
-    """Return the bit that is set too often or too seldom, how often, and its p-value.
-
-    The converter's code 0 is unknown: a bit of weight 2^b divides the codes into runs of 2^b, and
-    every origin of the runs is tried. Expectations include the noise: near a turning point many
-    readings lie about one code.
-    """
-    best, tried = (1.0, 0, 0.5), 0
-    span = int(np.ptp(coded.code))
-    codes = np.arange(expected.shape[1]) + int(coded.code.min()) - 1
-    for bit in range(_MOST_BITS):
-        run = 2**bit
-        if 4 * run > span:
-            break
-        found = _halves(coded.code, np.ones(len(coded.code)), run)
-        predicted = np.stack([_halves(codes, row, run) for row in expected])
-        should = np.clip(found, predicted.min(axis=0), predicted.max(axis=0)).clip(0.05, 0.95)
-        tried += 2 * run
-        # Neighbouring readings are in the same half, so that fewer are independent.
-        effective = max(int(np.count_nonzero(np.diff(np.floor(coded.position / run)))), 1)
-        excess = np.abs(found - should) / np.sqrt(should * (1.0 - should) / effective)
-        worst = int(np.argmax(excess))
-        best = min(best, (float(2.0 * ndtr(-excess[worst])), bit, float(found[worst])))
-    chance, bit, part = best
-    return bit, part, min(1.0, tried * chance)
-
-
-def _halves(codes: IntArray, number: FloatArray, run: int) -> FloatArray:
-    """Return the share of readings in half of the residues, for each origin of the half."""
-    residue = np.bincount(codes % (2 * run), number, 2 * run)
-    ring = np.concatenate([[0.0], np.cumsum(np.tile(residue, 2))])
-    return np.asarray((ring[run : 3 * run] - ring[: 2 * run]) / residue.sum())
-
-
 class Comb(NamedTuple):
-    """Codes that are equal modulo `period`.
+    """Codes that occur too seldom.
 
     Parameters
     ----------
     period
-        A power of two.
-    residue
-        The least probable residue, shape (1,).
+        The power of two modulo which they are equal; 0 for single codes.
+    codes, counts
+        The codes, and how often those of each residue occur.
     p_value
-        With all periods and residues that were tested.
+        With all periods, residues and codes that were tested.
     """
 
     period: int
-    residue: Counts
+    codes: IntArray
+    counts: Counts
     p_value: float
 
 
 def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
-    """Sum the codes by residue, and return the least probable residue.
+    """Sum the codes by residue, and return the least probable residues, or single codes.
 
-    A converter with a faulty bit loses every code of one residue modulo a power of two. Each code
-    alone may be expected too seldom to be missed; together they are not.
+    A converter with a faulty bit loses codes of some residues modulo a power of two. Each code
+    alone may be expected too seldom to be missed; together they are not. The first and the last
+    code are left out.
 
     Parameters
     ----------
@@ -381,20 +324,18 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
         Expected number of each code from ``code.min() - 1`` on, a row for each common error of
         the angles; shape (errors, codes), the middle row without error.
     """
-    first, size = int(code.min()) - 1, expected.shape[1]
-    codes = np.arange(first, first + size)
-    combs, tried = [Comb(1, Counts.of(codes[:1], codes[:0], np.ones((1, 1))), 1.0)], 0
-    for bit in range(1, _MOST_BITS + 1):
-        period = 2**bit
-        if 2 * period > size - 2:
-            break
-        predicted = np.array([np.bincount(codes % period, row, period) for row in expected])
-        counts = Counts.of(np.arange(period), code % period, predicted)
-        tried += int(np.count_nonzero(predicted.min(axis=0) > _FEWEST_EXPECTED))
-        worst = int(np.argmin(counts.chance))
-        combs.append(
-            Comb(period, counts.chosen(slice(worst, worst + 1)), float(counts.chance[worst]))
-        )
+    codes, tried = np.arange(int(code.min()) + 1, int(code.max())), 0
+    inside = code[(code >= codes[0]) & (code <= codes[-1])]
+    periods = [2**bit for bit in range(1, _MOST_BITS + 1) if 2 ** (bit + 1) <= len(codes) + 2]
+    combs = []
+    for period in (*periods, len(codes)):
+        rows = [np.bincount(codes % period, row, period) for row in expected[:, 2:-2]]
+        counts = Counts.of(np.arange(period), inside % period, np.array(rows))
+        tried += int(np.count_nonzero(np.min(rows, axis=0) > _FEWEST_EXPECTED))
+        worst = float(counts.chance.min())
+        seldom = counts.chosen(counts.chance <= max(_SIGNIFICANT / period, worst))
+        members = codes[np.isin(codes % period, seldom.code)]
+        combs.append(Comb(period if period in periods else 0, members, seldom, worst))
     best = min(combs, key=lambda comb: comb.p_value)
     return best._replace(p_value=min(1.0, tried * best.p_value))
 
