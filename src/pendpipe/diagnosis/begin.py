@@ -214,8 +214,8 @@ def order_for(amplitude: float, unit: str) -> int:
     if unit not in ("rad", "rad/s") or amplitude < 0.8:
         return 14
     if amplitude < 1.6:
-        return 20
-    return 28 if amplitude < 2.4 else 48
+        return 16
+    return 24 if amplitude < 2.4 else 48
 
 
 def _held(

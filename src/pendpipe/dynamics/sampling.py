@@ -1,16 +1,32 @@
 """A motion read at given times."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.chebyshev import analysis, lobatto_nodes
 
 _POINTS: Final = 6
 """Neighbouring nodes that a value is interpolated from."""
+_FINER: Final = 3
+"""Nodes that are interpolated from, over those of the motion."""
+
+
+def _at_finer(values: FloatArray) -> FloatArray:
+    """Read the polynomial of each half cycle at more nodes, shape (..., count, nodes)."""
+    return np.asarray(values @ _to_finer(values.shape[-1] - 1))
+
+
+@lru_cache
+def _to_finer(order: int) -> FloatArray:
+    finer = chebyshev.chebvander(lobatto_nodes(_FINER * order), order)
+    return np.ascontiguousarray((finer @ analysis(lobatto_nodes(order))).T)
 
 
 @dataclass(frozen=True)
@@ -52,7 +68,7 @@ class Sampled:
 
     def at_nodes(self, values: FloatArray) -> FloatArray:
         """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""
-        index = self._first + np.arange(_POINTS)[:, None]
+        index, values = self._first + np.arange(_POINTS)[:, None], _at_finer(values)
         flat = values.reshape(-1, values.shape[-2] * values.shape[-1])
         found = np.empty((len(flat), len(self._first)))
         # A row at a time stays in the processor's cache.
@@ -70,19 +86,20 @@ class Sampled:
 def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     """Read a motion at times within its clock.
 
-    psi - omega t and ln r are slow; each is interpolated by the polynomial through six nodes
-    of its half cycle.
+    psi - omega t and ln r are slow; each is interpolated by the polynomial through six
+    neighbouring nodes of its half cycle, close enough for 1e-8 of the motion.
     """
-    order = motion.clock.order
-    nodes = motion.time_s
+    order = _FINER * motion.clock.order
+    nodes = _at_finer(motion.time_s)
     behind = np.searchsorted(nodes.reshape(-1), time_s)
     half = np.clip((behind - 1) // (order + 1), 0, len(nodes) - 1)
     left = np.clip(behind - half * (order + 1) - _POINTS // 2, 0, order + 1 - _POINTS)
     first = (half * (order + 1) + left).astype(np.intp)
     weights = lagrange(nodes.reshape(-1), first, time_s)
     omega = motion.angular_frequency
-    slow = (motion.clock.psi - omega * (nodes - nodes[0, 0])).reshape(-1)
-    logs = motion.log_amplitude.reshape(-1)
+    psi = replace(motion.clock, order=order).psi
+    slow = (psi - omega * (nodes - nodes[0, 0])).reshape(-1)
+    logs = _at_finer(motion.log_amplitude).reshape(-1)
     phase = omega * (time_s - nodes[0, 0])
     log_amplitude = np.zeros_like(phase)
     for point in range(_POINTS):
