@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -31,7 +30,6 @@ _SHARED_ERROR: Final = 0.35
 """Largest part of an error that its neighbours may share if it belongs to a single reading."""
 _ROUNDS: Final = 4
 _NEIGHBOURS: Final = 4
-_BLOCK: Final = 50
 _MOST_ROUNDS: Final = 20
 _FAR_SD: Final = 8.0
 _WINDOW_RAD: Final = 4.0 * math.pi
@@ -50,12 +48,15 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         p_k = P(at least k of n beyond the k-th largest).
 
     The test uses the smallest p_k, with half of the probability given to k = 1. Readings that
-    are too small at the extremes of the motion are left to the tests for saturation.
+    are too small at the extremes of the motion are left to the tests for saturation. Where a misfit
+    of the motion remains in the windows, the test is the one that needs no model.
     """
     if data.used < 60:
         return nothing("glitches")
     residual, used = error_of(data, fit), data.weight > 0.0
-    local, smeared = _errors(fit, noise, residual, ~used)
+    local = _errors(fit, noise, residual, ~used)
+    if local.smooth():
+        return find_in_misfit(data, fit, noise, samples)
     if noise.coloured:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
         used = used.copy()
@@ -69,16 +70,16 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     for _ in range(_ROUNDS):
         beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
         beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED_BY_CHANCE
-        if smeared:
+        if noise.coloured:
             # The filter spreads a wrong reading over its neighbours: take the largest first.
             beyond &= error == _about(error, _NEIGHBOURS).max(axis=1)
         if not beyond.any():
             break
         size[beyond] = local.scaled[beyond]
         mask |= beyond
-        if not smeared:
+        if not noise.coloured:
             break
-        local, _ = _errors(fit, noise, residual, (data.weight == 0.0) | mask)
+        local = _errors(fit, noise, residual, (data.weight == 0.0) | mask)
         error = own_error(local)
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
@@ -151,31 +152,10 @@ def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolAr
     return found
 
 
-def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> tuple[Local, bool]:
-    """Return each reading's error, and whether a filter has spread it over its neighbours.
-
-    If a misfit of the motion remains in the windows, each reading is compared with the cubic
-    through its four neighbours instead.
-    """
-    phase = fit.at.sampled.phase
-    rest = np.where(out, 0.0, residual)
-    local = local_residual(phase, whitened_in_time(rest, noise), ~out)
-    if not local.smooth():
-        return local, noise.coloured
-    filled = np.interp(phase, phase[~out], residual[~out])
-    padded = np.pad(filled, 2, mode="reflect", reflect_type="odd")
-    between = (4.0 * (padded[1:-3] + padded[3:-1]) - padded[:-4] - padded[4:]) / 6.0
-    error = (filled - between) / _local_scale(filled - between)
-    return local_residual(phase, np.where(out, 0.0, error), ~out), True
-
-
-def _local_scale(error: FloatArray) -> FloatArray:
-    """Return the local median of |error|, which a misfit makes vary along the record."""
-    count = max(len(error) // _BLOCK, 1)
-    ends = np.linspace(0, len(error), count + 1).astype(np.int64)
-    usual = [np.median(np.abs(error[i:j])) for i, j in pairwise(ends)]
-    scale = np.interp(np.arange(len(error)), 0.5 * (ends[:-1] + ends[1:]), usual)
-    return np.asarray(np.maximum(scale, max(float(np.median(usual)), 1e-300)))
+def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> Local:
+    """Return each reading's error, whitened; a filter spreads it where the noise is coloured."""
+    white = whitened_in_time(np.where(out, 0.0, residual), noise)
+    return local_residual(fit.at.sampled.phase, white, ~out)
 
 
 def own_error(local: Local) -> FloatArray:
