@@ -189,37 +189,6 @@ def noise_before_rounding(local: Local, step: float) -> float:
     return float(_NOISE_RATIOS[np.argmax(likelihood)]) * step
 
 
-def rounding_moments(fraction: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance of the squared error due to rounding and noise.
-
-    Parameters
-    ----------
-    fraction
-        Position of the value between codes, in steps: 0 at a code; shape (n,).
-    ratio
-        Noise before rounding, in steps.
-
-    Returns
-    -------
-    square, variance
-        E[e^2] in steps^2 and Var[e^2] in steps^4, e = code - value; shape (n,).
-    """
-    grid = np.linspace(-0.5, 0.5, 65)
-    reach = int(np.ceil(5.0 * ratio)) + 1
-    codes = np.arange(-reach, reach + 1)
-    chance = ndtr((codes + 0.5 - grid[:, None]) / ratio) - ndtr(
-        (codes - 0.5 - grid[:, None]) / ratio
-    )
-    error = codes - grid[:, None]
-    square = np.sum(chance * error**2, axis=1)
-    fourth = np.sum(chance * error**4, axis=1)
-    position = fraction - np.round(fraction)
-    return (
-        np.interp(position, grid, square),
-        np.interp(position, grid, np.maximum(fourth - square**2, 0.0)),
-    )
-
-
 @dataclass(frozen=True)
 class Coded:
     """Readings as codes, without masked and outlying ones.
@@ -236,8 +205,6 @@ class Coded:
         Standard deviation of `position`'s error, in steps.
     ratio
         Noise before rounding, in steps.
-    datum
-        Index among the data, shape (m,); None where these are means of several readings.
     """
 
     lattice: Lattice
@@ -245,7 +212,6 @@ class Coded:
     position: FloatArray
     blur: float
     ratio: float
-    datum: IntArray | None
 
     @property
     def error(self) -> FloatArray:
@@ -261,15 +227,12 @@ class Raw:
     ----------
     values, residual, phase, used
         Readings, readings minus model, phase of the motion, and whether each counts.
-    datum
-        Index among the data; None where these are means.
     """
 
     values: FloatArray
     residual: FloatArray
     phase: FloatArray
     used: BoolArray
-    datum: IntArray | None = None
 
 
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
@@ -277,8 +240,7 @@ def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     sampled, reading = fit.at.sampled, fit.at.reading
     part = whole_readings(data, samples)
     if part is not None:
-        error, datum = error_of(data, fit), np.arange(len(data))
-        return Raw(samples.values[part], error, sampled.phase, data.weight > 0.0, datum)
+        return Raw(samples.values[part], error_of(data, fit), sampled.phase, data.weight > 0.0)
     first, last = np.searchsorted(samples.time_s, data.time_s[[0, -1]] + [-1e-9, 1e-9]).tolist()
     index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
     when, values = samples.time_s[index], samples.values[index]
@@ -316,5 +278,4 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     if misfit < _GOOD_MODEL:
         error, blur = raw.residual, min(0.5 * misfit, 0.05)
     position = lattice.position((raw.values - error)[good])
-    datum = None if raw.datum is None else raw.datum[good]
-    return Coded(lattice, lattice.code[good], position, blur, ratio, datum)
+    return Coded(lattice, lattice.code[good], position, blur, ratio)

@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.codes import Coded, read_codes, rounding_moments
+from pendpipe.diagnosis.forensics.codes import read_codes
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
@@ -31,12 +31,9 @@ _CONSTANT: Final = 1e-3
 """Relative variation of the mean of v^2 over a cycle below which it counts as constant."""
 _AGREE_SD: Final = 2.6
 """Standard deviations by which the part at twice the frequency may be too small."""
-_DITHERED: Final = 0.7
-"""Noise before rounding, in steps, from which rounding simply adds to the noise."""
+_RULED: Final = 0.1
+"""Noise before rounding, in steps, below which rounding rules the errors."""
 _ROUNDS: Final = 6
-_RELATIVE_STEP: Final = 0.05
-_LARGEST_BLUR: Final = 0.15
-"""Error of the angles in steps above which the rounding errors are unknown."""
 
 
 def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
@@ -138,10 +135,6 @@ class Squares(NamedTuple):
     ----------
     square
         In units of the variance of one reading.
-    expected, variance
-        Their mean and variance without jitter.
-    gain
-        Derivative of `expected` by the variance before rounding (1 where dithered).
     mean, double
         The parts of v^2 that vary with the amplitude, (omega A)^2/2, and at twice the
         frequency, -(omega A)^2 cos(2 psi)/2; over the mean of v^2.
@@ -152,37 +145,27 @@ class Squares(NamedTuple):
     """
 
     square: FloatArray
-    expected: FloatArray
-    variance: FloatArray
-    gain: FloatArray
     mean: FloatArray
     double: FloatArray
     seconds_squared: float
-    shared: float = 0.0
-
-    @property
-    def inverse(self) -> FloatArray:
-        """Weight of each square, limited for those that rounding fixes."""
-        return 1.0 / np.maximum(self.variance, 0.05 * float(np.mean(self.variance)))
+    shared: float
 
 
 def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
 
     The score for sigma_t^2 at zero is a sum of squared errors, weighted by v^2 minus its mean; its
-    p-value is that of a weighted sum of squares, scaled for heavier tails than normal. If
-    rounding is not dithered, each square is compared with its expectation at that angle. The part
-    of v^2 at twice the frequency must agree with the whole, or it alone counts: noise that decays
-    with the amplitude is not jitter.
+    p-value is that of a weighted sum of squares, scaled for heavier tails than normal. Errors that
+    rounding rules, with hardly any noise, are no random numbers. The part of v^2 at twice the
+    frequency must agree with the whole, or it alone counts: noise that decays with the amplitude is
+    not jitter.
     """
     if data.time_noise or data.used < 60:
         return nothing("jitter")
     coded = read_codes(data, fit, samples)
-    if coded is not None and coded.ratio < _DITHERED:
-        squares = _rounded(fit, coded)
-    else:
-        squares = _dithered(data, fit, noise)
-    if squares is None or len(squares.square) < 50:
+    squares = _squares(data, fit, noise)
+    ruled = coded is not None and coded.ratio < _RULED
+    if ruled or squares is None or len(squares.square) < 50:
         return nothing("jitter")
     p_value = _p_value(squares, squares.mean + squares.double)
     # At constant amplitude the mean of v^2 can't be distinguished from the variance of the noise.
@@ -194,94 +177,46 @@ def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
     return _described(data, fit, squares, p_value)
 
 
-def _dithered(data: Data, fit: Fit, noise: Noise) -> Squares | None:
+def _squares(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     """Return squares of normal errors; None if a misfit of the motion remains in them."""
     sampled, used = fit.at.sampled, data.weight > 0.0
-    residual = residual_of(data, fit)
-    white, unit = whitened_series(residual, noise)
-    unit = unit**2 * float(np.mean(white[used] ** 2))
+    white, unit = whitened_series(residual_of(data, fit), noise)
     local = local_residual(sampled.phase, white, used)
     if local.smooth():
         return None
-    scaled = local.scaled[used]
-    mean, double, speed = _speeds(fit, np.flatnonzero(used))
-    ones = np.ones(len(scaled))
-    shared = float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5))
-    return Squares(scaled**2, ones, 2.0 * ones, ones, mean, double, unit / speed, shared)
-
-
-def _rounded(fit: Fit, coded: Coded) -> Squares | None:
-    """Return squares of rounding errors; None if the angles are not known well enough."""
-    index = coded.datum
-    if index is None or coded.blur > _LARGEST_BLUR:
-        return None
-    # At rest within a step all errors are equal: they contain no information on noise.
-    moving = fit.at.sampled.amplitude[index] > 1.5 * coded.lattice.step
-    if np.count_nonzero(moving) < 50:
-        moving[:] = True
-    position = coded.position[moving] - np.round(coded.position[moving])
-    before = math.hypot(coded.ratio, coded.blur)
-    expected, variance = rounding_moments(position, before)
-    more, less = (1.0 + _RELATIVE_STEP) * before, (1.0 - _RELATIVE_STEP) * before
-    gain = rounding_moments(position, more)[0] - rounding_moments(position, less)[0]
-    gain /= more**2 - less**2
-    square = coded.error[moving] ** 2
-    unit = float(np.mean(square))
-    mean, double, speed = _speeds(fit, index[moving])
-    return Squares(
-        square / unit,
-        expected / unit,
-        variance / unit**2,
-        np.maximum(gain, 0.0),
-        mean,
-        double,
-        unit * coded.lattice.step**2 / speed,
-    )
-
-
-def _speeds(fit: Fit, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
-    sampled = fit.at.sampled
-    top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[index]) ** 2
-    double = -top * np.cos(2.0 * sampled.phase[index])
+    top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[used]) ** 2
     speed = float(np.mean(top))
-    return top / speed, double / speed, speed
+    return Squares(
+        local.scaled[used] ** 2,
+        top / speed,
+        -top / speed * np.cos(2.0 * sampled.phase[used]),
+        unit**2 * float(np.mean(white[used] ** 2)) / speed,
+        float(np.clip(-np.mean(local.leverage[used]), 0.0, 0.5)),
+    )
 
 
 def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
     """Return the probability of a weighted sum as large, the variance of the noise unknown."""
-    capped = np.minimum(squares.square, _CLIP_SD**2 * squares.expected.mean())
-    columns = [squares.gain] if beside is None else [squares.gain, squares.gain * beside]
+    capped = np.minimum(squares.square, _CLIP_SD**2)
     # Project out the variance (and `beside`), by least squares.
-    basis, inverse = np.stack(columns, axis=1), squares.inverse
-    wanted = squares.gain * weight
-    solved = np.linalg.solve(basis.T @ (inverse[:, None] * basis), basis.T @ (inverse * wanted))
-    rest = (wanted - basis @ solved) * inverse
-    off = capped - squares.expected
-    common = float(off @ (inverse * squares.gain)) / float(squares.gain**2 @ inverse)
-    off = off - common * squares.gain
-    weights = rest * squares.expected
+    parts = [np.ones(len(weight)), *([] if beside is None else [beside])]
+    basis = np.stack(parts, axis=1)
+    rest = weight - basis @ np.linalg.lstsq(basis, weight, rcond=None)[0]
+    off = capped - capped.mean()
     # Scatter relative to independent squares of normal numbers.
-    share = (
-        float(np.mean(off**2 * squares.inverse))
-        / float(np.mean(squares.variance * squares.inverse))
-        / (1.0 - squares.shared)
-    )
-    stretch = math.sqrt(
-        share * float(rest**2 @ squares.variance) / (2.0 * float(weights @ weights))
-    )
-    total = float(rest @ off)
-    return tail_of_squares(total / max(stretch, 1e-6) + float(weights.sum()), weights)
+    share = 0.5 * float(np.mean(off**2)) / (1.0 - squares.shared)
+    total = float(rest @ off) / max(math.sqrt(share), 1e-6)
+    return tail_of_squares(total + float(rest.sum()), rest)
 
 
 def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Fit a constant and parts to the variance; return sizes and their covariance."""
-    columns = squares.gain[:, None] * np.stack([np.ones(len(squares.gain)), *parts], axis=1)
+    columns = np.stack([np.ones(len(squares.square)), *parts], axis=1)
     size = np.zeros(columns.shape[1])
     matrix: FloatArray = np.eye(columns.shape[1])
-    off = np.minimum(squares.square, 25.0 * squares.expected.mean()) - squares.expected
+    off = np.minimum(squares.square, 25.0) - 1.0
     for _ in range(_ROUNDS):
-        model = np.maximum(squares.expected + columns @ size, 0.1 * squares.expected)
-        weight = squares.inverse / (model / squares.expected) ** 2
+        weight = 0.5 / np.maximum(1.0 + columns @ size, 0.1) ** 2
         matrix = np.asarray(np.linalg.inv(columns.T @ (weight[:, None] * columns)))
         size = matrix @ (columns.T @ (weight * off))
     return size, matrix
@@ -291,7 +226,7 @@ def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Findin
     speed = squares.mean + squares.double
     size, covariance = _fitted(squares, [speed])
     model, null = (
-        np.maximum(squares.expected + squares.gain * more, 0.1 * squares.expected)
+        np.maximum(1.0 + more, 0.1)
         for more in (size[0] + size[1] * speed, _fitted(squares, [])[0][0])
     )
     gain = np.log(null / model) + squares.square * (1.0 / null - 1.0 / model)
