@@ -48,7 +48,7 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.devices.simulated import Dialect
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
-from pendpipe.acquisition.drivers.decoders import SyncBitDecoder
+from pendpipe.acquisition.drivers.base import SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read

@@ -80,7 +80,8 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
     power = math.floor(math.log10(size)) if size > 0.0 else 0
     power = power if power >= 6 or power <= -4 else 0
     scaled, error = value / 10.0**power, error / 10.0**power
-    tens = f" × 10{_superscript(power)}" if power else ""
+    raised = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    tens = f" × 10{raised}" if power else ""
     if not known:
         number = f"{scaled:.0f}" if "e" in f"{scaled:.4g}" else f"{scaled:.4g}"
         return f"{_minus(number)}{tens} {unit}".rstrip()
@@ -99,7 +100,3 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
 
 def _minus(number: str) -> str:
     return number.replace("-", "\N{MINUS SIGN}")
-
-
-def _superscript(power: int) -> str:
-    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

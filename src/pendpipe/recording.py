@@ -361,11 +361,16 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, [*picked.values()], len(names))
     column = dict(zip(picked, np.ascontiguousarray(table.T), strict=True))
+    quality = None
+    if "quality" in column:
+        # What is no quality becomes 255, which `check` refuses.
+        known = np.isin(column["quality"], (GOOD, SUSPECT, MISSING))
+        quality = np.where(known, column["quality"], 255).astype(np.uint8)
     recording = Recording(
         time_s=column["time_s"],
         values=column[quantity],
         quantity=quantity,
-        quality=_as_bytes(column["quality"]) if "quality" in column else None,
+        quality=quality,
         radius_excess=column.get("radius_excess"),
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
         notes=notes,
@@ -439,12 +444,6 @@ def _numbers(
                     where, f"'{cells[index].strip()}' is no number", "correct or drop the row"
                 ) from None
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
-
-
-def _as_bytes(quality: FloatArray) -> ByteArray:
-    """Turn the column into bytes; what is no quality becomes 255, which `check` refuses."""
-    known = np.isin(quality, (GOOD, SUSPECT, MISSING))
-    return np.where(known, quality, 255).astype(np.uint8)
 
 
 def check(place: str | Path, recording: Recording, *, first_line: int | None = None) -> None:

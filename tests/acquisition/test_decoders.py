@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pendpipe.acquisition.drivers.decoders import Decoder, Loss, SyncBitDecoder, WordDecoder
+from pendpipe.acquisition.drivers.base import Decoder, Loss, SyncBitDecoder, WordDecoder
 from pendpipe.arrays import AnyArray
 
 

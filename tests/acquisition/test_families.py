@@ -10,7 +10,7 @@ import pytest
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
-from pendpipe.acquisition.drivers.decoders import Loss, WordDecoder
+from pendpipe.acquisition.drivers.base import Loss, WordDecoder
 from pendpipe.acquisition.drivers.letters import DI245
 from pendpipe.acquisition.drivers.text import DI149, DI155
 from pendpipe.errors import InputError

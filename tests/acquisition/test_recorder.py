@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pendpipe.acquisition.decode import decode_recording, find_clock_losses
-from pendpipe.acquisition.drivers.decoders import Scans
+from pendpipe.acquisition.drivers.base import Scans
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
 from pendpipe.acquisition.recorder import ProgressLine
 from pendpipe.acquisition.simulated import acquire_simulated

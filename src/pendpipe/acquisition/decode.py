@@ -17,8 +17,7 @@ from typing import Final, Literal
 import numpy as np
 
 from pendpipe.acquisition.drivers import find_driver
-from pendpipe.acquisition.drivers.base import Driver
-from pendpipe.acquisition.drivers.decoders import Decoder, Loss
+from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss
 from pendpipe.acquisition.raw import Hole, NothingRecordedError, RawRecording, read_raw
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from pendpipe.errors import refuse_if
@@ -591,13 +590,10 @@ def find_clock_losses(
         # The detection took extremes of many levels, which exaggerate the delays.
         near = level[max(0, index - _BESIDE_STEP + 1) : index + 1]
         rise = float(np.median(level[index + 2 : index + 2 + _BESIDE_STEP]) - np.median(near))
-        at = _arrival_of(late, int(first[index]), int(first[index + 2]))
+        # The arrival between the two after which the lateness never falls back.
+        begin, end = int(first[index]), int(first[index + 2])
+        least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
+        at = begin + 1 + int(np.argmax(np.diff(least_after)))
         found.append(ClockLoss(at, max(1, round(rise / interval_s))))
         index += _BESIDE
     return found, limit_s
-
-
-def _arrival_of(late: FloatArray, begin: int, end: int) -> int:
-    """Return the arrival between the two after which the lateness never falls back."""
-    least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
-    return begin + 1 + int(np.argmax(np.diff(least_after)))

@@ -16,8 +16,7 @@ import numpy as np
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers import find_driver, identify
-from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
-from pendpipe.acquisition.drivers.decoders import Scans
+from pendpipe.acquisition.drivers.base import Driver, Identity, Scans, Setup
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
 from pendpipe.arrays import AnyArray
@@ -358,8 +357,22 @@ def record(
         closing(Session(line, kind, request, clock, progress)) as session,
         _opened(raw_path) as stream,
     ):
-        header = _header(port, session.identity, session.setup, request, clock)
-        told = header | {"volts_per_radian": volts_per_radian, "source": source}
+        told = {
+            "model": session.identity.model,
+            "firmware": session.identity.firmware or None,
+            "serial_number": session.identity.serial_number or None,
+            "port": port,
+            "channels": list(session.setup.channels),
+            "bits": kind.bits,
+            "range_volts": session.setup.range_volts,
+            "rate_hz": session.setup.rate_hz,
+            "requested_rate_hz": request.rate_hz,
+            "duration_s": request.duration_s,
+            "clock_scale": clock.scale,
+            "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+            "volts_per_radian": volts_per_radian,
+            "source": source,
+        }
         kept = {key: value for key, value in told.items() if value is not None}
         try:
             session.run(stream, kept)
@@ -406,23 +419,3 @@ def _cannot_write(place: str | Path, fault: OSError) -> InputError:
         "make room, or give another file; what was kept till then is opened with "
         "pendpipe acquire --recover",
     )
-
-
-def _header(
-    port: str, identity: Identity, setup: Setup, request: AcquisitionRequest, clock: ScaledClock
-) -> dict[str, object]:
-    """Describe a recording for whoever finds the file."""
-    return {
-        "model": identity.model,
-        "firmware": identity.firmware or None,
-        "serial_number": identity.serial_number or None,
-        "port": port,
-        "channels": list(setup.channels),
-        "bits": find_driver(identity.model).bits,
-        "range_volts": setup.range_volts,
-        "rate_hz": setup.rate_hz,
-        "requested_rate_hz": request.rate_hz,
-        "duration_s": request.duration_s,
-        "clock_scale": clock.scale,
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
-    }

@@ -113,7 +113,13 @@ def read_records(path: str | Path) -> list[Record]:
     ]
     refuse_if(not rows, place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}")
     names = [name.strip() for name in rows[0][1].split("\t")]
-    _check_columns(f"{place}, line {rows[0][0]}", names)
+    for name in (*REQUIRED, *names):
+        for wrong, problem, remedy in (
+            (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
+            (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
+            (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
+        ):
+            refuse_if(wrong, f"{place}, line {rows[0][0]}", problem, remedy)
     records: list[Record] = []
     for number, line in rows[1:]:
         cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
@@ -127,19 +133,11 @@ def read_records(path: str | Path) -> list[Record]:
         cells += [""] * (len(names) - len(cells))
         records.append(_record(where, dict(zip(names, cells, strict=True))))
     refuse_if(not records, place, "the table has no records", "add a row a record")
-    _check_names(place, records)
+    # Windows takes names that differ in case only for one.
+    counts = Counter(entry.record.lower() for entry in records)
+    again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
+    refuse_if(again, place, f"the record '{''.join(again[-1:])}' stands twice", "rename one")
     return records
-
-
-def _check_columns(where: str, names: list[str]) -> None:
-    """Refuse a header with a column too few, unknown or twice."""
-    for name in (*REQUIRED, *names):
-        for wrong, problem, remedy in (
-            (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
-            (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
-            (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
-        ):
-            refuse_if(wrong, where, problem, remedy)
 
 
 def _record(where: str, row: dict[str, str]) -> Record:
@@ -196,13 +194,6 @@ def _number(where: str, row: dict[str, str], name: str) -> float | None:
         "fix or blank the cell",
     )
     return value
-
-
-def _check_names(place: Path, records: list[Record]) -> None:
-    """Refuse two records of one name, also where only the case differs (Windows)."""
-    counts = Counter(entry.record.lower() for entry in records)
-    again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
-    refuse_if(again, place, f"the record '{''.join(again[-1:])}' stands twice", "rename one")
 
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")

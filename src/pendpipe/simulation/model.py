@@ -137,20 +137,6 @@ class Given(NamedTuple):
         return dict(zip(names, self.values[first:].tolist(), strict=True))
 
 
-def read_effects(place: str | Path, tables: Sequence[Mapping[str, Any]]) -> list[Given]:
-    """Check the tables `[[effects]]` of a model file.
-
-    Raises
-    ------
-    InputError
-        Where an identifier or a parameter is unknown, missing, or out of its bounds.
-    """
-    return [
-        _read(f"{place}, effects {number}", dict(table))
-        for number, table in enumerate(tables, start=1)
-    ]
-
-
 def _read(place: str, table: dict[str, Any]) -> Given:
     identifier = table.pop("id", None)
     if not isinstance(identifier, str):
@@ -382,7 +368,8 @@ def simulate(model: Model, source: str = "simulated", place: str = "the model") 
     Recording
         In volts where there is a sensor, else in radians, with its metadata.
     """
-    given = read_effects(place, model.effects)
+    tables = enumerate(model.effects, start=1)
+    given = [_read(f"{place}, effects {number}", dict(table)) for number, table in tables]
     refuse_inert_effects(model, given, place)
     rate = model.sampling.sample_rate_hz
     time = np.arange(int(np.floor(model.sampling.duration_s * rate + 1e-9))) / rate

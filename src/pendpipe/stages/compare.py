@@ -17,7 +17,6 @@ from pendpipe.analysis.compare import (
     compare,
     tail_fits,
 )
-from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import load, shared
 from pendpipe.campaign.design import design_of
@@ -84,7 +83,13 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
         "joint": None if together is None else joint_values(*together),
         "tail": _tail(campaign, results),
         "calibration": read_json(sensor_file(campaign)) if settings.calibration else None,
-        "provenance": stamp(campaign),
+        "provenance": {
+            "version": __version__,
+            "code": code_version("pendpipe.stages.compare"),
+            "configuration": digest(settings.model_dump(exclude={"results", "records"})),
+            "seed": settings.seed,
+            "packages": {name: version(name) for name in PACKAGES},
+        },
     }
     write_json(out, content)
     write_json(summary, campaign_summary(content))
@@ -172,19 +177,15 @@ def _record(
     content["start_s"], content["stop_s"] = float(points.time_s[0]), float(points.time_s[-1])
     content["misfit"] = amplitude_misfit(points)
     if split is not None:
-        content |= _separated(split)
+        # The losses after Eq. 17, the errors of the calibration and of k in them.
+        content |= {
+            "a": split.quadratic.as_json(),
+            "c": split.coulomb.as_json(),
+            "quality_factor_limit": split.quality_factor_limit.as_json(),
+            "quality_factor_hysteretic": split.quality_factor_hysteretic.as_json(),
+            "quality_factor_viscous": split.quality_factor_viscous.as_json(),
+        }
     return content | _theory(campaign, result, found, spread.get(row.record))
-
-
-def _separated(split: SeparatedRecord) -> dict[str, Any]:
-    """The losses after Eq. 17, the errors of the calibration and of k in them."""
-    return {
-        "a": split.quadratic.as_json(),
-        "c": split.coulomb.as_json(),
-        "quality_factor_limit": split.quality_factor_limit.as_json(),
-        "quality_factor_hysteretic": split.quality_factor_hysteretic.as_json(),
-        "quality_factor_viscous": split.quality_factor_viscous.as_json(),
-    }
 
 
 def _theory(
@@ -351,14 +352,3 @@ def _number(content: dict[str, Any] | None) -> dict[str, Any] | None:
 
 
 PACKAGES: Final = ("numpy", "scipy", "numba", "matplotlib", "pyserial", "snakemake")
-
-
-def stamp(campaign: Campaign) -> dict[str, Any]:
-    """Versions of the program and its libraries, digest of the configuration, seed."""
-    return {
-        "version": __version__,
-        "code": code_version("pendpipe.stages.compare"),
-        "configuration": digest(campaign.configuration.model_dump(exclude={"results", "records"})),
-        "seed": campaign.configuration.seed,
-        "packages": {name: version(name) for name in PACKAGES},
-    }

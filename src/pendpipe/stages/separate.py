@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.analysis.separate import (
-    Benchmark,
     MeasuredRecord,
     SeparatedRecord,
     fit_benchmark,
@@ -67,7 +66,18 @@ def separate_campaign(campaign: Campaign, out: Path) -> None:
         out,
         {
             "schema_version": 1,
-            "hysteretic_coefficient": _benchmark_json(benchmark),
+            # In the form of campaign.json, with the tests of the line.
+            "hysteretic_coefficient": benchmark.coefficient.as_json()
+            | {
+                "inverse": benchmark.inverse,
+                "inverse_sd": benchmark.inverse_sd,
+                "chi2": benchmark.chi2,
+                "dof": benchmark.degrees_of_freedom,
+                "p_value": benchmark.p_value,
+                "free_exponent": benchmark.free_exponent.as_json(),
+                "exponent_p_value": benchmark.exponent_p_value,
+                "records": list(benchmark.records),
+            },
             "records": [asdict(record) for record in separated],
         },
     )
@@ -112,20 +122,6 @@ def _measured(
         coulomb=result.parameter("c"),
         moment_of_inertia=inertia,
     )
-
-
-def _benchmark_json(benchmark: Benchmark) -> dict[str, Any]:
-    """The coefficient in the form of campaign.json, with the tests of the line."""
-    return benchmark.coefficient.as_json() | {
-        "inverse": benchmark.inverse,
-        "inverse_sd": benchmark.inverse_sd,
-        "chi2": benchmark.chi2,
-        "dof": benchmark.degrees_of_freedom,
-        "p_value": benchmark.p_value,
-        "free_exponent": benchmark.free_exponent.as_json(),
-        "exponent_p_value": benchmark.exponent_p_value,
-        "records": list(benchmark.records),
-    }
 
 
 def _separated(content: dict[str, Any]) -> SeparatedRecord:

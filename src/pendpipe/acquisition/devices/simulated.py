@@ -295,13 +295,6 @@ Link: TypeAlias = PseudoTerminal | LoopbackSocket
 """The device's end; every call returns at once, except `wait`."""
 
 
-def open_link(kind: str | None = None) -> Link:
-    """Return a ``"pty"`` or a ``"socket"``; by default a pty where the system has them."""
-    if kind is None:
-        kind = "pty" if hasattr(os, "openpty") else "socket"
-    return PseudoTerminal() if kind == "pty" else LoopbackSocket()
-
-
 class SimulatedDevice:
     """An instrument behind a pseudo-terminal or socket: a context manager.
 
@@ -360,7 +353,10 @@ class SimulatedDevice:
         self.failure: BaseException | None = None
         self._signal = signal
         self._rate_error = rate_error
-        self._link = open_link(link) if link is None or isinstance(link, str) else link
+        if link is None or isinstance(link, str):
+            usual = "pty" if hasattr(os, "openpty") else "socket"
+            link = PseudoTerminal() if (link or usual) == "pty" else LoopbackSocket()
+        self._link = link
         self._stream: Stream | None = None
         self._starts = self.dialect.starts  # of streams, that were seen
         self._ending = threading.Event()

@@ -9,8 +9,7 @@ binary words; one whose buffer overflows writes ``stop 01`` (02, 03) into its da
 import math
 from typing import ClassVar, Final
 
-from pendpipe.acquisition.drivers.base import Driver, Identity
-from pendpipe.acquisition.drivers.decoders import WordDecoder
+from pendpipe.acquisition.drivers.base import Driver, Identity, WordDecoder
 from pendpipe.errors import InputError
 
 _DI149_HZ: Final = 750_000
@@ -107,7 +106,9 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
         # The last reading, no mean: a mean would be a filter.
         self._send_line("filter * 0", needed=False)
         rate = _CDC_HZ / (divisor * decimation * further)
-        self._send_line(f"ps {_packet_code(2 * len(channels) * rate)}", needed=False)
+        # The largest packets of which about twenty come in a second, or 16 bytes.
+        wanted = 2 * len(channels) * rate / _PACKETS_PER_SECOND
+        self._send_line(f"ps {sum(size <= wanted for size in _PACKETS[1:])}", needed=False)
         return rate
 
     def _start_stream(self) -> None:
@@ -152,9 +153,3 @@ MODELS: Final[dict[str, dict[str, object]]] = {
 
 for _model, _figures in MODELS.items():
     type(_model.replace("-", ""), (DI2108,), {}, model=_model, **_figures)
-
-
-def _packet_code(bytes_per_second: float) -> int:
-    """Choose the largest packets of which about twenty come in a second, or 16 bytes."""
-    wanted = bytes_per_second / _PACKETS_PER_SECOND
-    return sum(size <= wanted for size in _PACKETS[1:])
