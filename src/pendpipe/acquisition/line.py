@@ -13,7 +13,6 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Final
 
 import serial
@@ -62,12 +61,7 @@ class Line(AbstractContextManager["Line"]):
         except (OSError, ValueError) as fault:
             raise cannot_open(port, fault) from None
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        fault: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_fault: object) -> None:
         self.close()
 
     @property

@@ -90,27 +90,26 @@ def _of_record(arguments: argparse.Namespace) -> None:
     metres needs none: ``"volts_per_radian": null``.
     """
     recording = read_plain(arguments.file)
-    content: dict[str, Any] = {"schema_version": 1, "volts_per_radian": None, "warnings": []}
+    constant, warnings = None, list[str]()
     given = arguments.volts_per_radian
     own = given if given is not None else recording.number("volts_per_radian", arguments.file)
     if recording.quantity != "volts":
-        content["from"] = f"recorded in {recording.unit}"
+        origin = f"recorded in {recording.unit}"
     elif own is not None:
-        content["from"] = "the table of records" if given is not None else "the recording"
-        content["volts_per_radian"] = {"value": own, "sd": 0.0, "unit": "V/rad"}
-        content["warnings"].append("the sensor constant is given without an uncertainty")
+        origin = "the table of records" if given is not None else "the recording"
+        constant = {"value": own, "sd": 0.0, "unit": "V/rad"}
+        warnings = ["the sensor constant is given without an uncertainty"]
     elif arguments.sensor is not None:
-        result = read_json(arguments.sensor)
-        content["from"] = "the caliper run"
-        content["volts_per_radian"] = result["volts_per_radian"]
-        content["warnings"] += _range_warnings(recording, result)
+        origin, result = "the caliper run", read_json(arguments.sensor)
+        constant, warnings = result["volts_per_radian"], _range_warnings(recording, result)
     else:
         raise InputError(
             arguments.file,
             "the readings are volts and no sensor constant is known",
             "give volts_per_radian in the table of records, or a calibration",
         )
-    write_json(arguments.out, content)
+    content = {"volts_per_radian": constant, "warnings": warnings, "from": origin}
+    write_json(arguments.out, {"schema_version": 1, **content})
 
 
 def _range_warnings(recording: Recording, result: dict[str, Any]) -> list[str]:
