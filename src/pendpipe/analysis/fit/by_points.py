@@ -7,7 +7,6 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from pendpipe.analysis.fit.least_squares import (
 from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.physics.decay import amplitude_and_gradient
 
@@ -514,7 +513,6 @@ _NEAR: Final = 0.2
 _PENDULUM: Final = 0.25
 """Amplitude in rad from which sin x lengthens the period by 0.4 %, more than frequencies wander:
 what swings so far is taken for a pendulum unless its half cycles speak against it."""
-_BLOCKS: Final = 8
 
 
 class Coefficient(NamedTuple):
@@ -522,9 +520,7 @@ class Coefficient(NamedTuple):
 
     value: float
     sd: float
-    """From parts of the decay left out in turn, and from what a drift of the frequency would do."""
-    scatter: float
-    """The part of `sd` that is no drift."""
+    """From the scatter of the times, and what a drift of the frequency would change."""
     removed: float
     """Part of chi^2 of the times that the whole of sin x removes."""
 
@@ -532,11 +528,12 @@ class Coefficient(NamedTuple):
     def agrees(self) -> bool:
         """Whether the times alone ask for sin x.
 
-        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and what else
-        there is moves the coefficient by less than 0.2.
+        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and the
+        coefficient is within 0.2 of 1, or as near as a drift would bring it.
         """
-        near = abs(self.value - 1.0) < _AGREES * self.scatter and self.value > _SEEN * self.scatter
-        return near or (self.removed > 0.5 and abs(self.value - 1.0) < _NEAR)
+        off = abs(self.value - 1.0)
+        near = off < _AGREES * self.sd and self.value > _SEEN * self.sd
+        return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
 
     @property
     def excludes_sine(self) -> bool:
@@ -658,13 +655,11 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     A half swing lasts [pi (1 + losses) + eta (K + K' - pi)]/omega: the times are linear in
     1/omega and in eta/omega. The level's error makes them alternate.
 
-    The coefficient's error does not trust that the times scatter independently: an eighth of the
-    decay is left out in turn, the phase beyond it free. And by what it changes if the frequency may
-    drift in time, it is uncertain too.
+    By what the coefficient changes if the frequency may drift in time, it is uncertain too.
     """
     part = clear(points, _LARGE)
     if len(part) < _FEWEST or points.unit != "rad":
-        return Coefficient(0.0, math.inf, math.inf, 0.0)
+        return Coefficient(0.0, math.inf, 0.0)
     start = _law_start(part, "sine")
     losses = (*start.rates.tolist(), 0.5)
     plain, phase = (
@@ -672,30 +667,21 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
         for torque in TORQUES
     )
     weight = 1.0 / part.time_sd_s
-    columns = np.stack([plain, phase - plain, np.ones_like(phase), part.side], axis=1)
-    columns *= weight[:, None]
     right = (part.time_s - part.time_s[0]) * weight
 
-    def eta(design: FloatArray, kept: IntArray | slice = slice(None)) -> float:
-        values = np.linalg.lstsq(design[kept], right[kept], rcond=1e-13)[0]
-        return float(values[1] / values[0])
+    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
+        """The second factor over the first, its error, and chi^2; the level's error alternates."""
+        design = np.stack([*columns, np.ones_like(plain), part.side], axis=1) * weight[:, None]
+        inverse = np.linalg.pinv(design, rcond=1e-13)
+        values = inverse @ right
+        rest = right - design @ values
+        chi2 = float(rest @ rest)
+        noise = math.sqrt(chi2 / max(len(part) - len(values), 1)) * np.linalg.norm(inverse[1])
+        return float(values[1] / values[0]), float(noise / values[0]), chi2
 
-    def square(design: FloatArray) -> float:
-        rest = right - design @ np.linalg.lstsq(design, right, rcond=1e-13)[0]
-        return float(rest @ rest)
-
-    value, count = eta(columns), len(part)
-    blocks = min(_BLOCKS, count // 3)
-    # Each part of the decay is left out in turn, the phase beyond it free.
-    freer, place, without = np.column_stack([columns, weight]), np.arange(count), []
-    for low, high in pairwise(np.linspace(0, count, blocks + 1).astype(int).tolist()):
-        freer[:, 4] = weight * (place >= high)
-        without.append(eta(freer, np.flatnonzero((place < low) | (place >= high))))
-    scatter = math.sqrt((blocks - 1) * float(np.var(without)))
-    freer[:, 4] = weight * np.cumsum(np.linspace(-1.0, 1.0, count) * np.diff(plain, prepend=0.0))
-    drift = eta(freer) - value
-    bent = columns[:, [0, 2, 3]]
-    linear = square(bent)
-    bent[:, 0] += columns[:, 1]
-    removed = 1.0 - square(bent) / linear if linear > 0.0 else 0.0
-    return Coefficient(value, math.hypot(scatter, drift), scatter, removed)
+    drift = np.cumsum(np.linspace(-1.0, 1.0, len(part)) * np.diff(plain, prepend=0.0))
+    value, error, _ = fitted(plain, phase - plain)
+    drifting, *_ = fitted(plain, phase - plain, drift)
+    (*_, linear), (*_, sine) = fitted(plain), fitted(phase)
+    removed = 1.0 - sine / linear if linear > 0.0 else 0.0
+    return Coefficient(value, math.hypot(error, drifting - value), removed)
