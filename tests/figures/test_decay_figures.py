@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pendpipe import physics
+from pendpipe.analysis.fit.by_points import fit_envelope
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import (
     TurningPoints,
@@ -28,7 +27,6 @@ from pendpipe.figures.decays import (
     draw_fig07,
     draw_fig08,
     draw_fit,
-    fit_exponential,
     local_quality,
     quality_with_band,
     read_decay,
@@ -179,18 +177,16 @@ def test_band_is_the_error_of_b_where_only_b_is_uncertain() -> None:
     assert half_width == pytest.approx(1.96 * quality * 1e-4 / 0.012, rel=1e-4)
 
 
-@given(st.floats(1e-3, 2.0), st.floats(1e-4, 0.5))
-def test_an_exponential_is_found_exactly(start: float, rate: float) -> None:
-    time = np.linspace(0.0, 3.0 / rate, 60)
-    y = start * np.exp(-rate * time)
-    assert fit_exponential(time, y, 0.01 * y) == pytest.approx((start, rate), rel=1e-8)
-
-
 def test_linear_damping_misfits_a_nonlinear_decay(example: Any) -> None:
+    """The key tells both misfits; the dashed curve is the best exponential."""
     found = read_decay(example.folder, entry_of(example, TYPICAL))
-    start, rate = fit_exponential(found.elapsed_s, found.amplitude_rad, found.points.angle_sd_rad)
-    linear = found.amplitude_rad - start * np.exp(-rate * found.elapsed_s)
-    assert np.std(linear) > 30 * np.std(found.residual_rad)
+    linear = fit_envelope(found.points, {"a": 0.0, "c": 0.0})
+    assert np.std(linear.residual) > 30 * np.std(found.residual_rad)
+    upper = draw_decay(found).axes[0]
+    time, drawn = upper.lines[2].get_data()
+    assert np.diff(np.log(drawn)) == pytest.approx(-linear.value[1] * np.diff(time))
+    texts = [text.get_text() for text in upper.get_legend().get_texts()]
+    assert any(text.startswith("linear damping (rms misfit") for text in texts)
 
 
 def test_decay_residuals_are_data_minus_fit(example: Any) -> None:

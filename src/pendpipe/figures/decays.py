@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
+from pendpipe.analysis.fit.by_points import fit_envelope
 from pendpipe.analysis.fit.result import FitResult, read_fit, seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
@@ -347,8 +348,8 @@ _MARGINS: Final = {"top": 0.872, "bottom": 0.105, "hspace": 0.09}
 def draw_decay(decay: Decay) -> Figure:
     """Draw the amplitudes of the turning points against time, and data minus fit."""
     time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
-    start, rate = fit_exponential(decay.elapsed_s, y, sd)
-    linear = start * np.exp(-rate * decay.elapsed_s)
+    linear = fit_envelope(decay.points, {"a": 0.0, "c": 0.0})
+    rate, start = linear.value[[1, 3]].tolist()
     elapsed = np.linspace(0.0, float(decay.elapsed_s[-1]), 300)
     unit = decay.points.unit
     factor, shown_unit = axis_unit(y, unit)
@@ -364,7 +365,7 @@ def draw_decay(decay: Decay) -> Figure:
         )
         for values, misfit, name, colour, dashes in (
             (decay.along(elapsed)[0], decay.residual_rad, decay.law_name, INK, "-"),
-            (start * np.exp(-rate * elapsed), y - linear, "linear damping", VERMILION, "--"),
+            (start * np.exp(-rate * elapsed), linear.residual, "linear damping", VERMILION, "--"),
         )
     ]
     turned = measured(
@@ -384,36 +385,6 @@ def draw_decay(decay: Decay) -> Figure:
         shares=(1.0, 0.5),
         margins=_MARGINS,
     )
-
-
-def fit_exponential(
-    time_s: FloatArray, amplitude_rad: FloatArray, sd_rad: FloatArray
-) -> tuple[float, float]:
-    """Weighted least squares of ``y = y0 exp(-beta t)``.
-
-    Parameters
-    ----------
-    time_s, amplitude_rad, sd_rad
-        Times, amplitudes and their errors; shape (n,).
-
-    Returns
-    -------
-    tuple of float
-        y0 in rad and beta in 1/s.
-    """
-    from scipy.optimize import curve_fit
-
-    seen = amplitude_rad > 0.1 * np.max(amplitude_rad)
-    slope, level = np.polyfit(time_s[seen], np.log(amplitude_rad[seen]), 1)
-    error = np.maximum(sd_rad, np.max(sd_rad) * 1e-6)
-    found, _ = curve_fit(
-        lambda t, start, rate: start * np.exp(-rate * t),
-        time_s,
-        amplitude_rad,
-        (np.exp(level), -slope),
-        error,
-    )
-    return float(found[0]), float(found[1])
 
 
 COLUMNS: Final = 1200
