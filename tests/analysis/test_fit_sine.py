@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -241,6 +242,9 @@ def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> No
     assert result.cuts[-1]["stop_s"] == pytest.approx(TIME[-1])
     loss = [result.value(name) for name in "abc"] @ np.array([0.3**2, 0.3, 1.0])
     assert loss == pytest.approx(0.02 * 0.3 + 1e-3, rel=0.01)
+    # A reading whose unit nobody knows has a size without one.
+    bare = fit_recording(replace(recorded(values, TIME, 1e-5), quantity="reading"))
+    assert re.search(r"below 0\.\d+ the decay is not that", bare.light_reason)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")

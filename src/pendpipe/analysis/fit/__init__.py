@@ -17,6 +17,7 @@ from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import NotAnalysableError, refuse_if
+from pendpipe.quantities import pretty_unit
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -163,6 +164,7 @@ def _larger_amplitudes(points: TurningPoints) -> Iterator[TurningPoints]:
 
 def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) -> FitResult:
     least = float(part.amplitude_rad[-1])
-    below = f"below {least:.2g} {points.unit} the decay is not that of the fitted law"
+    size = f"{least:.2g} {pretty_unit(points.unit)}".rstrip()
+    below = f"below {size} the decay is not that of the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
     return replace(_amber(result, f"{below}: that is left out"), cuts=(*result.cuts, cut))

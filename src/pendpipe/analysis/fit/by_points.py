@@ -19,6 +19,7 @@ from pendpipe.analysis.fit.least_squares import (
     covariance,
     intervals95,
     minimise,
+    moved,
 )
 from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.turning_points import TurningPoints
@@ -167,21 +168,17 @@ def _line(
     restoring: Restoring,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Angular frequency and first time for one share; their covariance; residuals in s."""
-    weight = 1.0 / points.time_sd_s**2
     reference = float(points.time_s[0])
-    time = points.time_s - reference
     stretched = phases(points, amplitude, losses, omega, restoring) / math.pi
     columns = np.stack([stretched, np.ones_like(stretched)], axis=1)
-    if held is not None:
-        first = float(np.average(time - stretched * math.pi / held, weights=weight))
-        residual = time - stretched * math.pi / held - first
-        inverse = np.diag([0.0, 1.0 / weight.sum()])
-        slope = math.pi / held
-    else:
-        normal = (columns * weight[:, None]).T @ columns
-        inverse = np.linalg.inv(normal)
-        slope, first = inverse @ ((columns * weight[:, None]).T @ time)
-        residual = time - columns @ np.array([slope, first])
+    weighted = columns / points.time_sd_s[:, None] ** 2
+    # The half period, unless it is held, and the first time.
+    free = slice(0 if held is None else 1, 2)
+    line, inverse = np.array([math.pi / omega, 0.0]), np.zeros((2, 2))
+    inverse[free, free] = np.linalg.inv(weighted[:, free].T @ columns[:, free])
+    line += inverse @ weighted.T @ (points.time_s - reference - columns @ line)
+    residual = points.time_s - reference - columns @ line
+    slope, first = line.tolist()
     jacobian = np.diag([-math.pi / slope**2, 1.0])
     return np.array([math.pi / slope, reference + first]), jacobian @ inverse @ jacobian, residual
 
@@ -227,10 +224,8 @@ def fit_envelope(
         Of chi^2, see `minimise`.
     """
     time = points.time_s - points.time_s[0]
-    side, weight = points.side, 1.0 / points.angle_sd_rad**2
     measured = points.amplitude_rad
-    shared = -points.level_coupling * side
-    prior = 1.0 / max(points.level_sd_rad, 1e-12 * float(np.max(np.abs(measured)))) ** 2
+    shared = -points.level_coupling * points.side
 
     def parts(value: FloatArray) -> tuple[FloatArray, FloatArray]:
         a, b, c, y0, level = value
@@ -242,20 +237,27 @@ def fit_envelope(
         residual, jacobian = parts(value)
         if not np.all(np.isfinite(jacobian)):
             return Quadratic(np.inf, np.zeros(5), np.eye(5))
-        weighted = jacobian * weight[:, None]
-        normal = weighted.T @ jacobian
-        gradient = weighted.T @ residual
-        normal[4, 4] += prior
-        gradient[4] -= prior * value[4]
-        return Quadratic(
-            float(residual @ (weight * residual)) + prior * value[4] ** 2, gradient, normal
-        )
+        return _quadratic(points, residual, jacobian, float(value[4]))
 
     start, held = _start(points, fixed or {})
     found = minimise(evaluate, start, BOUNDS, held=held, tolerance=tolerance)
     residual, _ = parts(found.value)
     model = measured - residual - shared * found.value[4]
     return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
+
+
+def _quadratic(
+    points: TurningPoints, residual: FloatArray, jacobian: FloatArray, level: float
+) -> Quadratic:
+    """chi^2 of the amplitudes and of the level's error, which has a prior."""
+    weighted = jacobian / points.angle_sd_rad[:, None] ** 2
+    normal, gradient = weighted.T @ jacobian, weighted.T @ residual
+    least = 1e-12 * float(np.max(np.abs(points.amplitude_rad)))
+    prior = 1.0 / max(points.level_sd_rad, least) ** 2
+    normal[4, 4] += prior
+    gradient[4] -= prior * level
+    chi2 = float(np.sum((residual / points.angle_sd_rad) ** 2)) + prior * level**2
+    return Quadratic(chi2, gradient, normal)
 
 
 def fit_energies(
@@ -284,7 +286,7 @@ def fit_energies(
     share
         The hysteretic share of b.
     """
-    measured, side = points.amplitude_rad, points.side
+    measured = points.amplitude_rad
     base = np.array([0.0, 0.0, 0.0, measured[0], 0.0])
     start, held = _with_held(points, fixed or {}, base)
     free = fit_period(points, measured, 0.0, 0.0, 0.0, share=share, restoring=restoring)
@@ -294,8 +296,7 @@ def fit_energies(
     y = np.clip(measured, 0.0, most)
     energy, slope = (-np.cos(y), np.sin(y)) if sine else (0.5 * y**2, y)
     slope = np.maximum(slope, 1e-3 * np.max(slope))
-    shared = -points.level_coupling * side
-    weight = 1.0 / points.angle_sd_rad**2
+    shared = -points.level_coupling * points.side
     for _ in range(2):
         both = y[1:] + y[:-1]
         k = np.sin(0.5 * y) if sine else 0.5 * y
@@ -312,18 +313,13 @@ def fit_energies(
         lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
         jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
         residual = (energy - energy[0]) / slope - jacobian @ (start - base)
-        normal = jacobian.T @ (weight[:, None] * jacobian)
-        gradient = jacobian.T @ (weight * residual)
-        prior = 1.0 / max(points.level_sd_rad, 1e-12 * float(np.max(np.abs(measured)))) ** 2
-        normal[4, 4] += prior
-        gradient[4] -= prior * start[4]
-        step = bounded_step(normal, gradient, BOUNDS.about(start), held)
+        quadratic = _quadratic(points, residual, jacobian, float(start[4]))
+        step = bounded_step(quadratic.normal, quadratic.gradient, BOUNDS.about(start), held)
         value = BOUNDS.clip(start + step)
         residual = residual - jacobian @ step
         model = measured - residual - shared * value[4]
         y = np.clip(model, 0.0, most)
-    chi2 = float(residual @ (weight * residual)) + prior * float(value[4]) ** 2
-    quadratic = Quadratic(chi2, gradient - normal @ step, normal)
+    quadratic = moved(quadratic, step)
     return EnvelopeFit(value, quadratic, held, model, residual, converged=True)
 
 

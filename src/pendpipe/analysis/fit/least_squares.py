@@ -197,7 +197,7 @@ def minimise(
             predict_remaining is not None
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
-            return Minimum(trial, _moved(now, step), True, value, promised)
+            return Minimum(trial, moved(now, step), True, value, promised)
         ways = (bounds.clip(value + part * step) for part in FRACTIONS)
         tried = ((way, evaluate(way)) for way in ways)
         enough = now.chi2 + 0.1 * tolerance
@@ -211,7 +211,7 @@ def minimise(
     return Minimum(value, now, False, value)
 
 
-def _moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
+def moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
     """The quadratic about a point a step further."""
     chi2 = quadratic.chi2 - 2.0 * quadratic.gradient @ step + step @ quadratic.normal @ step
     return Quadratic(float(chi2), quadratic.gradient - quadratic.normal @ step, quadratic.normal)
