@@ -21,7 +21,7 @@ from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_pe
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
-from pendpipe.analysis.two_modes import BEAT, two_modes
+from pendpipe.analysis.two_modes import BEAT, slow_amplitude, two_modes
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import with_error
@@ -569,14 +569,7 @@ def _refuse_without_fall(
     )
     if _falls(run, least):
         return
-    fall, sd, wavers = _fall_of_all(time, values, run.middle_s)
-    refuse_if(
-        wavers,
-        place,
-        f"the amplitude does not fall over {len(swing)} half cycles",
-        "a driven oscillation has no free decay",
-        NotAnalysableError,
-    )
+    fall, sd = _fall_of_all(time, values, run.middle_s)
     refuse_if(
         fall < 4.0 * sd,
         place,
@@ -587,36 +580,19 @@ def _refuse_without_fall(
     )
 
 
-def _fall_of_all(
-    time: FloatArray, values: FloatArray, middle: FloatArray
-) -> tuple[float, float, bool]:
-    """Fall of the amplitude along a run, from all its readings.
+def _fall_of_all(time: FloatArray, values: FloatArray, middle: FloatArray) -> tuple[float, float]:
+    """Fall of the amplitude along a run, from all its readings, with its standard deviation.
 
-    Returns
-    -------
-    fall, sd
-        Of a straight line through the amplitudes of `_BLOCKS` parts, over the first.
-    wavers
-        Whether these differ from the line by more than the readings' noise makes them.
+    That of a straight line through the amplitudes of `_BLOCKS` parts, over the first.
     """
     phase = np.pi * np.interp(time, middle, np.arange(len(middle)))
     parts = np.searchsorted(time, np.linspace(middle[0], middle[-1], _BLOCKS + 1))
-    found = []
-    for first, last in pairwise(parts.tolist()):
-        wave = phase[first:last]
-        design = np.stack([np.ones(len(wave)), np.sin(wave), np.cos(wave)], axis=1)
-        inverse = np.linalg.pinv(design)
-        value = inverse @ values[first:last]
-        rest = values[first:last] - design @ value
-        noise = np.sqrt(float(rest @ rest) / max(len(wave) - 3, 1))
-        found.append((float(np.hypot(*value[1:])), float(noise * np.linalg.norm(inverse[1]))))
-    amplitude, sd = np.array(found).T
-    design = np.stack([np.ones(_BLOCKS), np.linspace(0.0, 1.0, _BLOCKS)], axis=1) / sd[:, None]
-    inverse = np.linalg.pinv(design)
-    begun, slope = (inverse @ (amplitude / sd)).tolist()
-    off = amplitude / sd - design @ [begun, slope]
-    wavers = float(off @ off) > 40.0
-    return -slope / begun, float(np.linalg.norm(inverse[1])) / begun, wavers
+    amplitude = np.abs(slow_amplitude(phase, values, parts.tolist()))
+    if len(amplitude) < _BLOCKS:
+        return 0.0, 1.0
+    place = np.linspace(0.0, 1.0, _BLOCKS)
+    (slope, begun), matrix = np.polyfit(place, amplitude, 1, cov=True)
+    return float(-slope / begun), float(np.sqrt(matrix[0, 0]) / begun)
 
 
 def _stop(time: FloatArray, run: Run) -> float:

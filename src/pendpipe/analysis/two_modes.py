@@ -72,7 +72,8 @@ def two_modes(
     slow = math.pi / half_period_s
     time = time_s - time_s[0]
     width = max(2.0 * half_period_s, float(time[-1]) / _WINDOWS)
-    amplitude = _slow_amplitude(time, values, slow, width)
+    edges = np.searchsorted(time, np.arange(0.0, time[-1], width))
+    amplitude = slow_amplitude(slow * time, values, edges.tolist())
     if len(amplitude) < _FEWEST:
         return None
     found = _fitted(time, values, amplitude, width, slow, 2)
@@ -142,14 +143,11 @@ def _fitted(
     return rates, size, design, residual
 
 
-def _slow_amplitude(
-    time: FloatArray, values: FloatArray, angular_frequency: float, width: float
-) -> AnyArray:
-    """Complex amplitude in each window, about the window's own level."""
-    edges = np.searchsorted(time, np.arange(0.0, time[-1], width))
+def slow_amplitude(phase: FloatArray, values: FloatArray, edges: list[int]) -> AnyArray:
+    """Complex amplitude between neighbouring edges, each about its own level."""
     found = []
-    for first, last in pairwise(edges.tolist()):
-        wave = np.exp(-1j * angular_frequency * time[first:last])
+    for first, last in pairwise(edges):
+        wave = np.exp(-1j * phase[first:last])
         if last - first < 6:
             break
         design = np.stack([np.ones(len(wave)), wave.real, wave.imag], axis=1)
