@@ -497,8 +497,6 @@ def estimate_level(information: FloatArray, score: FloatArray, noise: float, sta
         return constant
     # Neighbours average out the even errors of opposite half cycles (harmonics, decay).
     pairs = _paired(information, score)
-    if _steady(*pairs, mean, noise):
-        return constant
     # The wander must be smooth against the scatter of neighbours, noise or not.
     narrow, used = _local_lines(*pairs, 4)
     freedom = max(len(pairs[0]) - used, 1.0)
@@ -517,21 +515,6 @@ def estimate_level(information: FloatArray, score: FloatArray, noise: float, sta
     line, used = _local_lines(information, score, chosen)
     local = np.full(len(score), noise * math.sqrt(used / total))
     return Level(start + line, local, wanders=True)
-
-
-def _steady(information: FloatArray, score: FloatArray, mean: float, noise: float) -> bool:
-    """Whether blocks of a dozen half cycles agree with one level, as chance would have it."""
-    blocks = len(score) // 6
-    if blocks < 4:
-        return False
-    used = slice(0, 6 * blocks)
-    weight = information[used].reshape(blocks, 6).sum(1)
-    own = score[used].reshape(blocks, 6).sum(1) / weight
-    chi2 = float(np.sum(weight * (own - mean) ** 2)) / noise**2
-    # Neighbouring blocks that depart together are a slow wander, small as it may be.
-    pull = np.sqrt(weight) * (own - mean) / noise
-    together = float(np.sum(pull[1:] * pull[:-1]))
-    return chi2 < blocks + 3.0 * math.sqrt(2.0 * blocks) and together < 3.0 * math.sqrt(blocks)
 
 
 def _paired(information: FloatArray, score: FloatArray) -> tuple[FloatArray, FloatArray]:
