@@ -279,7 +279,7 @@ def _emit_derivatives(
 def rest(work: Work, out: Matrix, y: float, first: int) -> None:
     """Write the samples after the stop: the last turning point, exactly."""
     directions = work.rates
-    _fill(out[0, first:], work.sign * angle_of(work.shape, y) + work.offset)
+    out[0, first:] = work.sign * angle_of(work.shape, y) + work.offset
     if work.sensitivities == 0:
         return
     side = work.sign / curve(work.shape, y)
@@ -287,17 +287,10 @@ def rest(work: Work, out: Matrix, y: float, first: int) -> None:
     for c in range(directions):
         by_rate = side * work.amplitude[c + 1]
         by_omega -= work.rate[c] / work.omega * by_rate
-        _fill(out[c + 1, first:], by_rate)
-    _fill(out[directions + 1, first:], by_omega)
-    _fill(out[directions + 2, first:], side * work.first_sign * work.amplitude[0])
-    _fill(out[directions + 3, first:], 0.0)
-
-
-@kernel
-def _fill(column: FloatArray, value: float) -> None:
-    """Write one value to a part of a column."""
-    for i in range(column.size):
-        column[i] = value
+        out[c + 1, first:] = by_rate
+    out[directions + 1, first:] = by_omega
+    out[directions + 2, first:] = side * work.first_sign * work.amplitude[0]
+    out[directions + 3, first:] = 0.0
 
 
 LOSS_TOLERANCE = 5e-9

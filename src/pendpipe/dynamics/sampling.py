@@ -68,13 +68,7 @@ class Sampled:
 
     def at_nodes(self, values: FloatArray) -> FloatArray:
         """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""
-        index, values = self._first + np.arange(_POINTS)[:, None], _at_finer(values)
-        flat = values.reshape(-1, values.shape[-2] * values.shape[-1])
-        found = np.empty((len(flat), len(self._first)))
-        # A row at a time stays in the processor's cache.
-        for row, out in zip(flat, found, strict=True):
-            np.einsum("pn,pn->n", row.take(index, mode="clip"), self._weights, out=out)
-        return found.reshape(*values.shape[:-2], -1)
+        return interpolated(_at_finer(values), self._first, self._weights)
 
     def change(self, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
         """Change of the angle, rad, from changes of ln r and of t at fixed phase."""
@@ -97,14 +91,10 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     first = (half * (order + 1) + left).astype(np.intp)
     weights = lagrange(nodes.reshape(-1), first, time_s)
     omega = motion.angular_frequency
-    psi = replace(motion.clock, order=order).psi
-    slow = (psi - omega * (nodes - nodes[0, 0])).reshape(-1)
-    logs = _at_finer(motion.log_amplitude).reshape(-1)
-    phase = omega * (time_s - nodes[0, 0])
-    log_amplitude = np.zeros_like(phase)
-    for point in range(_POINTS):
-        phase = phase + weights[point] * slow[first + point]
-        log_amplitude = log_amplitude + weights[point] * logs[first + point]
+    slow = replace(motion.clock, order=order).psi - omega * (nodes - nodes[0, 0])
+    finer = np.stack([slow, _at_finer(motion.log_amplitude)])
+    late, log_amplitude = interpolated(finer, first, weights)
+    phase = omega * (time_s - nodes[0, 0]) + late
     return Sampled(
         motion, time_s, phase, np.exp(log_amplitude), np.cos(phase), np.sin(phase), first, weights
     )
@@ -138,6 +128,17 @@ def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) ->
         first,
         joined("_weights"),
     )
+
+
+def interpolated(values: FloatArray, first: IntArray, weights: FloatArray) -> FloatArray:
+    """Interpolate what is known at the nodes, shape (..., count, order + 1), by six of them."""
+    index = first + np.arange(_POINTS)[:, None]
+    flat = values.reshape(-1, values.shape[-2] * values.shape[-1])
+    found = np.empty((len(flat), len(first)))
+    # A row at a time stays in the processor's cache.
+    for row, out in zip(flat, found, strict=True):
+        np.einsum("pn,pn->n", row.take(index, mode="clip"), weights, out=out)
+    return found.reshape(*values.shape[:-2], -1)
 
 
 def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
