@@ -144,13 +144,13 @@ def test_the_rest_level_changes_as_the_last_turning_point() -> None:
     angle, jacobian = sample_with_jacobian(model, release, time)
     points, _, angles = turning_points_with_jacobian(model, release, 99)
     assert points.stopped
-    assert angle[-1] == angle[-2] == pytest.approx(points.rest_rad, abs=1e-14)
+    assert angle[-1] == angle[-2] == pytest.approx(points.angle_rad[-1], abs=1e-14)
     np.testing.assert_allclose(jacobian[-1], angles[-1], rtol=1e-9, atol=1e-12)
     np.testing.assert_array_equal(jacobian[-1], jacobian[-2])
     for column, name in enumerate(JACOBIAN_COLUMNS[:4]):
         value = getattr(model, name)
         up, down = (
-            turning_points(replace(model, **{name: value * (1 + s)}), release).rest_rad
+            turning_points(replace(model, **{name: value * (1 + s)}), release).angle_rad[-1]
             for s in (1e-5, -1e-5)
         )
         assert jacobian[-1, column] == pytest.approx((up - down) / (2e-5 * value), rel=1e-6)

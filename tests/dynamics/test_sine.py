@@ -89,7 +89,7 @@ def test_to_the_stop_from_any_amplitude() -> None:
         points = turning_points(model, Release(0.0, y))
         assert points.stopped
         assert points.time_s.size == times.size
-        assert abs(points.rest_rad) < model.stop_rad
+        assert abs(points.angle_rad[-1]) < model.stop_rad
         np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-11)
         np.testing.assert_allclose(points.time_s, times, rtol=1e-9)
 

@@ -228,14 +228,11 @@ class TurningPoints:
         Where: signed, offset included.
     stopped
         Whether friction holds the pendulum at the last of them.
-    rest_rad
-        Where it then stays, offset included; ``nan`` if it has not stopped.
     """
 
     time_s: FloatArray
     angle_rad: FloatArray
     stopped: bool
-    rest_rad: float
 
 
 def turning_points(
@@ -276,13 +273,8 @@ def turning_points(
         turning = np.empty((2, room if count is None else min(count, room)))
         found, stopped = _run(model, release, turning, until_s=end_s)
         if stopped or found == count or found < room:
-            return _turning_points(turning[:, :found], stopped)
+            return TurningPoints(turning[0, :found], turning[1, :found], stopped)
         room *= 4
-
-
-def _turning_points(turning: FloatArray, stopped: bool) -> TurningPoints:
-    rest_rad = float(turning[1, -1]) if stopped else math.nan
-    return TurningPoints(turning[0], turning[1], stopped, rest_rad)
 
 
 def turning_points_with_jacobian(
@@ -302,7 +294,7 @@ def turning_points_with_jacobian(
     turning = np.empty((2 + 2 * _COLUMNS, count))
     found, stopped = _run(model, release, turning, derivatives=True)
     turning = turning[:, :found]
-    points = _turning_points(turning, stopped)
+    points = TurningPoints(turning[0], turning[1], stopped)
     return points, turning[2 : 2 + _COLUMNS].T, turning[2 + _COLUMNS :].T
 
 
