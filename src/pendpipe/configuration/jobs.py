@@ -60,10 +60,11 @@ def acquisition(campaign: Campaign, record: str) -> str:
     """Digest all that a record's acquisition depends on, a file's content included."""
     row = campaign.record(record)
     settings = campaign.configuration
-    content: dict[str, Any] = {"row": asdict(row)}
-    if row.file is not None:
-        home = Path(settings.results, record)
-        content["source_sha256"] = source_sha256(home, "acquire", row.file)
+    home = Path(settings.results, record)
+    content: dict[str, Any] = {
+        "row": asdict(row),
+        "source_sha256": row.file and source_sha256(home, "acquire", row.file),
+    }
     if row.source == "simulated":
         assert settings.simulated is not None
         truth = settings.simulated.model_dump()
@@ -81,18 +82,14 @@ def acquisition(campaign: Campaign, record: str) -> str:
 
 def caliper(campaign: Campaign) -> str:
     """Digest all that the sensor's calibration depends on."""
-    settings = campaign.configuration
-    content: dict[str, Any] = {
+    settings, source = campaign.configuration, caliper_source(campaign)
+    home, truth = Path(settings.results, "calibration"), settings.simulated
+    content = {
         "run": settings.calibration and settings.calibration.model_dump(),
         "seed": settings.seed,
+        "source_sha256": source and source_sha256(home, "caliper", source),
+        "instrument": truth and truth.model_dump(include={"sensor", "device"}),
     }
-    source = caliper_source(campaign)
-    if source is not None:
-        home = Path(settings.results, "calibration")
-        content["source_sha256"] = source_sha256(home, "caliper", source)
-    if settings.simulated is not None:
-        content["sensor"] = settings.simulated.sensor.model_dump()
-        content["device"] = settings.simulated.device.model_dump()
     return digest(content)
 
 

@@ -18,8 +18,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.choose import choose
-from pendpipe.formats.measured import TimeBase, readings, refuse_text, time_base
+from pendpipe.formats.columns import TimeBase, choose, readings, refuse_text, time_base
 from pendpipe.formats.samples import (
     Gap,
     clipped_samples,

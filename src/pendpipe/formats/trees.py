@@ -98,26 +98,21 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
     """Walk through dictionaries, lists and structures; give every real array as columns."""
     if depth > 12 or tree is None:
         return
-    if isinstance(tree, dict):
+    tree = _array_of_list(tree) if isinstance(tree, list) else tree
+    label = tree.get("label") if isinstance(tree, dict) and "values" in tree else None
+    if isinstance(label, str) and label.strip():
         # Simulink's "structure with time" names a signal in its label.
-        label = tree.get("label")
-        if isinstance(label, str) and label.strip() and "values" in tree:
-            path, tree = label.strip(), {"values": tree["values"]}
-        for name, value in tree.items():
-            yield from _numbers(value, f"{path}.{name}" if path else str(name), depth + 1)
-        return
-    if isinstance(tree, list):
-        tree = _array_of_list(tree)
+        path, tree = label.strip(), {"values": tree["values"]}
     array = np.asarray(tree)
-    if array.dtype.names:  # a table of records
-        yield from _numbers({name: array[name] for name in array.dtype.names}, path, depth + 1)
-        return
-    if array.dtype == object:
-        for number, entry in enumerate(array.reshape(-1)[:64], start=1):
-            name = path if array.size == 1 else f"{path}({number})"
-            yield from _numbers(entry, name, depth + 1)
-        return
-    if array.dtype.kind not in "fiub" or array.ndim > 2 or not array.size:
+    records = {name: array[name] for name in array.dtype.names or ()}
+    named = tree if isinstance(tree, dict) else records
+    inside = {f"{path}.{name}" if path else str(name): value for name, value in named.items()}
+    if array.dtype == object and not isinstance(tree, dict):
+        entries = enumerate(array.reshape(-1)[:64], start=1)
+        inside = {path if array.size == 1 else f"{path}({n})": entry for n, entry in entries}
+    for name, value in inside.items():
+        yield from _numbers(value, name, depth + 1)
+    if inside or array.dtype.kind not in "fiub" or array.ndim > 2 or not array.size:
         return
     # Simulink's "structure with time" keeps the readings in NAME.signals.values.
     path = path.removesuffix(".signals.values").removesuffix(".values").removesuffix(".Data")

@@ -173,10 +173,15 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         closed=min(opened + math.ceil(length_s), _LATEST) if opened else 0,
         events=_events(recording, rows, pauses),
     )
-    lost = [key for key in ("volts_per_radian",) if key in recording.metadata]
-    notes += [f"a .WDH has no place for {key} ({recording.metadata[key]})" for key in lost]
-    if abs(begin_s) > 0.5 * interval_s:
-        notes.append(f"times in the .WDH count from its first sample ({begin_s:.6g} s here)")
+    constant = recording.metadata.get("volts_per_radian")
+    for lost, note in (
+        (constant, f"a .WDH has no place for volts_per_radian ({constant})"),
+        (
+            abs(begin_s) > 0.5 * interval_s,
+            f"times in the .WDH count from its first sample ({begin_s:.6g} s here)",
+        ),
+    ):
+        notes += [note] * bool(lost)
     return content, tuple(notes)
 
 

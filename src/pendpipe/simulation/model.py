@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import as_input_error, nearest, read_text
-from pendpipe.configuration.models import NotNegative, Positive, Section
+from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError
 from pendpipe.dynamics.sampling import sample_pieces
@@ -58,12 +58,10 @@ class PendulumModel(Section):
         )
 
 
-class SensorModel(Section):
-    """The angle sensor; without one the recording is in radians."""
+class SensorModel(Sensor):
+    """The angle sensor, of either sign; without one the recording is in radians."""
 
     volts_per_radian: float = Field(3.85, description="its constant")
-    offset_volts: float = Field(0.0, description="its reading at rest")
-    noise_volts: NotNegative = Field(0.0, description="rms of its white noise")
 
 
 class ConverterModel(Section):
