@@ -36,7 +36,7 @@ from pendpipe.acquisition.decode import decode_recording, find_clock_losses
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.raw import read_raw
-from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read

@@ -21,7 +21,7 @@ import numpy as np
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.raw import read_raw
-from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.recording import GOOD, read_plain

@@ -17,7 +17,7 @@ import numpy as np
 
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
-from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.formats import ReadOptions, text, windaq
 
 SAMPLES = 1 << 19

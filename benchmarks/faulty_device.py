@@ -23,7 +23,7 @@ from pendpipe.acquisition.devices.simulated import (
     Signal,
     SimulatedDevice,
 )
-from pendpipe.acquisition.simulated import record_from
+from pendpipe.acquisition.recorder import record_from
 from pendpipe.recording import Recording
 
 FAULTS: Final[Mapping[str, str]] = {

@@ -14,7 +14,7 @@ from pendpipe.provenance import code_version
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / ".evidence"
 READERS = (
-    "pendpipe.acquisition.simulated",
+    "pendpipe.acquisition.recorder",
     "pendpipe.formats.writing",
     "src/pendpipe/formats/*.py",
     "benchmarks/fuzz*.py",

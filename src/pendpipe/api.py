@@ -134,8 +134,7 @@ def acquire(
     >>> acquire("simulated:di2108", duration_s=20, clock_scale=100)
     Recording(1200 samples of volts, 0 to 19.9833 s)
     """
-    from pendpipe.acquisition.recorder import record
-    from pendpipe.acquisition.simulated import acquire_simulated, example_signal
+    from pendpipe.acquisition.recorder import acquire_simulated, example_signal, record
 
     request = {"rate_hz": rate_hz, "duration_s": duration_s, "channels": (channel,), **options}
     where, _, kind = port.partition(":")

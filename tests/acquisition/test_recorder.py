@@ -16,8 +16,7 @@ import pytest
 from pendpipe.acquisition.decode import decode_recording, find_clock_losses
 from pendpipe.acquisition.drivers.base import Scans
 from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
-from pendpipe.acquisition.recorder import ProgressLine
-from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.recorder import ProgressLine, acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError

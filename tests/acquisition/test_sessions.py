@@ -18,8 +18,7 @@ from pendpipe.acquisition.drivers.letters import DI154RS, DI245
 from pendpipe.acquisition.drivers.text import DI2108
 from pendpipe.acquisition.line import Line
 from pendpipe.acquisition.raw import read_raw
-from pendpipe.acquisition.recorder import record
-from pendpipe.acquisition.simulated import acquire_simulated
+from pendpipe.acquisition.recorder import acquire_simulated, record
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording

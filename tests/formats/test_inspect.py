@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from pendpipe.cli import main
 from pendpipe.formats import inspect, read
-from pendpipe.formats.samples import clipped_samples, find_gaps, is_uniform, resolution, sample_rate
+from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, resolution, sample_rate
 from pendpipe.recording import read_plain
 
 from .decays import WindaqFile, swing

@@ -1,4 +1,7 @@
-"""The recorder: bytes off the wire are kept first, over breaks of the line, and decoded later."""
+"""The recorder: bytes off the wire are kept first, over breaks of the line, and decoded later.
+
+A simulated device is recorded from as a real one is, over a line of its own (`acquire_simulated`).
+"""
 
 import math
 import time
@@ -9,17 +12,18 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import IO, Final, TextIO, cast
+from typing import IO, Any, Final, TextIO, cast
 
 import numpy as np
 
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
 from pendpipe.acquisition.drivers import find_driver, identify
 from pendpipe.acquisition.drivers.base import Driver, Identity, Scans, Setup
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
-from pendpipe.arrays import AnyArray
+from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
@@ -419,3 +423,102 @@ def _cannot_write(place: str | Path, fault: OSError) -> InputError:
         "make room, or give another file; what was kept till then is opened with "
         "pendpipe acquire --recover",
     )
+
+
+_LINE_BYTES_PER_S: Final = 2e6
+"""What a pseudo-terminal is asked to carry at most; it was seen to carry twice as much."""
+_SHORTEST_S: Final = 0.1
+"""Seconds of wall-clock time that a recording takes at least."""
+
+
+def acquire_simulated(
+    device_kind: str,
+    signal: Signal | Mapping[int, Signal],
+    *,
+    rate_hz: float,
+    duration_s: float,
+    clock_scale: float = 1000.0,
+    channels: Sequence[int] = (1,),
+    link: str | None = None,
+    rate_error: float = 0.0,
+    **options: Any,
+) -> Recording:
+    """Start a simulated device on a line of its own and record from it.
+
+    Parameters
+    ----------
+    device_kind
+        A key of `devices.DEVICES`: ``"di154"`` (12 bits), ``"di2108"`` (16 bits), ...
+    signal
+        Times in s since the start to volts at the terminals, noise included; or a mapping
+        from channel to that. See `SimulatedDevice`.
+    clock_scale
+        How many seconds of device and recorder pass in one of wall-clock time. It is lowered to
+        what the line can carry (2 MB/s), and so that a recording takes 0.1 s at least: in less
+        the rate can't be measured.
+    link
+        ``"pty"``, ``"socket"``, or ``None`` for what the system has.
+    rate_error
+        The device's clock is fast by this fraction.
+    rate_hz, duration_s, channels, **options
+        See `recorder.record`.
+
+    Returns
+    -------
+    Recording
+        In volts.
+
+    Raises
+    ------
+    InputError
+        As `recorder.record`; and whatever `signal` raises.
+    """
+    request = AcquisitionRequest(tuple(channels), rate_hz, duration_s)
+    fastest = min(
+        _LINE_BYTES_PER_S / (2 * len(request.channels or (1,)) * rate_hz),
+        duration_s / _SHORTEST_S,
+    )
+    scale = min(clock_scale, max(1.0, fastest))
+    with SimulatedDevice(
+        device_kind, signal, clock_scale=scale, link=link, rate_error=rate_error
+    ) as device:
+        return record_from(
+            device, rate_hz=rate_hz, duration_s=duration_s, channels=channels, **options
+        )
+
+
+def record_from(device: SimulatedDevice, **options: Any) -> Recording:
+    """Record from a simulated device that is switched on.
+
+    Raises
+    ------
+    InputError
+        As `recorder.record`; and whatever the device's signal raises.
+    """
+    source = f"simulated {device.dialect.model}"
+    try:
+        return record(device.port, device.kind, clock=device.clock, **{"source": source, **options})
+    except InputError:
+        # A device whose signal has failed is silent; the failure is the better answer.
+        if device.failure is not None:
+            raise device.failure from None
+        raise
+
+
+def example_signal(seed: int = 0, volts_per_radian: float = 3.85) -> Signal:
+    """A pendulum where none is given: viscous decay with a little noise.
+
+    theta = 0.3 rad exp(-beta t) cos(2 pi f t), f = 0.5 Hz, Q = pi f/beta = 150, read by a
+    sensor with 1 mV of white noise.
+    """
+    random = np.random.default_rng(seed)
+    frequency_hz, quality_factor, amplitude_rad, noise_volts = 0.5, 150.0, 0.3, 1e-3
+    beta = math.pi * frequency_hz / quality_factor
+
+    def signal(time_s: FloatArray) -> FloatArray:
+        angle_rad = amplitude_rad * np.exp(-beta * time_s)
+        angle_rad *= np.cos(2.0 * math.pi * frequency_hz * time_s)
+        volts = volts_per_radian * angle_rad
+        return np.asarray(volts + random.normal(0.0, noise_volts, len(time_s)))
+
+    return signal

@@ -220,7 +220,7 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         "reconnect_s": arguments.reconnect,
     }
     if arguments.device:
-        from pendpipe.acquisition.simulated import acquire_simulated, example_signal
+        from pendpipe.acquisition.recorder import acquire_simulated, example_signal
 
         where, _, kind = arguments.device.partition(":")
         refuse_if(
@@ -255,7 +255,7 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
 def _serve(arguments: argparse.Namespace) -> None:
     """Be a simulated instrument for other programs until the end."""
     from pendpipe.acquisition.devices.simulated import SimulatedDevice
-    from pendpipe.acquisition.simulated import example_signal
+    from pendpipe.acquisition.recorder import example_signal
 
     signal_volts = example_signal(arguments.seed, arguments.volts_per_radian or 3.85)
     if arguments.signal:

@@ -13,14 +13,16 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.samples import (
+from pendpipe.formats.table import (
+    Column,
+    ReadOptions,
+    Table,
     derivative_slope,
     follows_sine,
     periods,
     resolution,
     swing_of,
 )
-from pendpipe.formats.table import Column, ReadOptions, Table
 from pendpipe.formats.words import Role, Unit, plain, role_of, unit_of
 from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
 

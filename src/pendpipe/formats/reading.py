@@ -19,21 +19,19 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.columns import TimeBase, choose, readings, refuse_text, time_base
-from pendpipe.formats.samples import (
-    Gap,
-    clipped_samples,
-    find_gaps,
-    is_uniform,
-    resolution,
-    sample_rate,
-)
 from pendpipe.formats.table import (
     Column,
+    Gap,
     Marker,
     NotThisFormatError,
     ReadOptions,
     Table,
+    clipped_samples,
+    find_gaps,
+    is_uniform,
     most_unpacked,
+    resolution,
+    sample_rate,
 )
 from pendpipe.formats.words import role_of, split_header, unit_of
 from pendpipe.recording import (

@@ -1,14 +1,289 @@
-"""What every reader of a file returns: named columns of numbers, before any is chosen."""
+"""What every reader of a file returns: named columns of numbers, before any is chosen.
+
+The numbers of a column show by themselves whether they swing, and how far; how evenly they were
+taken, in what steps, and whether the converter's end was reached.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.special import ellipk
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
-from pendpipe.formats.samples import Swing, swing_of
 from pendpipe.formats.words import Role
+
+_ABSURD: Final = 1e100
+"""Beyond this nothing was measured; squares of it are no numbers."""
+_LOOKED_AT: Final = 1 << 15
+"""Samples of a long column that are transformed: means of neighbours."""
+_CLEAR: Final = 0.25
+"""Share of the variance that lies near one frequency; of white noise it is under 0.05."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How a column moves.
+
+    Parameters
+    ----------
+    amplitude
+        Root mean square of its strongest oscillation, in its own unit.
+    clarity
+        Share of the variance about the trend that lies within 15 % of one frequency.
+    samples_per_cycle
+        Samples in a cycle of that frequency; 0 where nothing oscillates.
+    graded
+        Share of the cycles whose size lies between a tenth and 85 % of the largest:
+        large for a free decay, 0 for a drive that is switched on and off.
+    """
+
+    amplitude: float = 0.0
+    clarity: float = 0.0
+    samples_per_cycle: float = 0.0
+    graded: float = 0.0
+
+    @property
+    def clear(self) -> bool:
+        """Whether there is an oscillation at all."""
+        return self.clarity > _CLEAR
+
+
+def swing_of(values: FloatArray) -> Swing:
+    """Find the strongest oscillation about the trend, from two cycles on."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 8 or np.abs(finite).max() > _ABSURD:
+        return Swing()
+    block = -(-len(finite) // _LOOKED_AT)
+    some = finite[: len(finite) // block * block].reshape(-1, block).mean(axis=1)
+    ramp, rest = np.linspace(-1.0, 1.0, len(some)), some - some.mean()
+    rest -= float(rest @ ramp) / float(ramp @ ramp) * ramp
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    power[:2] = 0.0
+    whole = len(some) * float(rest @ rest) / 2.0
+    if not whole > 0.0 or not power.any():
+        return Swing()
+    # The decay broadens the line, so it is looked for in bands, not in single bins.
+    peak = int(np.argmax(power))
+    low, high = int(0.85 * peak), int(1.15 * peak) + 2
+    share = min(1.0, float(power[low:high].sum()) / whole)
+    # Of a few samples a band is a good part of all there is.
+    chance = min(1.0, 3.0 * (high - low) / len(power))
+    return Swing(
+        amplitude=float(np.sqrt(share * np.mean(rest**2))),
+        clarity=share if share > chance else 0.0,
+        samples_per_cycle=block * len(some) / peak,
+        graded=_graded(rest, len(some) / peak),
+    )
+
+
+def _graded(rest: FloatArray, cycle: float) -> float:
+    """Share of the cycles of middling size."""
+    width = max(2, round(cycle))
+    size = np.ptp(rest[: len(rest) // width * width].reshape(-1, width), axis=1)
+    large = float(size.max(initial=0.0))
+    return float(np.mean((size > 0.1 * large) & (size < 0.85 * large))) if large else 0.0
+
+
+def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the periods and the amplitudes of the larger cycles.
+
+    The level is crossed when the reading has gone from a tenth of the largest amplitude on
+    one side to as much on the other, so noise near the level is no crossing.
+
+    Returns
+    -------
+    periods, amplitudes
+        From each crossing to the next but one, shape (n,); empty where there are few.
+    """
+    good, none = np.isfinite(values) & np.isfinite(time), np.empty(0)
+    time, values = time[good], values[good]
+    if len(values) < 8 or np.abs(values).max() > _ABSURD:
+        return none, none
+    low, middle, high = np.percentile(values, (0.5, 50, 99.5))
+    rest = values - middle
+    outside = np.flatnonzero(np.abs(rest) > 0.1 * max(high - middle, middle - low))
+    turns = np.flatnonzero(np.diff(np.signbit(rest[outside]).astype(np.int8)))
+    if not high > low or len(outside) < 8 or len(turns) < 5:
+        return none, none
+    before, after = outside[turns], outside[turns + 1]
+    part = rest[before] / (rest[before] - rest[after])
+    crossings = time[before] + part * (time[after] - time[before])
+    edges = zip(before[:-2], before[2:], strict=True)
+    largest = np.array([np.ptp(rest[a : b + 1]) for a, b in edges])
+    lasted = crossings[2:] - crossings[:-2]
+    usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
+    return lasted[usual], 0.5 * largest[usual]
+
+
+def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float | None:
+    """How nearly the period grows with the amplitude as a pendulum's does.
+
+    A pendulum's period is proportional to the complete elliptic integral K of the parameter
+    sin(A/2)^2; a reading is so many `radians` to its unit. The answer is the slope of the logarithm
+    of the measured period against that of the predicted: 1 if it is so, 0 if the period is
+    constant.
+
+    Returns
+    -------
+    slope
+        ``None`` where noise, or too small an amplitude, leaves it open.
+    """
+    lasted, size = periods(time, values)
+    keep = size > 0.3 * size.max(initial=0.0)
+    lasted, angle = lasted[keep], radians * size[keep]
+    expected, found = np.log(ellipk(np.sin(0.5 * angle) ** 2)), np.log(lasted)
+    for _ in range(2):
+        if len(found) < 8 or angle.max() > 3.0:
+            return None
+        across = expected - expected.mean()
+        spread = float(across @ across) or np.nan
+        slope = float(across @ found) / spread
+        rest = found - found.mean() - slope * across
+        sd = float(np.sqrt(rest @ rest / (len(rest) - 2) / spread))
+        near = np.abs(rest) <= 4.0 * np.median(np.abs(rest))
+        expected, found = expected[near], found[near]
+    return slope if sd < 0.15 else None
+
+
+def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) -> float | None:
+    """Ratio of `other` to the time derivative of `values`; ``None`` if it is not that.
+
+    Where 1, both are in the same unit; where pi/180, the one is in degrees and the
+    other in radians a second.
+    """
+    good = np.isfinite(time) & np.isfinite(values) & np.isfinite(other)
+    time, values, other = time[good], values[good], other[good]
+    if len(time) < 16 or np.any(np.diff(time) <= 0) or np.abs(values).max() > _ABSURD:
+        return None
+    rate = np.gradient(values, time)
+    # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.
+    kernel = np.array([0.25, 0.5, 0.25])
+    rate, other = np.convolve(rate, kernel, "valid"), np.convolve(other, kernel, "valid")
+    rate, other = rate - rate.mean(), other - other.mean()
+    product, size = float(rate @ other), float(rate @ rate)
+    alike = abs(product) > 0.9 * np.sqrt(size * float(other @ other)) > 0.0
+    return product / size if alike else None
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Time that is missing after a sample."""
+
+    after_sample: int
+    missing_s: float
+
+
+def is_uniform(time_s: FloatArray) -> bool:
+    """Say whether the samples are evenly spaced, gaps apart.
+
+    99 % of the intervals lie within 15 % of their median (a clock printed with too few
+    digits alternates by 10 %).
+    """
+    steps = np.diff(time_s)
+    middle = float(np.median(steps)) if len(steps) > 1 else 0.0
+    if not middle > 0:
+        return len(steps) < 2
+    return float(np.mean(np.abs(steps - middle) <= 0.15 * middle)) >= 0.99 or (
+        # A handful of gaps in a short recording is no unevenness.
+        bool(np.all(np.abs(steps / middle - np.rint(steps / middle)) < 0.1))
+        and float(np.mean(steps < 1.5 * middle)) > 0.8
+    )
+
+
+def sample_rate(time_s: FloatArray) -> float:
+    """Samples a second, gaps left out; of uneven samples the reciprocal median interval."""
+    steps = np.diff(time_s)
+    middle = float(np.median(steps)) if len(steps) else 0.0
+    usual = steps[np.abs(steps - middle) <= 0.5 * middle] if is_uniform(time_s) else middle
+    return 1.0 / float(np.mean(usual)) if middle > 0 else float("nan")
+
+
+def find_gaps(time_s: FloatArray) -> list[Gap]:
+    """Find the gaps.
+
+    In evenly spaced samples an interval beyond 1.5 times the median; where a row stands
+    for a count of an encoder, silence is natural at every turning point and grows near
+    rest: there one beyond 50 times the 99th percentile.
+    """
+    steps = np.diff(time_s)
+    if len(steps) < 2:
+        return []
+    middle = float(np.median(steps))
+    limit = 1.5 * middle if is_uniform(time_s) else 50.0 * float(np.percentile(steps, 99))
+    return [Gap(int(at), float(steps[at] - middle)) for at in np.flatnonzero(steps > limit)]
+
+
+def resolution(values: FloatArray) -> float | None:
+    """Find the step between readings: what all differences of neighbours are multiples of.
+
+    ``None`` where there is none (a computed or a smoothed reading). Neighbours, and not
+    all distinct values, since an encoder that has lost a count once has two ladders of
+    values with one step.
+    """
+    finite = values[np.isfinite(values)]
+    if len(finite) < 2 or np.abs(finite).max() > 1e100:
+        return None
+    jumps = np.abs(np.diff(finite))
+    # Values that arithmetic has left a rounding error apart are one value.
+    jumps = np.sort(jumps[jumps > 1e-9 * float(np.ptp(finite))])
+    if not len(jumps):
+        return None
+    smallest = float(jumps[min(2, len(jumps) - 1)])
+    near = float(jumps[jumps <= 1.35 * smallest].mean())
+    return _refined(jumps, near) or _refined(jumps, smallest)
+
+
+def _refined(jumps: FloatArray, step: float) -> float | None:
+    """Fit ``jump = k step`` and keep the step if nearly all jumps lie on it.
+
+    The reach of the fit grows, since an error of the step adds up over many steps.
+    """
+    reach, full = 2.0 * step, float(jumps[-1])
+    while True:
+        reach *= 2.0
+        near = jumps[jumps <= reach]
+        multiples = np.rint(near / step)
+        step = float(near @ multiples) / (float(multiples @ multiples) or np.inf) or step
+        # Jumps that belong to no ladder are spread evenly: 40 % of them within 0.2.
+        if np.mean(np.abs(near - multiples * step) < 0.2 * step) < 0.9:
+            return None
+        if reach >= full:
+            return step
+
+
+def clipped_samples(
+    values: FloatArray, step: float | None, limits: tuple[float, float] | None = None
+) -> int:
+    """Count samples that stand at the end of the converter's range.
+
+    Either at its known limits; or in flat tops: at least two runs of three or more equal
+    readings at the very extreme, whose neighbours lie more than four steps off, as no
+    smooth motion would have it.
+    """
+    if limits is not None:
+        low, high = np.array(limits) + 0.5 * (step or 0.0) * np.array([1.0, -1.0])
+        return int(np.sum((values <= low) | (values >= high)))
+    finite = values[np.isfinite(values)]
+    span = float(np.ptp(finite)) if len(finite) else 0.0
+    off = max(4.0 * (step or 0.0), 1e-3 * span)
+    return sum(_flat_tops(sign * values, off) for sign in (1.0, -1.0)) if span else 0
+
+
+def _flat_tops(values: FloatArray, off: float) -> int:
+    """Count the samples at the maximum, if two flat runs there fall off steeply."""
+    top = np.nanmax(values)
+    at = np.concatenate(([False], values == top, [False]))
+    edges = np.flatnonzero(np.diff(at.astype(np.int8)))
+    steep = 0
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        sides = values[max(start - 1, 0) : start].tolist() + values[stop : stop + 1].tolist()
+        steep += stop - start >= 3 and bool(sides) and top - min(sides) > off
+    return int(at.sum()) if steep >= 2 else 0
 
 
 class NotThisFormatError(Exception):

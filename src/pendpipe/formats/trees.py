@@ -20,7 +20,6 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import refuse_if
-from pendpipe.formats.samples import swing_of
 from pendpipe.formats.table import (
     Column,
     NotThisFormatError,
@@ -29,6 +28,7 @@ from pendpipe.formats.table import (
     damaged_if,
     most_unpacked,
     next_reader_if,
+    swing_of,
 )
 from pendpipe.formats.text import column_of_clock_times, table_of_text
 from pendpipe.formats.words import role_of, split_header

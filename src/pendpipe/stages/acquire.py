@@ -63,7 +63,7 @@ def acquire_record(
 
 def _simulated(campaign: Campaign, record: Record) -> Recording:
     """Let the simulated instrument record the simulated pendulum over its serial line."""
-    from pendpipe.acquisition.simulated import acquire_simulated
+    from pendpipe.acquisition.recorder import acquire_simulated
     from pendpipe.simulation.record import SensorVolts, generator, simulated_record
 
     truth = simulated_record(campaign, record)
@@ -188,7 +188,7 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
     Columns ``displacement_m``, ``volts``, ``volts_sd``: the caliper's reading, the mean of
     the samples at that position, and the mean's standard deviation.
     """
-    from pendpipe.acquisition.simulated import acquire_simulated
+    from pendpipe.acquisition.recorder import acquire_simulated
     from pendpipe.simulation.record import SensorVolts, generator
 
     settings = campaign.configuration
