@@ -119,10 +119,8 @@ def lines(fit: Fit) -> dict[str, float]:
     for effect, place in fit.model.places():
         if off_harmonics(fit, effect):
             sizes = slice(place.start, place.start + effect.sizes)
-            rest = fit.jacobian[:, [k for k in fit.free if not place.start <= k < place.stop]]
-            rest = rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300)
             taken = fit.jacobian[:, sizes] @ fit.value[sizes]
-            taken = taken - rest @ np.linalg.lstsq(rest, taken, rcond=1e-11)[0]
+            taken = fit.beside(taken, range(place.start, place.stop))
             found[effect.key] = float(taken @ taken)
     return found
 
@@ -277,10 +275,8 @@ def _needed_sizes(fit: Fit, effect: Effect, unit: float) -> tuple[float, int]:
     if not isinstance(effect, Curve):
         return 0.0, effect.sizes
     position = next(position for other, position in fit.model.places() if other is effect)
-    others = [index for index in fit.free if not position.start <= index < position.stop]
-    own, rest = fit.jacobian[:, position], fit.jacobian[:, others]
-    basis = np.linalg.qr(rest / np.maximum(np.linalg.norm(rest, axis=0), 1e-300))[0]
-    left = own - basis @ (basis.T @ own)
+    own = range(position.start, position.stop)
+    left = fit.beside(fit.jacobian[:, position], own)
     squares = (np.linalg.qr(left)[1] @ fit.value[position]) ** 2 / unit
     superfluous = squares < SIZE_CHARGE
     return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)

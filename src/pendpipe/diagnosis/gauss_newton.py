@@ -193,13 +193,14 @@ def _step(
     step, free, scale = np.zeros(len(value)), factored.free, factored.scale
     floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
     matrix, right = factored.triangle, factored.basis.T @ residual
-    best = np.linalg.lstsq(matrix, right, rcond=_PRECISE)[0]
-    if np.linalg.norm(best) > radius:
-        damping = math.sqrt(_damping(matrix, right, radius)) * np.eye(len(free))
-        matrix, right = np.vstack([matrix, damping]), np.append(right, np.zeros(len(free)))
-        best = np.linalg.lstsq(matrix, right, rcond=_PRECISE)[0]
+    left, singular, turned = np.linalg.svd(matrix)
+    seen = singular > _PRECISE * np.max(singular, initial=0.0)
+    pull, squares = (singular * (left.T @ right))[seen], singular[seen] ** 2
+    damping = _damping(pull, squares, radius)
+    best = turned[seen].T @ (pull / (squares + damping))
     if np.any(best < floor) or np.any(best > ceiling):
-        best = bounded_least_squares(matrix, right, floor, ceiling)
+        matrix = np.vstack([matrix, math.sqrt(damping) * np.eye(len(free))])
+        best = bounded_least_squares(matrix, np.append(right, 0.0 * free), floor, ceiling)
     step[free] = best / scale
     limit = 0.05 * value[OMEGA]
     if abs(step[OMEGA]) > limit:
@@ -207,14 +208,13 @@ def _step(
     return step, float(np.linalg.norm(best))
 
 
-def _damping(triangle: FloatArray, right: FloatArray, radius: float) -> float:
-    """Return the damping that gives a step the length `radius`; with none it is longer."""
-    left, singular, _ = np.linalg.svd(triangle)
-    seen = singular > _PRECISE * singular[0]
-    pull, squares = (singular * (left.T @ right))[seen], singular[seen] ** 2
+def _damping(pull: FloatArray, squares: FloatArray, radius: float) -> float:
+    """Return the least damping with which a step is no longer than `radius`."""
 
     def longer(damping: float) -> float:
         return float(np.linalg.norm(pull / (squares + damping))) - radius
 
+    if longer(0.0) <= 0.0:
+        return 0.0
     # The step is shorter than the gradient over the damping.
     return float(brentq(longer, 0.0, float(np.linalg.norm(pull)) / radius, rtol=_RADIUS_MET))

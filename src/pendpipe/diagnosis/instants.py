@@ -13,9 +13,8 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, misfit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit, better
 from pendpipe.diagnosis.scores import products_and_lengths
-from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import DroppedSamples
 from pendpipe.estimate import Estimate
@@ -137,8 +136,6 @@ def _widened(estimate: Estimate, interval: tuple[float, float]) -> Estimate:
 _SEARCH_WIDTHS: Final = (2.0, 0.125)
 """Range about an instant that is searched, in intervals between readings; the second is finer."""
 _SHIFTS: Final = np.linspace(-1.0, 1.0, 33)
-_NEEDED_FALL: Final = 1.0
-"""Fall of chi^2 from which the fit continues from another instant."""
 
 
 def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]) -> Fit:
@@ -161,26 +158,7 @@ def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]
         if not isinstance(effect, DroppedSamples):
             continue  # other effects change little from one reading to the next
         for width in _SEARCH_WIDTHS:
-            start = _best_beside(fit, data, noise, position.stop - 1, width * data.interval_s)
-            if start is None:
-                continue
-            better = refine(fit.model, data, noise, start, held=fixed)
-            fit = better if better.chi2 < fit.chi2 else fit
+            instant = np.arange(len(fit.value)) == position.stop - 1
+            starts = [fit.value + shift * width * data.interval_s * instant for shift in _SHIFTS]
+            fit = better(fit, best_fit(fit.model, data, noise, starts, held=fixed)) or fit
     return fit
-
-
-def _best_beside(
-    fit: Fit, data: Data, noise: Noise, instant: int, width_s: float
-) -> FloatArray | None:
-    """Return the values with one instant moved to the smallest chi^2; None if it stays."""
-    least, best = fit.chi2 - _NEEDED_FALL, None
-    for shift in _SHIFTS:
-        value = fit.value.copy()
-        value[instant] += shift * width_s
-        try:
-            there = misfit(fit.model, data, noise, value)
-        except NoMotionError:
-            continue
-        if there < least:
-            least, best = there, value
-    return best

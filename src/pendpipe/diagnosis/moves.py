@@ -19,7 +19,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress
-from pendpipe.diagnosis.detect import Detection, Lead, detect, prepare
+from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
@@ -27,7 +27,7 @@ from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
-from pendpipe.diagnosis.task import Task, applicable, undrawn
+from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
@@ -267,61 +267,39 @@ def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[
         return list(rivals)
     least_gain = OF_A_CURVE * curve.gain
     names = [rival for rival in rivals if not rival.drawn and rival.gain > least_gain]
-    names = names or [rival for rival in _best_names(state) if rival.gain > least_gain]
+    names = names or [rival for rival in _named(state, _FIRST_TRIED) if rival.gain > least_gain]
+    drawn = Proposed(curve.fit, (Step((curve,), 0.0, state.fit),))
     for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST_TRIED]:
         task.progress(f"trying {name.name} with a second effect instead of a curve")
-        if any(_better_than(curve, name, second, state) for second in _seconds(state, name, task)):
+        pairs = [
+            Proposed(second.fit, tuple(Step((rival,), 0.0, state.fit) for rival in (name, second)))
+            for second in _seconds(state, name, task)
+        ]
+        if _best(drawn, pairs, state) is not drawn:
             return [name, *(rival for rival in rivals if rival is not name)]
     return list(rivals)
 
 
-def _better_than(curve: Rival, name: Rival, second: Rival, state: State) -> bool:
-    """Whether the score of two names is smaller than that of a curve."""
-    fits = min((curve.fit, second.fit), key=lambda fit: fit.chi2)
-    scale = Scale.of(fits, state.data, state.noise)
-    names, drawn = (
-        price([Step((rival,), 0.0, state.fit) for rival in some])
-        for some in ((name, second), (curve,))
-    )
-    return scale.lost_by(second.fit) + names < scale.lost_by(curve.fit) + drawn
-
-
-def _best_names(state: State) -> list[Rival]:
-    """Refit the best named effects where only curves had been."""
-    assert state.now is not None
-    leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
-    return _refitted_beside(
-        state.fit, replace(state.now, leads=leads), state, state.held, _FIRST_TRIED
-    )
-
-
 def _seconds(state: State, name: Rival, task: Task) -> list[Rival]:
     """Return the best named effects that could be added to a first."""
-    effects = [
-        effect
-        for effect in applicable(task.catalogue, name.fit, task.baseline, state.data.unit)
-        if effect.kind != "unnamed"
-    ]
-    held = state.held
-    if isinstance(name.lead.effect, ReleasedParameter):
-        held = name.lead.effect.without(held)
-    released = [entry for entry in task.released if entry not in name.fit.model.effects]
-    scanner = prepare(name.fit, state.data, state.noise, [*effects, *released])
-    found = detect(scanner, name.fit, seed=task.seed, known=state.now)
-    if found.p_value > task.threshold:
-        return []
-    return _refitted_beside(name.fit, found, state, held, _SECOND_TRIED)
+    effect, beside = name.lead.effect, replace(state, fit=name.fit)
+    if isinstance(effect, ReleasedParameter):
+        beside.held = effect.without(state.held)
+    task.scanned(beside)
+    assert beside.now is not None
+    return [] if beside.now.p_value > task.threshold else _named(beside, _SECOND_TRIED)
 
 
-def _refitted_beside(
-    base: Fit, found: Detection, state: State, held: Sequence[int], most: int
-) -> list[Rival]:
+def _named(state: State, most: int) -> list[Rival]:
+    """Refit the best named effects of a scan, where only curves had been."""
+    assert state.now is not None
+    leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
     return refit_leads(
-        base,
+        state.fit,
         state.data,
         state.noise,
-        found,
-        held=held,
+        replace(state.now, leads=leads),
+        held=state.held,
         phase_lost=False,
         most=most,
         origin=state.origin,

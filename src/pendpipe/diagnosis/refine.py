@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
@@ -102,6 +102,12 @@ class Fit:
         """The largest phase difference between model and readings."""
         return self.evaluation.max_phase_error_rad
 
+    def beside(self, columns: FloatArray, own: Collection[int]) -> FloatArray:
+        """Return what the derivatives by the free values, but for its `own`, leave of columns."""
+        others = self.jacobian[:, [k for k in self.free if k not in own]]
+        others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+        return np.asarray(columns - others @ np.linalg.lstsq(others, columns, rcond=1e-11)[0])
+
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
         matrix = np.zeros((len(self.value), len(self.value)))
@@ -121,17 +127,15 @@ class Fit:
 def pulled(fit: Fit) -> list[int]:
     """Return the indices of fitted values that the readings pull far beyond a bound."""
     low, high = fit.model.bounds()
+    inside = (low < fit.value) & (fit.value < high)
+    bound = [index for index in fit.free if not inside[index]]
     found = []
-    for index in fit.free:
-        if low[index] < fit.value[index] < high[index]:
-            continue
+    for index in bound:
         column = fit.jacobian[:, index]
-        length = float(np.linalg.norm(column))
-        others = [k for k in fit.free if k != index and low[k] < fit.value[k] < high[k]]
-        part = fit.jacobian[:, others]
-        rest = column - part @ np.linalg.lstsq(part, column, rcond=1e-11)[0]
+        rest = fit.beside(column, bound)
         alone = float(np.linalg.norm(rest))
-        if alone > 1e-9 * length and abs(float(rest @ fit.residual)) > _FAR_BEYOND_SD * alone:
+        seen = alone > 1e-9 * float(np.linalg.norm(column))
+        if seen and abs(float(rest @ fit.residual)) > _FAR_BEYOND_SD * alone:
             found.append(index)
     return found
 

@@ -30,7 +30,7 @@ _MISFIT: Final = 1.3
 """chi^2 per reading from which a misfit of the motion may leak between its harmonics."""
 _NEAR_BAND: Final = (0.3, 3.0)
 _KICKS: Final = 64
-_SIZES: Final = np.geomspace(1e-4, 1e6, 101)
+_SIZES: Final = np.geomspace(1e-4, 1e6, 801)
 """Variances of a kick, times the largest eigenvalue, at which the likelihood is computed."""
 _SMALLEST_EIGENVALUE: Final = 1e-3
 """Smallest eigenvalue used, over the largest: rougher shapes contain no information."""
@@ -189,12 +189,10 @@ def _shapes(whitened: FloatArray, basis: FloatArray, residual: FloatArray) -> Sh
 def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
     """Return the variance of a kick, its error, and twice the gain in log-likelihood."""
     sizes = np.append(0.0, _SIZES) / shapes.weight.max()
-    twice = _twice(shapes, sizes)
+    variance = 1.0 + sizes[:, None] * shapes.weight
+    # -2 ln L.
+    twice = np.sum(np.log(variance) + shapes.square / variance, axis=1)
     best = int(np.argmin(twice))
-    if 0 < best < len(sizes) - 1:
-        sizes = np.append(0.0, np.geomspace(sizes[max(best - 1, 1)], sizes[best + 1], 25))
-        twice = _twice(shapes, sizes)
-        best = int(np.argmin(twice))
     size = float(sizes[best])
     relative = shapes.weight / (1.0 + size * shapes.weight)
     return size, math.sqrt(2.0 / float(relative @ relative)), float(twice[0] - twice[best])
@@ -212,12 +210,6 @@ def _may_walk(shapes: Shapes) -> bool:
         return True
     sd = math.hypot(slow_sd / slow, fast_sd / fast)
     return abs(math.log(slow / fast)) < math.log(_LARGEST_RATIO) + 3.0 * sd
-
-
-def _twice(shapes: Shapes, sizes: FloatArray) -> FloatArray:
-    """-2 ln L at each variance of a kick."""
-    variance = 1.0 + sizes[:, None] * shapes.weight
-    return np.asarray(np.sum(np.log(variance) + shapes.square / variance, axis=1))
 
 
 def _described(
