@@ -137,8 +137,8 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
     other = first.rivals[1]
     monkeypatch.setattr(weighing, "_likelier", lambda _, step, __: other if step is first else None)
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
-    assert found.steps[0].winner is other
-    assert found.steps[1].before is other.fit
+    assert found.steps[0].winner.identifier == other.identifier
+    assert found.steps[1].before is found.steps[0].winner.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner
     assert {effect.identifier for effect in found.improved.model.effects} == {
         other.identifier,
@@ -152,9 +152,13 @@ def test_after_a_swap_every_effect_is_weighed_beside_the_new_ones(
     """Both effects give way, and the second is compared in the model that has the first's rival."""
     outcome = diagnosed("two")
     wanted = [step.rivals[1] for step in outcome.search.steps]
-    others = iter(wanted)
+    others = iter(reversed(wanted))
+
+    def taken(step: Step) -> bool:
+        return step.winner.identifier in {rival.identifier for rival in wanted}
+
     monkeypatch.setattr(
-        weighing, "_likelier", lambda _, step, __: None if step.winner in wanted else next(others)
+        weighing, "_likelier", lambda _, step, __: None if taken(step) else next(others)
     )
     found, weighed = swap_in_likelier(outcome.search, outcome.beginning)
     names = {rival.identifier for rival in wanted}

@@ -223,3 +223,14 @@ def test_sin_x_is_read_between_the_nodes_as_exactly_as_it_is_solved(amplitude: f
         for order in (order_for(amplitude, "rad"), 64)
     )
     np.testing.assert_allclose(few, many, rtol=0.0, atol=5e-6 * amplitude)
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 1.5, 2.3])
+@pytest.mark.parametrize("early_s", [0.003, 0.01])
+def test_just_before_it_starts_a_motion_is_as_just_after(amplitude: float, early_s: float) -> None:
+    """About a turning point it is even but for the loss, which is small."""
+    time_s = np.array([-early_s, early_s, 1.0, 5.0])
+    value = np.array([5e-3, 8e-3, 1e-3, 0.4, 5.6, amplitude, 0.0, 0.0, 1.0])
+    model = Model(time_s, 0.02, (by_identifier("circular-error"),), order=24)
+    before, after = model.evaluate(value).reading[:2]
+    assert before == pytest.approx(after, rel=1e-6)

@@ -64,12 +64,15 @@ class Weighed(NamedTuple):
         The effects that the recording cannot distinguish from it, the best of each identifier.
     weights
         Probabilities of the effect, of its mates, and of none of them.
+    rivals
+        All that were refitted.
     """
 
     without: Fit
     gain: float
     mates: tuple[Rival, ...]
     weights: FloatArray
+    rivals: tuple[Rival, ...]
 
 
 def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
@@ -93,7 +96,7 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.improved, effect)):
         weights = weights * _explained(found, effect, gain)
-    return Weighed(without, gain, tuple(mates), weights)
+    return Weighed(without, gain, tuple(mates), weights, tuple(rivals))
 
 
 def beside(found: Search, effect: Effect) -> Search:
@@ -142,7 +145,7 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
-    without, gain, mates, weights = weighed
+    without, gain, mates, weights, _ = weighed
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -317,7 +320,8 @@ def swap_in_likelier(
 ) -> tuple[Search, tuple[Weighed, ...]]:
     """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
 
-    After each replacement all are weighed anew: what each was compared beside has changed.
+    The last goes first. After a replacement all are weighed anew: what each was compared beside has
+    changed.
 
     A search adds what reduces a gross misfit most. Where much remains unexplained, a slightly
     larger gain means nothing and the prior decides; and effects added later, or the final
@@ -330,31 +334,31 @@ def swap_in_likelier(
     tuple of Weighed
         One for each of its steps.
     """
+    # Names under a curve stay: their probabilities show how little they explain.
+    may_change = found.named.model is found.improved.model
     tried: list[set[str]] = []
     while True:
-        weighed = tuple(weigh(found, beginning, step) for step in found.steps)
         tried.append({effect.key for effect in found.improved.model.effects})
-        # Names under a curve stay: their probabilities show how little they explain.
-        if found.named.model is not found.improved.model:
-            return found, weighed
-        likelier = _with_a_likelier(found, weighed, tried)
-        if likelier is None:
-            return found, weighed
-        found, words = likelier
-        progress(words)
+        weighed: list[Weighed] = []
+        for number in reversed(range(len(found.steps))):
+            weighed.append(weigh(found, beginning, found.steps[number]))
+            likelier = may_change and _with_a_likelier(found, number, weighed[-1], tried)
+            if likelier:
+                name, found = found.steps[number].winner.name, likelier
+                progress(f"replacing {name} by {found.steps[number].winner.name}: it is likelier")
+                break
+        else:
+            return found, tuple(reversed(weighed))
 
 
 def _with_a_likelier(
-    found: Search, weighed: Sequence[Weighed], tried: Sequence[set[str]]
-) -> tuple[Search, str] | None:
-    """Exchange the first effect that has a likelier rival, if that is a set not yet tried."""
-    for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True)):
-        best = _likelier(found, step, each)
-        after = _exchanged(found, number, best, each.without) if best else None
-        if best is None or after is None:
-            continue
-        if {effect.key for effect in after.improved.model.effects} not in tried:
-            return after, f"replacing {step.winner.name} by {best.name}, which is likelier"
+    found: Search, number: int, weighed: Weighed, tried: Sequence[set[str]]
+) -> Search | None:
+    """Exchange a step's winner for a likelier rival, if there is one, and the set is new."""
+    best = _likelier(found, found.steps[number], weighed)
+    after = _exchanged(found, number, best, weighed) if best else None
+    if after and {effect.key for effect in after.improved.model.effects} not in tried:
+        return after
     return None
 
 
@@ -378,7 +382,7 @@ def _has_curve(steps: Sequence[Step], but: Step) -> bool:
     return any(step.winner.drawn for step in steps if step is not but)
 
 
-def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search | None:
+def _exchanged(found: Search, number: int, best: Rival, weighed: Weighed) -> Search | None:
     """Replace a step's winner by a rival; None where the model has no such motion."""
     step, effect = found.steps[number], best.lead.effect
     own, held = step.winner.lead.effect, set(found.held)
@@ -387,26 +391,33 @@ def _exchanged(found: Search, number: int, best: Rival, without: Fit) -> Search 
         held.add(own.index)
     if isinstance(effect, ReleasedParameter):
         held = set(effect.without(held))
-    fit = refitted(without, found, sorted(held), best)
+    fit = refitted(weighed.without, found, sorted(held), best)
     if fit is None:
         return None
     fit = with_errors(fit, found.data, found.noise)
     return replace(
         found,
         improved=fit,
-        steps=_reordered(found.steps, number, effect),
+        steps=_reordered(found.steps, number, effect, weighed),
         remainder=remainder_of(fit, found.data, found.noise),
         held=tuple(sorted(held)),
         named=fit,
     )
 
 
-def _reordered(steps: Sequence[Step], number: int, effect: Effect) -> tuple[Step, ...]:
-    """Return the steps with an effect moved to the front of its rivals at one of them."""
-    own = [rival for rival in steps[number].rivals if rival.lead.effect.key == effect.key]
-    rest = [rival for rival in steps[number].rivals if rival.lead.effect.key != effect.key]
+def _reordered(
+    steps: Sequence[Step], number: int, effect: Effect, weighed: Weighed
+) -> tuple[Step, ...]:
+    """Return the steps with an effect moved to the front of its rivals at one of them.
+
+    These are as they were refitted: what they are compared beside stays.
+    """
+    again = {rival.lead.effect.key: rival for rival in weighed.rivals}
+    rivals = [again.get(rival.lead.effect.key, rival) for rival in steps[number].rivals]
+    own = [rival for rival in rivals if rival.lead.effect.key == effect.key]
+    rest = [rival for rival in rivals if rival.lead.effect.key != effect.key]
     after = list(steps)
-    after[number] = replace(steps[number], rivals=(*own, *rest))
+    after[number] = replace(steps[number], rivals=(*own, *rest), before=weighed.without)
     if number + 1 < len(steps):
         # The next step is tested without its own effect: start from this model.
         after[number + 1] = replace(steps[number + 1], before=own[0].fit)

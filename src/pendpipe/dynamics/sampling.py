@@ -142,13 +142,32 @@ def interpolated(values: FloatArray, first: IntArray, weights: FloatArray) -> Fl
 
 
 def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
-    """Weights of the six nodes from `first` on at each time, shape (6, n)."""
-    near = [nodes[first + point] for point in range(_POINTS)]
-    weights = np.empty((_POINTS, len(time_s)))
-    for point in range(_POINTS):
+    """Weights of the six nodes from `first` on at each time, shape (6, n).
+
+    The nodes at the ends of a motion lie close together: beyond, only three are used.
+    """
+    weights = _through(nodes, first, time_s, range(_POINTS))
+    half = _POINTS // 2
+    for outside, points in (
+        (time_s < nodes[0], range(half)),
+        (time_s > nodes[-1], range(half, _POINTS)),
+    ):
+        if outside.any():
+            weights[:, outside] = 0.0
+            near = _through(nodes, first[outside], time_s[outside], points)
+            weights[points.start : points.stop, outside] = near
+    return weights
+
+
+def _through(
+    nodes: FloatArray, first: IntArray, time_s: FloatArray, points: Sequence[int]
+) -> FloatArray:
+    """Lagrange's weights of some nodes behind `first`."""
+    near = [nodes[first + point] for point in points]
+    weights = np.empty((len(near), len(time_s)))
+    for own, node in enumerate(near):
         product = np.ones_like(time_s)
-        for other in range(_POINTS):
-            if other != point:
-                product = product * (time_s - near[other]) / (near[point] - near[other])
-        weights[point] = product
+        for other in (*near[:own], *near[own + 1 :]):
+            product = product * (time_s - other) / (node - other)
+        weights[own] = product
     return weights
