@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from pendpipe.errors import InputError
 from pendpipe.files import finite, read_json
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Flags = dict[str, dict[str, Any]]
 """Arguments by their names, each with its options; see `declare`."""
+Arguments: TypeAlias = argparse.Namespace
+"""What one call gave for them."""
 ALTERNATIVES: Final = "alternatives"
 
 
@@ -145,21 +147,21 @@ def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
         )
 
 
-def read_options(arguments: argparse.Namespace) -> ReadOptions:
+def read_options(arguments: Arguments) -> ReadOptions:
     """Turn the parsed arguments into the readers' options."""
     from pendpipe.formats import ReadOptions
 
     return ReadOptions(**{each.name: getattr(arguments, each.name) for each in fields(ReadOptions)})
 
 
-def announce(arguments: argparse.Namespace, recording: Recording) -> None:
+def announce(arguments: Arguments, recording: Recording) -> None:
     """Print what was guessed, the weak guesses first, to stderr."""
     weak = [f"a guess: {guess}" for guess in recording.weak_guesses]
     for line in (*weak, *recording.notes):
-        print(f"{arguments.file}: {line}", file=sys.stderr)
+        tell(f"{arguments.file}: {line}")
 
 
-def read_motion(arguments: argparse.Namespace) -> tuple[Recording, dict[str, Any]]:
+def read_motion(arguments: Arguments) -> tuple[Recording, dict[str, Any]]:
     """Read FILE, apply the sensor constant, and say what was guessed.
 
     Returns
@@ -203,7 +205,12 @@ def load(path: Path) -> Campaign:
     return load_campaign(read_configuration(path), path)
 
 
-def print_answer(arguments: argparse.Namespace, content: Any, text: str) -> None:
+def tell(line: str) -> None:
+    """Print a line for whoever sits before the screen; results go to standard output."""
+    print(line, file=sys.stderr)
+
+
+def print_answer(arguments: Arguments, content: Any, text: str) -> None:
     """Print a command's answer: in words, or with ``--json`` as one object."""
     if arguments.json:
         print_json(content)

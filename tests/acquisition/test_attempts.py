@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe.acquisition.attempts import choose, new_path, read_attempts
+from pendpipe.acquisition.decode import choose, new_path, read_attempts
 from pendpipe.acquisition.raw import RawWriter, lock
 from pendpipe.errors import InputError
 

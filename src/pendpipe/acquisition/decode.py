@@ -5,11 +5,19 @@ never early: by how much changes with every piece. The pieces that were least la
 line whose slope is the true interval between scans. In a stream without marks lost scans leave no
 trace but one: everything after them arrives late, and stays so. Other delays (a busy host) pass,
 and the pieces that were not held up are as early as before.
+
+Each attempt at a recording keeps its bytes in a raw file of its own, never overwritten: a campaign
+in ``results/<record>/raw/``, the command line beside ``--out``. A recording is always decoded from
+such a file, so it can be made again at any time.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+import secrets
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal
@@ -18,9 +26,16 @@ import numpy as np
 
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss
-from pendpipe.acquisition.raw import Hole, NothingRecordedError, RawRecording, read_raw
+from pendpipe.acquisition.raw import (
+    Hole,
+    NothingRecordedError,
+    RawRecording,
+    append_event,
+    is_being_recorded,
+    read_raw,
+)
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
-from pendpipe.errors import refuse_if
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
 _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
@@ -597,3 +612,125 @@ def find_clock_losses(
         found.append(ClockLoss(at, max(1, round(rise / interval_s))))
         index += _BESIDE
     return found, limit_s
+
+
+_STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
+
+
+def new_path(start: str | Path) -> Path:
+    r"""Name a raw file that nobody else has: `start`, a UTC time stamp, and a random number.
+
+    Examples
+    --------
+    >>> re.sub(r"\d", "0", new_path("raw/").name[:23])
+    '00000000T000000.000000Z'
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    return Path(f"{start}{stamp}-{secrets.token_hex(4)}.raw")
+
+
+def new_path_beside(out: Path) -> Path:
+    """Name the raw file of a recording on the command line: ``OUT.raw`` if that is free.
+
+    Beside a device or a pipe nothing is kept: ``recording.raw`` in the current folder is.
+    """
+    out = _file_of(out)
+    first = out.with_suffix(".raw")
+    return new_path(f"{out.with_suffix('')}.") if first.exists() else first
+
+
+def _file_of(out: Path) -> Path:
+    return Path("recording.csv") if out.exists() and not out.is_file() else out
+
+
+def paths_beside(out: Path) -> list[Path]:
+    """List the raw files that `new_path_beside` has named for a recording."""
+    out = _file_of(out)
+    pattern = re.compile(re.escape(out.stem) + rf"(\.{_STAMP})?\.raw")
+    return [path for path in out.parent.glob("*") if pattern.fullmatch(path.name)]
+
+
+def read_attempts(paths: Iterable[Path]) -> list[RawRecording]:
+    """Read the attempts that hold at least one scan, the oldest first.
+
+    Raises
+    ------
+    InputError
+        If one of them is being recorded now, or none holds a scan and one is damaged.
+    """
+    found: list[RawRecording] = []
+    damages: list[InputError] = []
+    for path in sorted(path for path in paths if path.is_file()):
+        refuse_if(
+            is_being_recorded(path),
+            path,
+            "another process is recording into it",
+            "wait for its end",
+        )
+        try:
+            raw = read_raw(path)
+            decode_recording(raw)
+        except NothingRecordedError:
+            continue
+        except InputError as fault:
+            damages.append(fault)
+        else:
+            found.append(raw)
+    if damages and not found:
+        raise damages[0]
+    # A name has its time stamp down to microseconds; OUT.raw, the first of all, has none.
+    return sorted(
+        found, key=lambda raw: (str(raw.header["recorded_at"]), *re.findall(_STAMP, raw.path.name))
+    )
+
+
+def choose(attempts: Sequence[RawRecording]) -> RawRecording:
+    """Return the newest complete attempt; if none is complete, the longest."""
+    complete = [attempt for attempt in attempts if attempt.is_complete]
+    return complete[-1] if complete else max(attempts, key=lambda attempt: len(attempt.data))
+
+
+def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Recording:
+    """Decode a raw file; the recording's metadata names it and holds the notes.
+
+    Parameters
+    ----------
+    path
+        The raw file.
+    folder
+        Where the recording goes: the file is named relative to it.
+    channel
+        As printed on the box; the first one recorded by default.
+    """
+    recording = decode_recording(path, channel)
+    inside = path.is_relative_to(folder)
+    metadata = {"raw_file": (path.relative_to(folder) if inside else Path(path.name)).as_posix()}
+    if recording.notes:
+        metadata["notes"] = "; ".join(recording.notes)
+    return replace(recording, metadata={**recording.metadata, **metadata})
+
+
+def mark_saved(path: Path, out: Path) -> None:
+    """Note in a raw file that its recording was written; without a right to it, do not."""
+    with suppress(OSError):
+        append_event(path, event="saved", file=out.name)
+
+
+@contextmanager
+def kept_in(raw_path: Path, out: Path) -> Iterator[None]:
+    """While a recording is written: if that fails, name the raw file that still holds it.
+
+    Raises
+    ------
+    InputError
+        Where the recording can't be written, for a full disk for one.
+    """
+    kept = f"the recording is kept in {raw_path}: call again to write it"
+    try:
+        yield
+    except OSError as fault:
+        raise InputError(
+            out, f"it can't be written ({fault.strerror or fault})", f"make room; {kept}"
+        ) from None
+    except InputError as fault:
+        raise InputError(fault.place, fault.problem, f"{fault.remedy}; {kept}") from None

@@ -8,7 +8,6 @@ pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
 pendpipe acquire --serve di2108 --signal config/model.toml
 """
 
-import argparse
 import signal
 import sys
 import threading
@@ -19,7 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from pendpipe.arguments import ALTERNATIVES, Flags, load, number_within, shared, under
+from pendpipe.arguments import ALTERNATIVES, Arguments, Flags, load, number_within, shared, under
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_writable
 
@@ -83,7 +82,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """List ports, serve a device, or record."""
     if arguments.list:
         _list(arguments.port)
@@ -119,10 +118,10 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
             signal.signal(number, old)
 
 
-def _record(arguments: argparse.Namespace) -> None:
+def _record(arguments: Arguments) -> None:
     """Record, or write what an earlier call has recorded and could not write."""
     refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
-    from pendpipe.acquisition import attempts
+    from pendpipe.acquisition import decode
     from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
@@ -133,9 +132,9 @@ def _record(arguments: argparse.Namespace) -> None:
         check_writable(out.parent)
     if arguments.samples is not None:
         arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
-    kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
+    kept = [Path(arguments.raw)] if arguments.raw else decode.paths_beside(out)
     no_earlier_one = arguments.recover or arguments.anew
-    earlier = [] if no_earlier_one else attempts.read_attempts(kept)
+    earlier = [] if no_earlier_one else decode.read_attempts(kept)
     if arguments.recover:
         raw = Path(arguments.recover)
     elif earlier and not earlier[-1].event("saved"):
@@ -146,20 +145,20 @@ def _record(arguments: argparse.Namespace) -> None:
             file=sys.stderr,
         )
     else:
-        raw = Path(arguments.raw) if arguments.raw else attempts.new_path_beside(out)
+        raw = Path(arguments.raw) if arguments.raw else decode.new_path_beside(out)
         _from_device(arguments, raw)
-    recording = attempts.decode_attempt(raw, out.parent, arguments.channel)
-    with attempts.kept_in(raw, out):
+    recording = decode.decode_attempt(raw, out.parent, arguments.channel)
+    with decode.kept_in(raw, out):
         lost = write(out, recording)
     if not arguments.recover:
-        attempts.mark_saved(raw, out)
+        decode.mark_saved(raw, out)
     for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
     print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
 
 
-def _caliper(arguments: argparse.Namespace) -> None:
+def _caliper(arguments: Arguments) -> None:
     """Acquire the caliper run of a campaign."""
     from pendpipe.configuration.jobs import caliper_source
     from pendpipe.manifest import job
@@ -172,7 +171,7 @@ def _caliper(arguments: argparse.Namespace) -> None:
         run_caliper(campaign, out)
 
 
-def _stage(arguments: argparse.Namespace) -> None:
+def _stage(arguments: Arguments) -> None:
     """Acquire one record of a campaign."""
     from pendpipe.stages.acquire import acquire_record
     from pendpipe.stages.refusal import run_stage
@@ -206,7 +205,7 @@ def _stage(arguments: argparse.Namespace) -> None:
     )
 
 
-def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
+def _from_device(arguments: Arguments, raw: Path) -> None:
     """Record into a raw file."""
     from pendpipe.acquisition.recorder import ProgressLine
 
@@ -252,7 +251,7 @@ def _from_device(arguments: argparse.Namespace, raw: Path) -> None:
         )
 
 
-def _serve(arguments: argparse.Namespace) -> None:
+def _serve(arguments: Arguments) -> None:
     """Be a simulated instrument for other programs until the end."""
     from pendpipe.acquisition.devices.simulated import SimulatedDevice
     from pendpipe.acquisition.recorder import example_signal

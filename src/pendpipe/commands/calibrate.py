@@ -8,14 +8,13 @@ With --record (the workflow's way) FILE is a recording instead, and the result s
 constant holds for it.
 """
 
-import argparse
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from pendpipe import manifest
-from pendpipe.arguments import SHARED, Flags, print_answer, shared, under
+from pendpipe.arguments import SHARED, Arguments, Flags, print_answer, shared, under
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_json, write_json
 from pendpipe.recording import Recording, read_plain
@@ -43,7 +42,7 @@ _OF_A_RECORD: Final = shared("--record", "--refused") | {
 ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Calibrate a sensor, or pick the constant of a record."""
     out: Path | None = arguments.out
     if arguments.record is not None:
@@ -64,7 +63,7 @@ def run(arguments: argparse.Namespace) -> None:
         _sensor(arguments)
 
 
-def _sensor(arguments: argparse.Namespace) -> None:
+def _sensor(arguments: Arguments) -> None:
     """Fit, print and write a sensor's line."""
     from pendpipe.analysis.calibrate import calibrate, read_caliper_table
 
@@ -82,7 +81,7 @@ def _sensor(arguments: argparse.Namespace) -> None:
         write_json(arguments.out, calibration.as_json())
 
 
-def _of_record(arguments: argparse.Namespace) -> None:
+def _of_record(arguments: Arguments) -> None:
     """Write the sensor constant of one record with its standard deviation.
 
     The record's own constant (from the table) comes before the one in the recording's

@@ -1,10 +1,9 @@
 """Check a campaign's configuration, or print its schema or the manual's tables."""
 
-import argparse
 import json
 from typing import Final
 
-from pendpipe.arguments import ALTERNATIVES, Flags
+from pendpipe.arguments import ALTERNATIVES, Arguments, Flags
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.configuration.models import Configuration
 from pendpipe.templates import render
@@ -24,7 +23,7 @@ ARGUMENTS: Final[Flags] = {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Check, or print."""
     if arguments.schema:
         print(schema(), end="")

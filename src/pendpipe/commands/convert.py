@@ -1,11 +1,10 @@
 """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import FILE, announce, read_options
+from pendpipe.arguments import FILE, Arguments, announce, read_options
 
 ARGUMENTS: Final = FILE | {
     "out": {
@@ -16,7 +15,7 @@ ARGUMENTS: Final = FILE | {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
     from pendpipe.formats.writing import check_name, write

@@ -9,7 +9,6 @@ Several FILEs are recordings of one pendulum: physics shared, start and noise ea
 (docs/several.md).
 """
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +17,7 @@ from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
+    Arguments,
     Flags,
     number_within,
     print_answer,
@@ -87,7 +87,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: Arguments) -> int:
     """Diagnose, write the result, and print the answer."""
     if len(arguments.files) > 1:
         keep_memory()
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
+def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     """Diagnose, unless a stage that this one builds on has refused the record.
 
     The fit runs beside the diagnosis, so its refusal does not count. Nor does a diagnosis refuse
@@ -149,7 +149,7 @@ def _diagnose(arguments: argparse.Namespace, fixed: dict[str, float]) -> int:
     return FOUND if arguments.fail_on == content["verdict"] else 0
 
 
-def _diagnose_several(arguments: argparse.Namespace) -> int:
+def _diagnose_several(arguments: Arguments) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
 
@@ -191,7 +191,7 @@ def _diagnose_several(arguments: argparse.Namespace) -> int:
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 
-def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -> Outcome:
+def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Outcome:
     """Diagnose a recording, with the turning points of an earlier stage if given."""
     more |= {
         "baseline": arguments.baseline,
@@ -208,7 +208,7 @@ def _outcome(arguments: argparse.Namespace, recording: Recording, **more: Any) -
     )
 
 
-def _write(arguments: argparse.Namespace, outcome: Outcome) -> dict[str, Any]:
+def _write(arguments: Arguments, outcome: Outcome) -> dict[str, Any]:
     """Draw the figures that are wanted, then write the result that names them."""
     wanted = arguments.figures == "all" or (
         arguments.figures == "found" and outcome.verdict == "missing-physics"
@@ -228,7 +228,7 @@ def _remove_figures(folder: Path) -> None:
             folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
 
-def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
+def _write_placeholders(arguments: Arguments, reason: str) -> None:
     """Write one line instead of each figure that a workflow waits for and that was not drawn."""
     wanted = arguments.record is not None and arguments.figures != "none"
     paths = [arguments.out / f"{name}.svg" for name in OF_EVERY_DIAGNOSIS if wanted]
@@ -236,7 +236,7 @@ def _write_placeholders(arguments: argparse.Namespace, reason: str) -> None:
         write_whole(path, _EMPTY.format(reason))
 
 
-def _not_analysable(arguments: argparse.Namespace, reason: str, provenance: dict[str, Any]) -> int:
+def _not_analysable(arguments: Arguments, reason: str, provenance: dict[str, Any]) -> int:
     """Write why there is no diagnosis; in a campaign the other records go on."""
     content = not_analysable(arguments.baseline, reason, provenance)
     if arguments.out is not None:

@@ -4,14 +4,13 @@ Nothing is changed. Each line names a file or folder, what is wrong with it, and
 to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 """
 
-import argparse
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe import manifest
-from pendpipe.arguments import SHARED, print_answer
+from pendpipe.arguments import SHARED, Arguments, print_answer
 from pendpipe.errors import InputError
 from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
 
@@ -34,7 +33,7 @@ ARGUMENTS: Final = {
 }
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: Arguments) -> int:
     """Examine and print."""
     found = examine(arguments.folder)
     content = {"schema_version": 1, "findings": [finding._asdict() for finding in found]}
@@ -150,7 +149,7 @@ def _undecoded(raw: Path) -> Iterator[Finding]:
     table = raw.parent.parent / "recording.csv" if in_campaign else raw.with_suffix(".csv")
     if table.is_file() and not table.read_bytes().startswith(b"# refused:"):
         return
-    from pendpipe.acquisition.attempts import read_attempts
+    from pendpipe.acquisition.decode import read_attempts
 
     call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
     problem, safe = f"there is no {table.name} of it", f"{call} makes it"

@@ -3,17 +3,16 @@
 With --list, one line an effect: identifier, kind, name.
 """
 
-import argparse
 from typing import Final
 
-from pendpipe.arguments import print_answer, shared
+from pendpipe.arguments import Arguments, print_answer, shared
 
 ARGUMENTS: Final = {"--list": {"action": "store_true", "help": "one line an effect"}} | shared(
     "--json"
 )
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Print."""
     from pendpipe.effects.catalogue import CATALOGUE
     from pendpipe.effects.manual import page

@@ -4,12 +4,10 @@ What has no data is left out, and said on standard error; in a campaign with an 
 each of figures 3 to 10 is written all the same, with the reason in its place.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import shared
+from pendpipe.arguments import Arguments, shared, tell
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 
@@ -29,7 +27,7 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Draw."""
     from pendpipe.figures.campaign import draw_all
     from pendpipe.figures.data import read_compared
@@ -46,11 +44,11 @@ def run(arguments: argparse.Namespace) -> None:
     with job(folder, "figures", inputs=inputs, outputs=[listed]) as running:
         drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
         for name, reason in drawn.left_out.items():
-            print(f"pendpipe: {name} is not drawn: {reason}", file=sys.stderr)
+            tell(f"pendpipe: {name} is not drawn: {reason}")
         names = [
             (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
             for file in drawn.files
         ]
         write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
         running.extras += drawn.files
-    print(f"{arguments.out}: {len(drawn.files)} files drawn", file=sys.stderr)
+    tell(f"{arguments.out}: {len(drawn.files)} files drawn")

@@ -11,8 +11,6 @@ differ from the law by more than noise. red: they contradict each other; then th
 printed instead of the law, and the exit status is 2 unless --accept is given.
 """
 
-import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -23,12 +21,14 @@ from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
+    Arguments,
     Flags,
     number_within,
     print_answer,
     print_json,
     read_motion,
     shared,
+    tell,
 )
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import write_json
@@ -70,7 +70,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: Arguments) -> int:
     """Fit and print; write what is asked for."""
     if len(arguments.files) > 1:
         return _table(arguments)
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     result = _fit(arguments)
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
-        print(f"pendpipe: {arguments.file}: {why} (--accept prints it)", file=sys.stderr)
+        tell(f"pendpipe: {arguments.file}: {why} (--accept prints it)")
     if arguments.out and arguments.out != "-":
         _write(arguments, result)
     if figure:
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
     return _status(arguments, result)
 
 
-def _stage(arguments: argparse.Namespace) -> None:
+def _stage(arguments: Arguments) -> None:
     """Fit one record of a campaign; a red light stands in the result and stops nothing."""
     from pendpipe.stages.refusal import run_stage
 
@@ -118,7 +118,7 @@ def _stage(arguments: argparse.Namespace) -> None:
     )
 
 
-def _fit(arguments: argparse.Namespace) -> FitResult:
+def _fit(arguments: Arguments) -> FitResult:
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
@@ -143,13 +143,13 @@ def _fit(arguments: argparse.Namespace) -> FitResult:
     )
 
 
-def _write(arguments: argparse.Namespace, result: FitResult) -> None:
+def _write(arguments: Arguments, result: FitResult) -> None:
     write_json(Path(arguments.out), result.to_dict())
     for warning in result.warnings:
-        print(f"{arguments.file}: {warning}", file=sys.stderr)
+        tell(f"{arguments.file}: {warning}")
 
 
-def _print(arguments: argparse.Namespace, result: FitResult) -> None:
+def _print(arguments: Arguments, result: FitResult) -> None:
     """Print the summary."""
     from pendpipe.analysis.fit.result import gravity_line, lines
 
@@ -160,11 +160,11 @@ def _print(arguments: argparse.Namespace, result: FitResult) -> None:
     print("\n".join(printed))
 
 
-def _status(arguments: argparse.Namespace, result: FitResult) -> int:
+def _status(arguments: Arguments, result: FitResult) -> int:
     return 2 if result.light == "red" and not arguments.accept else 0
 
 
-def _table(arguments: argparse.Namespace) -> int:
+def _table(arguments: Arguments) -> int:
     """Fit several recordings; what can't be fitted gets its reason, and the others go on."""
     from pendpipe.analysis.fit.result import row, table
 
@@ -181,7 +181,7 @@ def _table(arguments: argparse.Namespace) -> int:
         try:
             result = _fit(arguments)
         except InputError as problem:
-            print(f"pendpipe: {problem}", file=sys.stderr)
+            tell(f"pendpipe: {problem}")
             found.append({"file": file, "error": str(problem)})
             rows.append(row(file, None))
             status = 2

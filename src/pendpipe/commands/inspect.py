@@ -1,15 +1,14 @@
 """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
 
-import argparse
 from typing import Final
 
-from pendpipe.arguments import FILE, print_answer, read_options, shared
+from pendpipe.arguments import FILE, Arguments, print_answer, read_options, shared
 from pendpipe.formats import Inspection, inspect
 
 ARGUMENTS: Final = FILE | shared("--json")
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Inspect and print."""
     found = inspect(arguments.file, read_options(arguments))
     print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))

@@ -3,12 +3,10 @@
 The page is a single HTML file that needs no network.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import FILE, read_motion, shared
+from pendpipe.arguments import FILE, Arguments, read_motion, shared, tell
 
 ARGUMENTS: Final = (
     FILE
@@ -20,7 +18,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Fit, diagnose, and write the page."""
     from dataclasses import replace
 
@@ -42,4 +40,4 @@ def run(arguments: argparse.Namespace) -> None:
         return
     out = Path(arguments.out) if arguments.out else Path(name).with_suffix(".html")
     write_whole(out, page)
-    print(f"{out}: written", file=sys.stderr)
+    tell(f"{out}: written")

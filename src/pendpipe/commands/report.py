@@ -5,12 +5,10 @@ from the folder `figures` beside the page, where pendpipe figures has put them. 
 campaign's numbers go to standard output too, beside the paper's and the simulated truth.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import shared
+from pendpipe.arguments import Arguments, shared, tell
 
 ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
     "--summary": {
@@ -33,7 +31,7 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Write the page."""
     from pendpipe.figures.data import read_compared, read_content
     from pendpipe.files import write_whole
@@ -54,6 +52,6 @@ def run(arguments: argparse.Namespace) -> None:
             arguments.proof,
         )
         write_whole(arguments.out, page)
-    print(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB", file=sys.stderr)
+    tell(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB")
     if rows := headline(comparison, configuration.get("simulated") or {}):
         print(as_text(rows))

@@ -5,11 +5,10 @@ MODEL.toml has the sections pendulum, sampling and, where wanted, sensor, conver
 with every key.
 """
 
-import argparse
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Flags
+from pendpipe.arguments import Arguments, Flags
 
 ARGUMENTS: Final[Flags] = {
     "model": {"metavar": "MODEL.toml", "help": "what to simulate"},
@@ -18,7 +17,7 @@ ARGUMENTS: Final[Flags] = {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Simulate and write."""
     from pendpipe import api
     from pendpipe.recording import write_plain

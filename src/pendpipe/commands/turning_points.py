@@ -5,14 +5,12 @@ the level, with standard deviations (independent of each other), and the level. 
 holds what they share: noise, the level's standard deviation, the spans that were cut.
 """
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Final
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
-from pendpipe.arguments import FILE, read_motion, shared
+from pendpipe.arguments import FILE, Arguments, read_motion, shared, tell
 from pendpipe.stages.refusal import run_stage
 
 ARGUMENTS: Final = (
@@ -22,7 +20,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Measure and write."""
     run_stage(
         "turning-points",
@@ -34,12 +32,12 @@ def run(arguments: argparse.Namespace) -> None:
     )
 
 
-def _measure(arguments: argparse.Namespace) -> None:
+def _measure(arguments: Arguments) -> None:
     recording, provenance = read_motion(arguments)
     points, _ = measure_recording(recording, arguments.file, provenance)
     write_turning_points(arguments.out, points)
     for note in points.notes:
-        print(f"{arguments.file}: {note}", file=sys.stderr)
+        tell(f"{arguments.file}: {note}")
     print(
         f"{arguments.out}: {len(points)} turning points, {points.apparent_frequency_hz:.6g} Hz,"
         f" {abs(points.angle_rad[0]):.4g} {points.unit} at first"

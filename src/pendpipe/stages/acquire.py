@@ -93,7 +93,7 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     InputError
         If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
     """
-    from pendpipe.acquisition.attempts import (
+    from pendpipe.acquisition.decode import (
         choose,
         decode_attempt,
         kept_in,

@@ -1,6 +1,5 @@
 """Compare a campaign's losses with Eq. 16, and sum the campaign up in numbers."""
 
-import argparse
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +17,7 @@ from pendpipe.analysis.compare import (
     tail_fits,
 )
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import load, shared
+from pendpipe.arguments import Arguments, load, shared
 from pendpipe.campaign.design import design_of
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
@@ -49,7 +48,7 @@ ARGUMENTS: Final = shared("--campaign", required=True) | {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Compare."""
     campaign = load(arguments.campaign)
     inputs = [

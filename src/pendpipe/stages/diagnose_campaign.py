@@ -6,11 +6,10 @@ effects. DIR is the campaign's folder of results; it gets campaign_diagnosis.jso
 goes to standard output as one paragraph.
 """
 
-import argparse
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.arguments import SHARED, load, print_answer, shared
+from pendpipe.arguments import SHARED, Arguments, load, print_answer, shared
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
@@ -39,7 +38,7 @@ ARGUMENTS: Final = (
 )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: Arguments) -> int:
     """Diagnose the campaign, write the result, and print the answer."""
     campaign = load(arguments.campaign)
     there = campaign.configuration.model_copy(update={"results": str(arguments.folder)})

@@ -1,6 +1,5 @@
 """Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
-import argparse
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -11,7 +10,7 @@ from pendpipe.analysis.separate import (
     fit_benchmark,
     separate,
 )
-from pendpipe.arguments import load, shared
+from pendpipe.arguments import Arguments, load, shared
 from pendpipe.campaign.fit import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
@@ -30,7 +29,7 @@ ARGUMENTS: Final = shared("--campaign", required=True) | {
 }
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Arguments) -> None:
     """Separate."""
     campaign = load(arguments.campaign)
     inputs = record_files(campaign, "fit.json", "calibration.json")
