@@ -187,6 +187,14 @@ def test_times_of_terminals_and_of_pandas(read_as: Callable[..., Recording], for
     same(read_as(head + "\n".join(lines) + "\n", "a.log"))
 
 
+def test_a_table_that_lies_on_its_side(read_as: Callable[..., Recording]) -> None:
+    lines = [
+        ",".join([name, *(f"{x:.4f}" for x in values)])
+        for name, values in (("t (s)", TIME), ("theta (rad)", ANGLE))
+    ]
+    same(read_as("\n".join(lines) + "\n"))
+
+
 # --- phones and microcontrollers -------------------------------------------------------------
 
 
@@ -468,6 +476,9 @@ TABLES = {
     + "".join(
         f"np.float64({t:.2f}), np.float64({x:.5f})\n" for t, x in zip(TIME, ANGLE, strict=True)
     ),
+    "all rows in one line": "data = ["
+    + ", ".join(f"({t:.2f}, {x:.5f})" for t, x in zip(TIME, ANGLE, strict=True))
+    + "]\n",
     "the brackets of MATLAB": "% run 3\nA = [\n"
     + "".join(f"  {t:.2f} {x:.5f};\n" for t, x in zip(TIME, ANGLE, strict=True))
     + "];\n",

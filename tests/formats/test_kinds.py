@@ -741,7 +741,10 @@ def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:
     assert recording.weak_guesses == ()
 
 
-def test_origin_excel_and_seismographs_write_tables_of_their_own(tmp_path: Path) -> None:
+def test_igor_origin_excel_and_seismographs_write_tables_of_their_own(tmp_path: Path) -> None:
+    column = "".join(f"\t{x:.6f}\n" for x in ANGLE)
+    scale = 'X SetScale/P x, 0, 0.0333333333, "s", phi; SetScale y, 0, 0, "rad", phi\n'
+    same(read_text(tmp_path, f"IGOR\nWAVES/D/O\tphi\nBEGIN\n{column}END\n{scale}", "a.itx"))
     head = "Long Name\tTime\tAngle\nUnits\ts\trad\nComments\t\tPohl's wheel\n"
     rows = "".join(
         f"{n}\t{t:.5f}\t{x:.6f}\n" for n, (t, x) in enumerate(zip(TIME, ANGLE, strict=True))
@@ -787,9 +790,16 @@ def test_symbols_above_the_units_are_no_units(tmp_path: Path) -> None:
     assert recording.unit == "rad"
 
 
-def test_attributes_of_elements(tmp_path: Path) -> None:
-    pairs = zip(TIME, ANGLE, strict=True)
-    same(read_text(tmp_path, "".join(f'<sample t="{t:.6f}" theta="{x:.6f}"/>\n' for t, x in pairs)))
+@pytest.mark.parametrize("form", ["yaml", "matlab", "xml"])
+def test_lists_by_name_and_attributes_of_elements(tmp_path: Path, form: str) -> None:
+    times, angles = ([f"{x:.6f}" for x in column] for column in (TIME, ANGLE))
+    pairs = zip(times, angles, strict=True)
+    content = {
+        "yaml": f"bob: brass\nt: [{', '.join(times)}]\ntheta: [{', '.join(angles)}]\n",
+        "matlab": f"t = [{' '.join(times)}];\ntheta = [{' '.join(angles)}];\n",
+        "xml": "".join(f'<sample t="{t}" theta="{x}"/>\n' for t, x in pairs),
+    }[form]
+    same(read_text(tmp_path, content))
 
 
 def test_the_name_of_a_section_is_no_unit(tmp_path: Path) -> None:

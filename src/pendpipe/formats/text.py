@@ -98,7 +98,7 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     for begins, own_form in _DIALECTS:
         if begins.match("\n".join(lines[:50])):
             lines = own_form(lines)
-    for form_of in (_bare_cells, _without_words, _without_split_decimals):
+    for form_of in (_in_rows, _bare_cells, _without_words, _without_split_decimals, _upright):
         lines = form_of(lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
@@ -190,6 +190,17 @@ def _of_tektronix(lines: list[str]) -> list[str]:
     return [names, *(row[4] if row is not None else "" for row in rows)]
 
 
+def _of_igor(lines: list[str]) -> list[str]:
+    """Make of Igor's text a table: names above, and the interval, which stands below."""
+    text = "\n".join(lines)
+    scale = re.search(r"SetScale */P +x *,[^,]*,([^,]*),", text)
+    unit = re.search(r'SetScale +[yd] *,[^,]*,[^,]*, *"([^"]+)"', text)
+    names = lines[1].partition(" ")[2] if " " in lines[1] else lines[1].partition("\t")[2]
+    names = re.sub(r"[,\s]+", "\t", names.strip()) + (f" ({unit[1]})" if unit else "")
+    rows = [line.strip() for line in lines[2:] if not re.match(r"\s*(BEGIN|END|X )", line)]
+    return [f"# dt = {scale[1].strip()} s" if scale else "#", names, *rows]
+
+
 def _of_origin(lines: list[str]) -> list[str]:
     """Leave of Origin's three lines of titles the names and the units."""
     head = [re.sub(r"^(Long Name|Units)(?=\t)", "", line) for line in lines[:6]]
@@ -206,6 +217,7 @@ _DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]],
     (re.compile("# Created by Octave"), _of_octave),
     (re.compile(r"(?:.*\n)*DEF="), _of_cassy),
     (re.compile('"?Record Length"?,'), _of_tektronix),
+    (re.compile(r"IGOR\s*\nWAVES"), _of_igor),
     (re.compile(r"Long Name\t"), _of_origin),
     (re.compile("TIMESERIES .*SLIST"), _of_seismograph),
 )
@@ -226,6 +238,14 @@ _CLOTHED: Final = (
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
 )
 """Errors (``± 0.1``); rows that end in ``;``."""
+
+
+def _in_rows(lines: list[str]) -> list[str]:
+    """Part a list that stands in one line."""
+    if len(lines) >= 5:
+        return lines
+    whole = re.sub(r"^(\w+\s*=\s*)?[\[{]\s*(?=[(\[{])", "", "\n".join(lines).lstrip())
+    return re.sub(r"(?<=[)\]}])\s*,\s*(?=[(\[{])", "\n", whole).split("\n")
 
 
 _TOKEN: Final = re.compile(
@@ -277,6 +297,23 @@ def _without_split_decimals(lines: list[str]) -> list[str]:
 
 
 _SPLIT: Final = re.compile(r"[+-]?\d+,\d+(,[+-]?\d+,\d+)+")
+
+
+def _upright(lines: list[str]) -> list[str]:
+    """Turn a table that lies on its side: a few long lines, each of one quantity."""
+    longest = max(lines[:_FEW_LINES], key=len).strip(";, ")
+    sign = next((sign for sign in "\t;," if sign in longest), " ")
+    some = (re.sub(_BRACKETS, rf"\1{sign}\2", line.strip()) for line in lines[:_FEW_LINES])
+    cells = [row.split(sign if sign != " " else None) for row in some if row]
+    cells = [row for row in cells if len(row) >= 5 * _FEW_LINES]
+    if len(lines) > _FEW_LINES or len(cells) < 2 or len(set(map(len, cells))) > 1:
+        return lines
+    return ["\t".join(column) for column in zip(*cells, strict=True)]
+
+
+_BRACKETS: Final = re.compile(r"^['\"]?(\w+)['\"]?\s*[:=]\s*\[([^\[\]]*)\]\s*[;,]?$")
+"""``t = [0 0.1 0.2];``: MATLAB, Python, YAML."""
+_FEW_LINES: Final = 12
 
 
 _NAMES: Final = {
