@@ -239,25 +239,19 @@ def _without_wild(values: FloatArray, turn: float) -> FloatArray:
     return np.where(np.abs(values - middle) > allowed, middle, values)
 
 
-def _crests(time: FloatArray, values: FloatArray, turns: IntArray) -> FloatArray:
+def _crests(values: FloatArray, turns: IntArray) -> FloatArray:
     """Values at the turning points, from the parabola through three samples about each.
 
     With 16 samples a cycle the largest sample lies up to 2 % below the turning point, and
     now more, now less: as if the amplitude were held up.
     """
-    found = values[turns].copy()
-    inner = np.flatnonzero((turns > 0) & (turns < len(values) - 1))
-    at = turns[inner]
-    left, right = time[at - 1] - time[at], time[at + 1] - time[at]
+    at = np.clip(turns, 1, len(values) - 2)
     before, after = values[at - 1] - values[at], values[at + 1] - values[at]
-    spread = left * right * (right - left)
-    slope = (right**2 * before - left**2 * after) / spread
-    bend = (left * after - right * before) / spread
-    rise = np.where(bend != 0.0, -(slope**2) / (4.0 * np.where(bend != 0.0, bend, 1.0)), 0.0)
+    bend = before + after
+    rise = -((after - before) ** 2) / (8.0 * np.where(bend != 0.0, bend, np.inf))
     # No farther than the parabola of a turning point between even samples can go.
-    limit = 0.125 * np.abs(before + after)
-    found[inner] += np.clip(rise, -limit, limit)
-    return found
+    limit = np.where(at == turns, 0.125 * np.abs(bend), 0.0)
+    return values[turns] + np.clip(rise, -limit, limit)
 
 
 def _median3(values: FloatArray) -> FloatArray:
@@ -279,7 +273,7 @@ def half_cycles(
     # The last one found is where the record happens to end, or any point of the final rest.
     ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())
     turns = turns[:-1]
-    extremes = _crests(time, smooth, turns)
+    extremes = _crests(smooth, turns)
     return HalfCycles(
         turn_time_s=time[turns],
         turn=extremes,
