@@ -228,7 +228,8 @@ def _without_wild(values: FloatArray, turn: float) -> FloatArray:
     Where a cycle has few samples, `turn` rad apart, the topmost stands out of the next by up
     to A (1 - cos turn), A the motion's amplitude: it is no wild reading.
     """
-    middle = _median3(values)
+    beside = np.lib.stride_tricks.sliding_window_view(np.pad(values, 1, mode="edge"), 3)
+    middle = np.median(beside, axis=1)
     # The range of each cycle; a cycle that is cut at its edges turns in one beside it.
     starts = np.arange(0, len(values), math.ceil(2.0 * math.pi / turn))
     swing = np.maximum.reduceat(middle, starts) - np.minimum.reduceat(middle, starts)
@@ -252,16 +253,6 @@ def _crests(values: FloatArray, turns: IntArray) -> FloatArray:
     # No farther than the parabola of a turning point between even samples can go.
     limit = np.where(at == turns, 0.125 * np.abs(bend), 0.0)
     return values[turns] + np.clip(rise, -limit, limit)
-
-
-def _median3(values: FloatArray) -> FloatArray:
-    """Median of each sample and its neighbours."""
-    if len(values) < 3:
-        return values.copy()
-    out = values.copy()
-    a, b, c = values[:-2], values[1:-1], values[2:]
-    out[1:-1] = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
-    return out
 
 
 def half_cycles(
