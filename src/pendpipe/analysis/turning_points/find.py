@@ -82,18 +82,9 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
     """Which extremes stand clear of gaps in the data; and which have one before them."""
     half_period = float(np.median(np.diff(time[index[: min(12, len(index))]])))
-    # In pieces: the differences of all times would be another record in memory.
-    piece = 1 << 20
-    gaps = np.concatenate(
-        [
-            np.flatnonzero(np.diff(time[i : i + piece + 1]) > 0.4 * half_period) + i
-            for i in range(0, len(time), piece)
-        ]
-    )
-    clear = (index > 1) & (index < len(time) - 2)
-    for gap in gaps:
-        # An extreme at the very edge of a gap is where the data end, not where they turn.
-        clear &= (index != gap) & (index != gap + 1)
+    gaps = np.flatnonzero(np.diff(time) > 0.4 * half_period)
+    # An extreme at the very edge of a gap is where the data end, not where they turn.
+    clear = (index > 1) & (index < len(time) - 2) & ~np.isin(index, [gaps, gaps + 1])
     before = np.searchsorted(gaps, index)
     return clear, (np.diff(before, prepend=before[:1]) > 0).astype(np.int64)
 
