@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.quantities import compact, with_error
 
@@ -106,33 +106,22 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
 
 
 def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
-    """The decrement at the large, the middle and the small amplitude; see `seen_loss`."""
-    index = np.arange(len(points))
-    return [
-        seen_loss(points.chosen(np.isin(index, part)))
-        for part in _windows(np.log(points.amplitude_rad))
-    ]
+    """The decrement about the large, the middle and the small amplitude; see `seen_loss`."""
+    logs, count = np.log(points.amplitude_rad), len(points)
+    index, found = np.arange(count), []
+    middle = int(np.argmin(np.abs(logs - 0.5 * (logs[0] + logs[-1]))))
+    for centre, reach in ((0, _FALL), (middle, 0.5 * _FALL), (count - 1, _FALL)):
+        # A third of them at most, from the centre on until the amplitude has fallen or risen.
+        order = np.argsort(np.abs(index - centre), kind="stable")[: max(_FEWEST, -(-count // 3))]
+        beyond = np.abs(logs[order] - logs[centre]) > reach
+        beyond[:_FEWEST] = False
+        window = order[np.cumsum(beyond) == 0]
+        found.append(seen_loss(points.chosen(np.isin(index, window))))
+    return found
 
 
 def _end_is_steep(amplitude: FloatArray) -> bool:
     return float(amplitude[-_FEWEST]) > math.exp(_STEEP) * float(amplitude[-1])
-
-
-def _windows(log_amplitude: FloatArray) -> list[IntArray]:
-    """Indices of the turning points about the large, the middle and the small amplitude."""
-    count = len(log_amplitude)
-    most = max(_FEWEST, -(-count // 3))
-    index = np.arange(count)
-    middle = int(np.argmin(np.abs(log_amplitude - 0.5 * (log_amplitude[0] + log_amplitude[-1]))))
-    windows = []
-    for centre in (0, middle, count - 1):
-        order = np.argsort(np.abs(index - centre), kind="stable")[:most]
-        reach = 0.5 * _FALL if centre == middle else _FALL
-        fallen = np.abs(log_amplitude[order] - log_amplitude[centre]) > reach
-        fallen[:_FEWEST] = False
-        last = int(np.argmax(fallen)) if fallen.any() else len(order)
-        windows.append(np.sort(order[:last]))
-    return windows
 
 
 def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
