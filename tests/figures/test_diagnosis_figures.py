@@ -13,6 +13,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.integrate import solve_ivp
 
+from pendpipe import diagnose
 from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.cycles import cycles
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES, diagnosis
@@ -67,6 +68,14 @@ def test_a_model_on_its_own_clock_has_its_own_amplitude_and_phase(content: Shown
     assert np.diff(own.phase) == pytest.approx(2.0 * math.pi, abs=1e-6)
     expected = np.interp(own.time_s, at.sampled.time_s, at.sampled.amplitude)
     assert own.amplitude == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_model_goes_on_smoothly_where_its_own_cycles_begin_late() -> None:
+    """Read beyond its first and last cycle, not held there: that takes from the end's loss."""
+    example = Path(__file__).parents[2] / "examples/string-pendulum.csv"
+    content = shown(diagnose(example))
+    loss = content.of_model(content.baseline).loss
+    assert np.max(np.abs(np.diff(loss, 2))) < 0.01 * np.mean(loss)
 
 
 def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:

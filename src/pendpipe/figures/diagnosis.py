@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter
+from scipy.interpolate import make_interp_spline
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
@@ -119,7 +120,10 @@ class Shown:
         """The same of a model's readings, between the same times."""
         found, ends = self._measured
         own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
-        return between(own.at(found.time_s), ends)
+        # Its first cycle may begin after the readings', and its last one end before theirs.
+        table = np.stack([np.log(own.amplitude), own.phase, own.sd], axis=1)
+        logs, phase, sd = make_interp_spline(own.time_s, table, k=1)(found.time_s).T
+        return between(Cycles(found.time_s, np.exp(logs), phase, sd), ends)
 
 
 def shown(outcome: Outcome) -> Shown:
