@@ -49,8 +49,6 @@ class SharedErrors:
         Of the sphere's radius and of its distance from the axis, m.
     relative_inertia
         Of all moments of inertia together (a mass, the local g), relative.
-    relative_viscosity, relative_density
-        Of the fluid's properties at its temperature, relative.
     temperature_k
         Of the water's temperature; it changes viscosity and density together.
     temperature_c
@@ -61,8 +59,6 @@ class SharedErrors:
     radius_m: float = 0.0
     distance_m: float = 0.0
     relative_inertia: float = 0.0
-    relative_viscosity: float = 0.0
-    relative_density: float = 0.0
     temperature_k: float = 0.0
     temperature_c: float = 20.0
 
@@ -164,8 +160,6 @@ def shifted(losses: Columns, errors: SharedErrors, sds: float) -> dict[str, Colu
         "moment of inertia": {
             "moment_of_inertia_kg_m2": inertia * (1.0 + sds * errors.relative_inertia)
         },
-        "viscosity": {"viscosity_pa_s": viscosity * (1.0 + sds * errors.relative_viscosity)},
-        "density": {"density_kg_per_m3": density * (1.0 + sds * errors.relative_density)},
         "temperature": {
             "viscosity_pa_s": viscosity * thinner,
             "density_kg_per_m3": density * lighter,

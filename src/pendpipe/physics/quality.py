@@ -59,63 +59,12 @@ def viscous_frequency_shift(quality_factor: Numbers) -> FloatArray:
 
 
 @equation
-def viscous_frequency_ratio(quality_factor: Numbers) -> FloatArray:
-    """Frequency of Eq. 3's free decay over the undamped one: ``sqrt(1 - 1/(4 Q^2))``.
-
-    NaN for Q below 1/2, where there is no oscillation.
-    """
-    squared = 1.0 - 0.25 / quality_factor**2
-    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
-
-
-@equation
 def hysteretic_frequency_shift(quality_factor: Numbers) -> FloatArray:
     """Relative frequency shift of Eq. 8's hysteretic term to leading order: ``-pi^2/(32 Q_h^2)``.
 
     According to the paper there is none; Eq. 8 itself has one, 2.5 times that of Eq. 6.
     """
     return -(np.pi**2) / (32.0 * quality_factor**2)
-
-
-@equation
-def hysteretic_frequency_ratio(quality_factor: Numbers) -> FloatArray:
-    """Frequency of Eq. 8's hysteretic decay over omega/(2 pi): ``sqrt(1 - (pi/(4 Q_h))^2)``.
-
-    In polar coordinates ``omega x = R cos(phi)``, ``x' = -R sin(phi)`` a half cycle of
-    ``x'' + h R sgn(x') + omega^2 x = 0``, with h = pi omega/(4 Q_h), is
-    ``phi' = omega - h cos(phi)``, so it takes ``pi/sqrt(omega^2 - h^2)``.
-    NaN for Q_h below pi/4, where there is no oscillation.
-    """
-    squared = 1.0 - (np.pi / (4.0 * quality_factor)) ** 2
-    return np.sqrt(np.where(squared >= 0.0, squared, np.nan))
-
-
-@equation
-def hysteretic_decrement_quality(quality_factor: Numbers) -> FloatArray:
-    """Q from the decrement of a half cycle of Eq. 8's hysteretic term.
-
-    ``Q = pi / (4 artanh(pi/(4 Q_h)))``, exactly: in the coordinates of
-    `hysteretic_frequency_ratio`, ``R' = -h R sin(phi)``, so R falls by
-    ``(omega - h)/(omega + h)``, and a half cycle's logarithmic decrement is pi/(2 Q).
-
-    Parameters
-    ----------
-    quality_factor
-        Q_h of Eq. 8, above pi/4.
-
-    Returns
-    -------
-    FloatArray
-        The quality factor that the turning points show, below Q_h by pi^2/(48 Q_h^2)
-        of it to leading order (0.2 % at Q_h = 10).
-    """
-    return np.pi / (4.0 * np.arctanh(np.pi / (4.0 * quality_factor)))
-
-
-@equation
-def hysteretic_quality_of_decrement(decrement_quality: Numbers) -> FloatArray:
-    """Q_h of Eq. 8 whose half cycles show the given Q: ``Q_h = pi/(4 tanh(pi/(4 Q)))``."""
-    return np.pi / (4.0 * np.tanh(np.pi / (4.0 * decrement_quality)))
 
 
 @equation
