@@ -69,12 +69,9 @@ def _imports(module: str) -> frozenset[str]:
     for start, unknown in _BY_NAME.findall(text):
         if not start:
             raise ValueError(f"{module} imports what has no name to follow")
-        found |= _modules_of(start.rpartition(".")[0]) if unknown else {start}
+        package = start.rpartition(".")[0]
+        modules = PACKAGE.joinpath(*package.split(".")[1:]).glob("*.py")
+        found |= {f"{package}.{path.stem}" for path in modules} if unknown else {start}
     # A package's own __init__ runs before its modules do.
     parents = {name.rpartition(".")[0] for name in found}
     return frozenset(name for name in found | parents if name.startswith(PACKAGE.name))
-
-
-def _modules_of(package: str) -> set[str]:
-    folder = PACKAGE.joinpath(*package.split(".")[1:])
-    return {f"{package}.{path.stem}" for path in folder.glob("*.py")}

@@ -703,11 +703,10 @@ def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Reco
         As printed on the box; the first one recorded by default.
     """
     recording = decode_recording(path, channel)
-    inside = path.is_relative_to(folder)
-    metadata = {"raw_file": (path.relative_to(folder) if inside else Path(path.name)).as_posix()}
-    if recording.notes:
-        metadata["notes"] = "; ".join(recording.notes)
-    return replace(recording, metadata={**recording.metadata, **metadata})
+    named = path.relative_to(folder) if path.is_relative_to(folder) else Path(path.name)
+    told = {"raw_file": named.as_posix(), "notes": "; ".join(recording.notes)}
+    kept = {key: text for key, text in told.items() if text}
+    return replace(recording, metadata={**recording.metadata, **kept})
 
 
 def mark_saved(path: Path, out: Path) -> None:

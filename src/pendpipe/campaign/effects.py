@@ -217,11 +217,10 @@ def campaign_effect(
     """Declare a campaign effect by the function through which it enters."""
 
     def declare(function: Acts) -> CampaignEffect:
-        effect = CampaignEffect(
+        CATALOGUE[identifier] = CampaignEffect(
             identifier, name, equation, parameter, expected, on, function, shapes
         )
-        CATALOGUE[identifier] = effect
-        return effect
+        return CATALOGUE[identifier]
 
     return declare
 

@@ -9,7 +9,6 @@ Several FILEs are recordings of one pendulum: physics shared, start and noise ea
 (docs/several.md).
 """
 
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +23,7 @@ from pendpipe.arguments import (
     print_json,
     read_motion,
     shared,
+    tell,
 )
 from pendpipe.diagnosis import Outcome, diagnose_decay, diagnose_recording
 from pendpipe.diagnosis.result import FILE_NAME, not_analysable
@@ -144,7 +144,7 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     if arguments.out is not None:
         content = _write(arguments, outcome)
     for warning in content["warnings"]:
-        print(f"{arguments.file}: {warning}", file=sys.stderr)
+        tell(f"{arguments.file}: {warning}")
     print_answer(arguments, content, content["statement"])
     return FOUND if arguments.fail_on == content["verdict"] else 0
 
@@ -166,7 +166,7 @@ def _diagnose_several(arguments: Arguments) -> int:
     names = distinct_names(arguments.files)
     for number, (file, name) in enumerate(zip(arguments.files, names, strict=True)):
         if Path(file).with_name("refused.json").exists():
-            print(f"{file}: refused, and left out", file=sys.stderr)
+            tell(f"{file}: refused, and left out")
             continue
         arguments.file = file
         arguments.calibration = given[number % len(given)] if given else None
@@ -245,10 +245,10 @@ def _not_analysable(arguments: Arguments, reason: str, provenance: dict[str, Any
         write_json(arguments.out / FILE_NAME, content)
     if arguments.json:
         print_json(content)
-    print(f"pendpipe: {reason}", file=sys.stderr)
+    tell(f"pendpipe: {reason}")
     return 2 if arguments.refused is None else 0
 
 
 def _print_progress(line: str) -> None:
     """Progress goes to standard error."""
-    print(f"  {line}", file=sys.stderr, flush=True)
+    tell(f"  {line}")

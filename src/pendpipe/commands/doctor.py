@@ -131,16 +131,28 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
         home = results / inside[0] if inside else results
         ours = path.resolve() in listed or path.name.lower() == "readme.md"
         if TEMPORARY.fullmatch(path.name):
-            problem = "a process was killed while it wrote this"
-            yield Finding("temporary", str(path), problem, "delete it when no run is alive")
+            yield Finding(
+                "temporary",
+                str(path),
+                "a process was killed while it wrote this",
+                "delete it when no run is alive",
+            )
         elif SET_ASIDE in path.name:
-            problem = "a damaged result, kept when it was made again"
-            yield Finding("set-aside", str(path), problem, "delete it when nobody needs it")
+            yield Finding(
+                "set-aside",
+                str(path),
+                "a damaged result, kept when it was made again",
+                "delete it when nobody needs it",
+            )
         elif path.suffix == ".raw":
             yield from _undecoded(path)
         elif not set(inside) & set(_NO_RESULTS) and not ours and (home / FOLDER).is_dir():
-            problem = "no stage has written this"
-            yield Finding("orphaned", str(path), problem, "move it elsewhere, or delete it")
+            yield Finding(
+                "orphaned",
+                str(path),
+                "no stage has written this",
+                "move it elsewhere, or delete it",
+            )
 
 
 def _undecoded(raw: Path) -> Iterator[Finding]:
@@ -173,8 +185,12 @@ def _of_snakemake(folder: Path) -> Iterator[Finding]:
         yield Finding("locked", str(folder / "locks"), problem, safe)
     unfinished = sum(1 for path in folder.glob("incomplete/**/*") if path.is_file())
     if unfinished:
-        problem = f"{unfinished} results were being written when a run was killed"
-        yield Finding("incomplete", str(folder / "incomplete"), problem, _RUN)
+        yield Finding(
+            "incomplete",
+            str(folder / "incomplete"),
+            f"{unfinished} results were being written when a run was killed",
+            _RUN,
+        )
 
 
 def _alive(project: Path) -> int | None:

@@ -824,7 +824,10 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     if missing := layout.width - len(cells):
         names, units = [""] * missing + names, [""] * missing + units
         notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the last",)
-    return Header(tuple(_unique(names)), tuple(units), interval, metadata, notes)
+    # Names that stand more than once are numbered: Volt, Volt (2).
+    before = ((name, names[:place].count(name)) for place, name in enumerate(names))
+    unique = tuple(f"{name} ({n + 1})" if n and name else name for name, n in before)
+    return Header(unique, tuple(units), interval, metadata, notes)
 
 
 def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
@@ -967,9 +970,3 @@ def _metadata(lines: Sequence[str]) -> dict[str, str]:
     parts = (line.strip().lstrip("#%/! ").partition(":") for line in lines[:200])
     told = {k.strip(): v.strip() for k, _, v in parts if v.strip() and 0 < len(k) <= 40}
     return {"header": " ".join(lines)[:4000]} | told
-
-
-def _unique(names: Sequence[str]) -> list[str]:
-    """Number names that stand more than once (``Volt``, ``Volt (2)``)."""
-    before = ((name, list(names[:place]).count(name)) for place, name in enumerate(names))
-    return [f"{name} ({n + 1})" if n and name else name for name, n in before]

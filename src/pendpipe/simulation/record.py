@@ -95,11 +95,18 @@ def simulated_record(campaign: Campaign, record: Record) -> SimulatedRecord:
     assert truth is not None
     plan = truth.release.get(record.record) or truth.release[record.fluid]
     model = equation_of_motion(campaign, record)
-    duration = _duration(model, truth.sensor, truth.device, plan.angle_rad)
-    if plan.duration_s is not None:
-        duration = min(duration, plan.duration_s)
-    # The first sample comes at any phase: the release lies up to a period before it.
     period = 2.0 * np.pi / model.angular_frequency
+    # As long as the amplitude stays above the noise, eight periods at least.
+    noise = float(np.hypot(truth.sensor.noise_volts, STEP_V[truth.device.kind] / np.sqrt(12.0)))
+    lasts = physics.time_at(
+        noise / truth.sensor.volts_per_radian,
+        plan.angle_rad,
+        model.quadratic,
+        model.hysteretic + model.viscous,
+        model.coulomb,
+    )
+    duration = min(max(float(lasts), FEWEST_PERIODS * period), plan.duration_s or np.inf)
+    # The first sample comes at any phase: the release lies up to a period before it.
     before = float(generator(campaign, record.record + " release").uniform(0.0, period))
     return SimulatedRecord(
         model=model,
@@ -109,19 +116,6 @@ def simulated_record(campaign: Campaign, record: Record) -> SimulatedRecord:
         rate_hz=plan.samples / duration,
         duration_s=duration,
     )
-
-
-def _duration(model: Eq8, sensor: Sensor, device: Device, angle_rad: float) -> float:
-    """How long the amplitude stays above the noise, eight periods at least."""
-    noise = float(np.hypot(sensor.noise_volts, STEP_V[device.kind] / np.sqrt(12.0)))
-    lasts = physics.time_at(
-        noise / sensor.volts_per_radian,
-        angle_rad,
-        model.quadratic,
-        model.hysteretic + model.viscous,
-        model.coulomb,
-    )
-    return max(float(lasts), FEWEST_PERIODS * 2.0 * np.pi / model.angular_frequency)
 
 
 class SensorVolts:
