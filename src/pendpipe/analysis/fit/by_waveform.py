@@ -426,12 +426,10 @@ def _result(
     fixed: Mapping[str, float],
 ) -> FitResult:
     """Judge what the fit has left; return the result."""
-    # Of where the last step began, if that was so small that it was accepted unverified.
-    residual = fitted.problem.residual(fitted.minimum.at)
+    residual = fitted.problem.residual(fitted.minimum.value)
     dof = len(residual) - 8 + len(fitted.held)
     noise, slow = judge_noise(samples, points, residual, fitted.problem)
-    gained = fitted.minimum.gained * fitted.problem.noise_rms**2
-    rms = math.sqrt(max(float(residual @ residual) - gained, 0.0) / len(residual))
+    rms = math.sqrt(float(residual @ residual) / len(residual))
     chi2_per_dof = rms**2 * len(residual) / dof / noise**2
     # What rounding leaves is slow by nature; its likelihood knows that already.
     random = fitted.problem.step == 0.0

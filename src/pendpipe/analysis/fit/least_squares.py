@@ -152,10 +152,6 @@ class Minimum(NamedTuple):
     value: FloatArray
     quadratic: Quadratic
     converged: bool
-    at: FloatArray
-    """Where chi^2 was evaluated: `value`, or where the last, unverified step began."""
-    gained: float = 0.0
-    """By what that step lowers chi^2."""
 
 
 def minimise(
@@ -197,18 +193,18 @@ def minimise(
             predict_remaining is not None
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
-            return Minimum(trial, moved(now, step), True, value, promised)
+            return Minimum(trial, moved(now, step), True)
         ways = (bounds.clip(value + part * step) for part in FRACTIONS)
         tried = ((way, evaluate(way)) for way in ways)
         enough = now.chi2 + 0.1 * tolerance
         found = next((there for there in tried if there[1].chi2 <= enough), None)
         if found is None:
-            return Minimum(value, now, False, value)
+            return Minimum(value, now, False)
         settled = now.chi2 - found[1].chi2 < 1e-12 * now.chi2 and promised < 1e-6 * now.chi2
         value, now = found
         if settled:
-            return Minimum(value, now, True, value)
-    return Minimum(value, now, False, value)
+            return Minimum(value, now, True)
+    return Minimum(value, now, False)
 
 
 def moved(quadratic: Quadratic, step: FloatArray) -> Quadratic:
