@@ -83,7 +83,6 @@ def _added(outcome: Outcome, base: Fit, name: str) -> list[Fit]:
         lead,
         held=outcome.beginning.held,
         phase_lost=is_gross(base, found.data),
-        origin=outcome.beginning.value,
     )
     return [rival.fit for rival in rivals]
 

@@ -35,7 +35,7 @@ def blamed(error: float) -> tuple[Forensics, State]:
     data = data.masked(mask)
     noise = white_noise(data, NOISE_RAD)
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = State(fit, data, noise, [], TRUTH, fit.value)
+    state = State(fit, data, noise, [], fit.value)
     state.faults = [Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask)]
     samples = prepare(Recording(TIME_S, readings, "angle_rad"), "the test")
     return Forensics(samples, LEVEL), state

@@ -345,7 +345,7 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     monkeypatch.setattr(
         "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [late]
     )
-    state = State(fit, data, noise, [], fit.value, fit.value)
+    state = State(fit, data, noise, [], fit.value)
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
     Forensics(samples, 0.01).before(state, silent)
     assert np.array_equal(state.data.time_s, data.time_s)

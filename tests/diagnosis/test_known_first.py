@@ -38,7 +38,7 @@ def searched(readings: FloatArray) -> tuple[Beginning, State]:
     begun = beginning_of(record)
     noise = first_noise(begun)
     fit = refine(begun.model, begun.data, noise, begun.value, held=begun.held)
-    state = State(fit, begun.data, noise, list(begun.held), begun.value, fit.value)
+    state = State(fit, begun.data, noise, list(begun.held), fit.value)
     forensics = Forensics(prepare(record, "the test"), 0.01)
     known_law_first(begun, state, Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent))
     return begun, state

@@ -64,7 +64,7 @@ def state_with(readings: FloatArray, *names: str) -> State:
     ]
     start = np.concatenate([bare.value, *shapes])
     fit = refine(Model(TIME_S, INTERVAL_S, effects), data, noise, start)
-    state = State(fit, data, noise, [], TRUTH, bare.value)
+    state = State(fit, data, noise, [], bare.value)
     for effect in effects:
         gain = bare.chi2 - fit.chi2
         lead = Lead(effect, (), gain, 1e-12)
@@ -221,7 +221,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     bent = 4e-4 * np.tanh(angle / 0.02)
     data, noise = prepared(other_engine(TRUTH) + bent + white(6))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = State(fit, data, noise, [], TRUTH, fit.value)
+    state = State(fit, data, noise, [], fit.value)
     before = remainder_of(fit, data, noise)
     assert describe(state, 1e-9, task_for(recording(data.values, 6)))
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
@@ -231,7 +231,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
 
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
-    state = State(fit, data, noise, [], TRUTH, fit.value)
+    state = State(fit, data, noise, [], fit.value)
     assert not describe(state, 0.1, task_for(recording(data.values, 6)))
     assert state.fit is fit
 
@@ -247,7 +247,7 @@ def rivals_after(readings: FloatArray, seed: int) -> list[Rival]:
     begun = beginning_of(record)
     noise = first_noise(begun)
     fit = refine(begun.model, begun.data, noise, begun.value)
-    state = State(fit, begun.data, noise, [], begun.value, fit.value)
+    state = State(fit, begun.data, noise, [], fit.value)
     task = task_for(record)
     effects: list[Effect] = applicable(CATALOGUE, fit, "eq8", "rad")
     state.now = detect(prepare(fit, begun.data, noise, effects), fit, seed=1)

@@ -82,7 +82,6 @@ def test_an_effect_whose_score_a_bound_halves_is_refitted(
         _detection({"damping-drift": (100.0, (40.0,)), "power-law-damping": (50.0, (1.5, 0.0))}),
         held=(),
         phase_lost=False,
-        origin=base.value,
     )
     asked = {rival.identifier for rival in rivals}
     assert ("power-law-damping" in asked) == at_a_bound

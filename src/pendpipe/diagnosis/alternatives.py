@@ -126,9 +126,7 @@ def reconsider_red_noise(
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
     if other.p_value > level * CATALOGUE_SHARE:
         return
-    rivals = refit_leads(
-        fit, data, noise, other, held=state.held, phase_lost=False, most=3, origin=state.origin
-    )
+    rivals = refit_leads(fit, data, noise, other, held=state.held, phase_lost=False, most=3)
     if not rivals:
         return
     extended, data, noise = settled(rivals[0].fit, data, noise, state.held)

@@ -302,5 +302,4 @@ def _named(state: State, most: int) -> list[Rival]:
         held=state.held,
         phase_lost=False,
         most=most,
-        origin=state.origin,
     )

@@ -15,7 +15,7 @@ from pendpipe.diagnosis.detect import Detection, Lead
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, equivalent, ranked
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, better, fit_in_growing_window, pulled
+from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import finer_shape
 from pendpipe.dynamics.any_law import NoMotionError
@@ -42,8 +42,6 @@ _SCORE_MARGIN_AT_BOUND: Final = 0.6
 """The same where a value at its bound lowers the scores."""
 LOST_PHASE_RAD: Final = 1.0
 """Phase error in rad from which a model has lost the motion."""
-_FROM_FIRST_CYCLES: Final = 4
-"""Leads that are then refitted from the first cycles on."""
 
 
 def refit_leads(
@@ -54,17 +52,12 @@ def refit_leads(
     *,
     held: Sequence[int],
     phase_lost: bool,
-    origin: FloatArray,
     most: int = _MOST_REFITTED,
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
     leads = _worth_refitting(detection, phase_lost, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, phase_lost=phase_lost):
-        lost = base.max_phase_error_rad > LOST_PHASE_RAD and len(fits) < _FROM_FIRST_CYCLES
-        # With the baseline's friction the motion may stop before the end.
-        if lost or (phase_lost and fit is None):
-            fit = better(fit, _from_first_cycles(base, data, noise, lead, held, origin))
         if fit is not None and believable(base, fit, lead.effect):
             fits.append((lead, fit))
     if not fits:
@@ -125,20 +118,6 @@ def _rank(lead: Lead) -> float:
     """Return what a score is worth with the noise as it is, as the refits are ranked later."""
     local = float(chdtrc(max(lead.effect.sizes, 1), max(lead.score, 0.0)))
     return equivalent(local, lead.score) + lead.effect.prior
-
-
-def _from_first_cycles(
-    base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], origin: FloatArray
-) -> Fit | None:
-    """Refit in a progressive window where the base has lost the phase."""
-    effect = lead.effect
-    if isinstance(effect, ReleasedParameter) or effect.kind == "unnamed":
-        return None
-    sizes = np.ones(1) if effect.parameter_free else np.zeros(effect.sizes)
-    known = base.value[len(origin) :]
-    start = np.concatenate([origin, known, sizes, np.asarray(lead.shape, dtype=np.float64)])
-    model = base.model.adding(effect)
-    return fit_in_growing_window(model, data, noise, start, held=held)
 
 
 def side_by_side(

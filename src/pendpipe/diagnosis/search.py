@@ -131,7 +131,7 @@ def search(
     progress(f"fitting {BASELINES.get(baseline, baseline)} to {data.used} readings")
     white = first_noise(beginning)
     fit = refine(beginning.model, data, white, beginning.value, held=held)
-    state = State(fit, data, white, held, beginning.value, fit.value)
+    state = State(fit, data, white, held, fit.value)
     state.settle(fit)
     forensics = Forensics(samples, level)
     task = Task(catalogue, released, baseline, level, seed, forensics, progress)
@@ -249,7 +249,6 @@ def _add_one(state: State, task: Task) -> bool:
         found,
         held=state.held,
         phase_lost=loses_phase(state.fit),
-        origin=state.origin,
     )
     if rivals:
         rivals = prefer_parameters(state, rivals)

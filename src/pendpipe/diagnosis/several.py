@@ -326,7 +326,7 @@ def search_together(
         for number in range(len(searches) == 2, len(searches))
     ]
     task = Task(CATALOGUE, differing, baseline, level, seed, _TestedAlone(), progress)
-    state = State(fit, data, noise, held, fit.value, fit.value)
+    state = State(fit, data, noise, held, fit.value)
     state.settle(fit)
     _known_first(state, task, searches)
     return swap_in_likelier(grown(state, task, beginning), beginning, progress)

@@ -77,8 +77,6 @@ class State:
         The present model, the readings (masked, with corrected times), and their noise.
     held
         Indices of values that are not fitted.
-    origin
-        The start values of the search.
     bare
         The values of the baseline fitted alone.
     """
@@ -87,7 +85,6 @@ class State:
     data: Data
     noise: Noise
     held: list[int]
-    origin: FloatArray
     bare: FloatArray
     steps: list[Step] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)

@@ -30,8 +30,6 @@ from pendpipe.estimate import Estimate
 
 _FEWEST_AT_END: Final = 2
 """Readings exactly at the end of the range that make a flat top."""
-_SHARED_ERROR: Final = 0.1
-"""Error in steps of the true angle that a window's readings share if rounding is coarse."""
 _ROUNDING_RMS: Final = 0.5
 """Rms in steps up to which errors may be correlated by rounding alone."""
 _MASK_BELOW: Final = 1e-2
@@ -103,20 +101,9 @@ def _end(raw: Raw, step: float, side: Side, memory: float) -> End:
     before = noise_before_rounding(local, step) if step else local.rms
     spread = np.sqrt(before**2 + local.rms**2 * np.maximum(local.leverage, 0.0))
     near = raw.used & (true > limit - 6.0 * local.rms - 3.0 * step)
-    # Of the true angle, due to rounding: common to the readings of one code.
-    steps = min((before / step) ** 2, 30.0) if step else 30.0
-    common = _SHARED_ERROR * step * math.exp(-2.0 * math.pi**2 * steps)
-    p_value = _largest(limit + 0.5 * step - true[near], spread[near], common)
+    p_value = float(np.exp(np.sum(log_ndtr((limit + 0.5 * step - true[near]) / spread[near]))))
     beyond = np.maximum(true[at] - limit - 0.5 * step, 0.0) / spread[at]
     return End(side, sign * limit, p_value, float(beyond @ beyond))
-
-
-def _largest(room: FloatArray, spread: FloatArray, common: float) -> float:
-    """Probability that no reading goes beyond, averaged over the common error."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(9)
-    shifted = (room[:, None] + common * nodes) / spread[:, None]
-    chance = np.exp(np.sum(log_ndtr(shifted), axis=0))
-    return float(min(chance @ weights / weights.sum(), 1.0))
 
 
 def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tuple[int, BoolArray]:

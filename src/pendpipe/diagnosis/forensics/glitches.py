@@ -26,8 +26,6 @@ from pendpipe.estimate import Estimate
 _GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
 _CERTAIN_SD: Final = 4.5
 _LARGE_SD: Final = 3.0
-_SHARED_ERROR: Final = 0.35
-"""Largest part of an error that its neighbours may share if it belongs to a single reading."""
 _ROUNDS: Final = 4
 _NEIGHBOURS: Final = 4
 _MOST_ROUNDS: Final = 20
@@ -41,7 +39,7 @@ _EXPECTED_BY_CHANCE: Final = 0.05
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test for readings that neither normal nor heavy-tailed noise explains.
 
-    Each error is compared with its window and its neighbours. For k = 1, 2, 3, 5, 10 ... the
+    Each error is compared with its window. For k = 1, 2, 3, 5, 10 ... the
     tail of the noise (Student's distribution, averaged over the posterior of nu) is fitted with
     the k largest errors censored, and the k-th largest of n is tested:
 
@@ -61,7 +59,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
         used = used.copy()
         used[:TAPS] = used[-TAPS:] = False
-    error = own_error(local)
+    error = np.abs(local.scaled)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
     ordered = np.sort(error[used])
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
@@ -80,7 +78,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         if not noise.coloured:
             break
         local = _errors(fit, noise, residual, (data.weight == 0.0) | mask)
-        error = own_error(local)
+        error = np.abs(local.scaled)
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
         mask &= ~ends
@@ -156,17 +154,6 @@ def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> Loc
     """Return each reading's error, whitened; a filter spreads it where the noise is coloured."""
     white = whitened_in_time(np.where(out, 0.0, residual), noise)
     return local_residual(fit.at.sampled.phase, white, ~out)
-
-
-def own_error(local: Local) -> FloatArray:
-    """Return |error| in standard deviations, less the part that neighbours share."""
-    scaled = local.scaled
-    padded = np.pad(scaled, 1, mode="reflect")
-    around = 0.5 * (padded[:-2] + padded[2:])
-    # Only for large errors: the distribution of the others must not change.
-    shared = (np.abs(around) > _SHARED_ERROR * np.abs(scaled)) & (np.abs(scaled) > _LARGE_SD)
-    alone = np.abs(scaled - around) * math.sqrt(2.0 / 3.0)
-    return np.asarray(np.where(shared, np.minimum(np.abs(scaled), alone), np.abs(scaled)))
 
 
 def _about(error: FloatArray, neighbours: int) -> FloatArray:
