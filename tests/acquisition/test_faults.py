@@ -131,6 +131,21 @@ def test_what_breaks_the_frame_mark_costs_one_scan(
     assert error_steps(recording, late_s=1 / RATE_HZ) <= 0.51
 
 
+def test_a_lost_byte_of_the_unmarked_family_is_told_by_the_signal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No mark tells it; the words are cut across from there on, and are put into step again."""
+    recording = recorded_in_steps(
+        "di2108", slow, Fault("drop", at=1001), monkeypatch, rate_hz=RATE_HZ, duration_s=15.0
+    )
+    assert any("bytes slipped at 1 places" in note for note in recording.notes)
+    assert recording.quality is not None
+    gap = np.flatnonzero(recording.quality == MISSING)
+    assert 1 <= len(gap) <= 7
+    assert abs(gap - 500).max() <= 7
+    assert error_steps(recording) <= 0.51
+
+
 def arrivals(kind: str, lost: int) -> bytes:
     """A raw recording of 150 s in which scans are lost after 40 s; delays of 2 ms and more."""
     device, random = DEVICES[kind](), np.random.default_rng(6)

@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from pendpipe.acquisition.drivers import find_driver
-from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss
+from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss, WordDecoder
 from pendpipe.acquisition.raw import (
     Hole,
     NothingRecordedError,
@@ -34,6 +34,7 @@ from pendpipe.acquisition.raw import (
     is_being_recorded,
     read_raw,
 )
+from pendpipe.acquisition.slips import find_slips
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
@@ -314,6 +315,9 @@ def _notes(
     met = [loss for loss in losses if loss.after_scan and not loss.reason]
     silent = [loss for loss in losses if loss.reason == "clock"]
     damaged = [loss for loss in losses if loss.reason == "damage"]
+    slipped = [loss.reason for loss in losses if loss.reason.startswith("slip")]
+    unsure = len(slipped) - slipped.count("slip")
+    doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
     discarded = sum(loss.discarded_bytes for loss in met)
     pieces = ", ".join(f"{len(segment.counts)} scans" for segment in segments)
     stopped, asked_s = raw.event("stopped"), raw.header.get("duration_s")
@@ -322,6 +326,10 @@ def _notes(
     notes = (
         (met, f"{_lost(met)} scans lost at {len(met)} places ({discarded} bytes out of step)"),
         (silent, f"{_lost(silent)} scans lost at {len(silent)} places, by the recorder's clock"),
+        (
+            slipped,
+            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}",
+        ),
         *(
             (loss.reason.startswith("stop"), f"the device's buffer overflowed ('{loss.reason}')")
             for loss in losses
@@ -417,29 +425,60 @@ def _decode(
 def _scans_of(
     data: bytes, holes: Sequence[Hole], decoder: Decoder
 ) -> tuple[AnyArray, tuple[Loss, ...]]:
-    """Decode a stream, put into step again behind every hole."""
+    """Decode a stream, put into step again behind every hole and, without marks, every slip."""
     size = decoder.bytes_per_scan
     parts: list[AnyArray] = []
     losses: list[Loss] = []
     begin = scans = 0
-    for hole in (*holes, None):
-        end = len(data) if hole is None else hole.at_byte - (hole.at_byte - begin) % size
-        fed = decoder.feed(data[begin:end])
+    marked = not isinstance(decoder, WordDecoder)
+    for cut in (*_cuts(data, holes, size, marked=marked), None):
+        fed = decoder.feed(data[begin : cut.last_byte if cut else len(data)])
         # (What might be the beginning of a stop code is held back.)
         ended = decoder.finish()
-        # A decoder counts its scans on over a hole.
+        # A decoder counts its scans on over a cut.
         parts += [fed.counts, ended.counts]
-        scans += len(fed) + len(ended)
-        losses += fed.losses
         # A decoder of words tells of a stop code whenever it ends: once is enough.
-        if hole is None or not decoder.ended:
-            losses += ended.losses
-        if hole is not None:
-            begin = min(hole.at_byte + -(hole.at_byte - end + hole.bytes_missing) % size, len(data))
-            lost = -(-(begin - end + hole.bytes_missing) // size)
-            losses.append(Loss(scans, begin - end, lost, reason="damage"))
+        losses += [*fed.losses, *ended.losses] if marked or not cut else []
+        scans += len(fed) + len(ended)
+        if not cut:
+            break
+        thrown = cut.next_byte - cut.last_byte
+        lost = -(-(thrown + cut.bytes_missing) // size)
+        losses.append(Loss(scans, thrown, lost, suspect_before=cut.suspect, reason=cut.reason))
+        begin = cut.next_byte
     counts = [part for part in parts if len(part)] or parts[:1]
     return np.concatenate(counts) if len(counts) > 1 else counts[0], tuple(losses)
+
+
+class _Cut(NamedTuple):
+    """Where a stream is taken apart: what is between the two bytes is thrown away."""
+
+    last_byte: int
+    next_byte: int
+    reason: str
+    bytes_missing: int = 0
+    suspect: bool = False
+
+
+def _cuts(data: bytes, holes: Sequence[Hole], size: int, *, marked: bool) -> list[_Cut]:
+    """Find the places where a stream of scans of so many bytes is out of step."""
+    cuts: list[_Cut] = []
+    begin = 0
+    for hole in (*holes, None):
+        end = len(data) if hole is None else hole.at_byte
+        if not marked:
+            for slip in find_slips(data[begin:end], size // 2):
+                reason = "slip" if slip.sure else "slip, channels unsure"
+                last, following = begin + slip.last_byte, begin + slip.next_byte
+                cuts.append(_Cut(last, following, reason, suspect=True))
+            begin = cuts[-1].next_byte if cuts else begin
+        if hole is None:
+            break
+        last = end - (end - begin) % size
+        following = end + -(end - last + hole.bytes_missing) % size
+        cuts.append(_Cut(last, min(following, len(data)), "damage", hole.bytes_missing))
+        begin = cuts[-1].next_byte
+    return cuts
 
 
 def _scans_by(
