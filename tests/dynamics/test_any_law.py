@@ -222,7 +222,7 @@ def test_sin_x_is_read_between_the_nodes_as_exactly_as_it_is_solved(amplitude: f
         Model(time_s, 0.013, effects, order=order).evaluate(value).reading
         for order in (order_for(amplitude, "rad"), 64)
     )
-    np.testing.assert_allclose(few, many, rtol=0.0, atol=5e-6 * amplitude)
+    np.testing.assert_allclose(few, many, rtol=0.0, atol=3e-7 * amplitude)
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 1.5, 2.3])

@@ -206,16 +206,18 @@ def _before_the_stop(data: Data, model: Model, value: FloatArray) -> tuple[Data,
             model = model.at_times(data.time_s)
 
 
+_NODES: Final = ((0.4, 14), (0.8, 16), (1.6, 20), (2.4, 28))
+"""Nodes up to an amplitude, with which sin x is solved to 3e-7 of the motion."""
+
+
 def order_for(amplitude: float, unit: str) -> int:
     """Return the number of nodes in a half cycle: more where sin x differs more from x.
 
     `amplitude` is that of the angle, rad, or of the angular velocity over omega.
     """
-    if unit not in ("rad", "rad/s") or amplitude < 0.8:
-        return 14
-    if amplitude < 1.6:
-        return 16
-    return 24 if amplitude < 2.4 else 48
+    if unit not in ("rad", "rad/s"):
+        return _NODES[0][1]
+    return next((nodes for up_to, nodes in _NODES if amplitude < up_to), 48)
 
 
 def _held(
