@@ -17,7 +17,7 @@ from pendpipe.diagnosis.scores import (
     Bank,
     build_bank,
     local_p_values,
-    products_and_lengths,
+    scores_and_lengths,
     tangent_basis,
 )
 from pendpipe.diagnosis.task import applicable
@@ -85,7 +85,7 @@ def test_an_effect_scores_its_size_times_its_columns_length(name: str) -> None:
     rows, worth = bank.rows()[name], WORTH[name]
     row = rows[len(rows) // 2]
     candidate = bank.candidates[row]
-    _, (length,) = products_and_lengths(fit, noise, candidate.effect, [candidate.shape])
+    _, (length,) = scores_and_lengths(fit, noise, candidate.effect, [candidate.shape])
     size = worth / length
     truth = np.concatenate([TRUTH, [size], candidate.shape])
     readings = fit.model.adding(candidate.effect).reading(truth)

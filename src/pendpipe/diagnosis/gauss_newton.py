@@ -62,6 +62,21 @@ class Evaluation:
         """The Jacobian."""
         return _jacobian(self.model, self.noise, self.value, self.at)
 
+    @cached_property
+    def factored(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """QR factors of the Jacobian with columns of unit length, and their lengths.
+
+        Raises
+        ------
+        NoMotionError
+            If a derivative is not finite.
+        """
+        if not np.all(np.isfinite(self.columns)):
+            raise NoMotionError("its derivatives are not finite")
+        scale = np.linalg.norm(self.columns, axis=0)
+        scale[scale == 0.0] = 1.0
+        return *np.linalg.qr(self.columns / scale), scale
+
 
 class GaussNewton:
     """Gauss-Newton steps of one model on one set of readings."""
@@ -72,7 +87,6 @@ class GaussNewton:
         self._shapes = np.array(_shapes(model), dtype=np.int64)
         # A shape that must be positive is a scale: a speed, a time or a length.
         self._scales = self._shapes[self._low[self._shapes] > 0.0]
-        self._factored: _Factored | None = None
 
     def without_places(self, free: IntArray) -> IntArray:
         """Return the values without those along which chi^2 has many minima.
@@ -96,9 +110,9 @@ class GaussNewton:
         here: Evaluation,
         free: IntArray,
         radius: float = math.inf,
-        columns: FloatArray | None = None,
+        origin: Evaluation | None = None,
     ) -> tuple[FloatArray, float]:
-        """Return the best step of a linear model with these `columns`, and its length.
+        """Return the best step of a linear model, with the derivatives at `origin` or here.
 
         The length, at most `radius`, is that of the changes that each value makes by itself in the
         whitened readings (More 1978): values that compensate each other have long steps.
@@ -109,14 +123,7 @@ class GaussNewton:
         scales = self._scales
         low[scales] = np.maximum(low[scales], here.value[scales] / _LARGEST_RATIO)
         high[scales] = np.minimum(high[scales], here.value[scales] * _LARGEST_RATIO)
-        columns = here.columns if columns is None else columns
-        if self._factored is None or not self._factored.is_of(columns, free):
-            self._factored = _Factored.of(columns, free)
-        return _step(self._factored, here.residual, here.value, low, high, radius)
-
-    def forget(self) -> None:
-        """Release the factored columns."""
-        self._factored = None
+        return _step(origin or here, free, here.residual, here.value, low, high, radius)
 
     def moved(self, here: Evaluation, step: FloatArray) -> Evaluation | None:
         """Evaluate the model a step away, within the bounds; None where it has no motion."""
@@ -156,33 +163,9 @@ def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> F
     return columns
 
 
-@dataclass(frozen=True)
-class _Factored:
-    """QR factors of the free values' columns, scaled to unit length."""
-
-    columns: FloatArray
-    free: IntArray
-    scale: FloatArray
-    basis: FloatArray
-    triangle: FloatArray
-
-    @classmethod
-    def of(cls, columns: FloatArray, free: IntArray) -> _Factored:
-        """Factor them."""
-        part = columns[:, free]
-        if not np.all(np.isfinite(part)):
-            raise NoMotionError("its derivatives are not finite")
-        scale = np.linalg.norm(part, axis=0)
-        scale[scale == 0.0] = 1.0
-        return cls(columns, free, scale, *np.linalg.qr(part / scale))
-
-    def is_of(self, columns: FloatArray, free: IntArray) -> bool:
-        """Whether these columns are the ones factored."""
-        return columns is self.columns and np.array_equal(free, self.free)
-
-
 def _step(
-    factored: _Factored,
+    origin: Evaluation,
+    free: IntArray,
     residual: FloatArray,
     value: FloatArray,
     low: FloatArray,
@@ -190,10 +173,11 @@ def _step(
     radius: float,
 ) -> tuple[FloatArray, float]:
     """Solve for the step, the best within the bounds and no longer than `radius`."""
-    step, free, scale = np.zeros(len(value)), factored.free, factored.scale
+    basis, triangle, scales = origin.factored
+    step, scale, matrix = np.zeros(len(value)), scales[free], triangle[:, free]
     floor, ceiling = (low - value)[free] * scale, (high - value)[free] * scale
-    matrix, right = factored.triangle, factored.basis.T @ residual
-    left, singular, turned = np.linalg.svd(matrix)
+    right = basis.T @ residual
+    left, singular, turned = np.linalg.svd(matrix, full_matrices=False)
     seen = singular > _PRECISE * np.max(singular, initial=0.0)
     pull, squares = (singular * (left.T @ right))[seen], singular[seen] ** 2
     damping = _damping(pull, squares, radius)

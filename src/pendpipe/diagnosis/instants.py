@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from statistics import NormalDist
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, better
-from pendpipe.diagnosis.scores import products_and_lengths
+from pendpipe.diagnosis.scores import scores_and_lengths
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import DroppedSamples
 from pendpipe.estimate import Estimate
@@ -67,39 +67,17 @@ def with_instants(
     span = without.at.span
     rows = [*effect.shapes(span), *effect.finer(span, (instant.value,))]
     rough = np.unique([*(float(row[0]) for row in rows), instant.value])
-    time_s, spacing = _between(
-        rough,
-        _scored(without, noise, effect, rough).scores,
-        span.period_s / _PER_CYCLE,
-        error_scale,
-    )
-    found = _scored(without, noise, effect, time_s)
-    weight = np.exp(0.5 * (found.scores - found.scores.max()) / error_scale**2)
-    weight *= spacing / found.lengths
-    sizes = found.sizes[:, None] + error_scale / found.lengths[:, None] * _NORMAL_POINTS
+    scores, _ = scores_and_lengths(without, noise, effect, rough[:, None].tolist())
+    time_s, spacing = _between(rough, scores**2, span.period_s / _PER_CYCLE, error_scale)
+    scores, lengths = scores_and_lengths(without, noise, effect, time_s[:, None].tolist())
+    weight = np.exp(0.5 * (scores**2 - np.max(scores**2)) / error_scale**2) * spacing / lengths
+    sizes = (scores[:, None] + error_scale * _NORMAL_POINTS) / lengths[:, None]
     shared = np.repeat(weight, len(_NORMAL_POINTS))
     return {
         **estimates,
         effect.parameters[0].name: _widened(size, _quantiles(sizes.ravel(), shared)),
         effect.parameters[1].name: _widened(instant, _quantiles(time_s, weight)),
     }
-
-
-class _Scored(NamedTuple):
-    """The best size at each instant, and the length of the derivative by the size."""
-
-    sizes: FloatArray
-    lengths: FloatArray
-
-    @property
-    def scores(self) -> FloatArray:
-        return np.asarray((self.sizes * self.lengths) ** 2)
-
-
-def _scored(without: Fit, noise: Noise, effect: Effect, time_s: FloatArray) -> _Scored:
-    products, lengths = products_and_lengths(without, noise, effect, time_s[:, None].tolist())
-    lengths = np.where(lengths > 0.0, lengths, np.inf)
-    return _Scored(products / lengths**2, lengths)
 
 
 def _between(

@@ -257,7 +257,8 @@ class Refining:
             if self._ended or self.hopeless:
                 break
             self._round()
-        self._steps.forget()
+        # As large as the derivatives themselves.
+        vars(self._here).pop("factored", None)
 
     def _cannot_reach(self, useful: float, left: int) -> bool:
         last = self._gains[-_LAST_STEPS:]
@@ -315,7 +316,7 @@ class Refining:
             missing = expected - (here.chi2 - there.chi2)
             if missing <= (1.0 - _POOR) * max(expected, 0.0):
                 break
-            step, _ = self._steps.step(there, free, math.sqrt(missing), here.columns)
+            step, _ = self._steps.step(there, free, math.sqrt(missing), here)
             nearer = self._steps.moved(there, step)
             if nearer is None or expected - (here.chi2 - nearer.chi2) > _POOR * missing:
                 break
@@ -342,7 +343,7 @@ class Refining:
         if not np.all(np.any(before.columns[:, self._free], axis=0)):
             # The shape of an effect had no influence while its size was zero.
             return
-        step, _ = self._steps.step(here, self._free, columns=before.columns)
+        step, _ = self._steps.step(here, self._free, origin=before)
         expected = _expected(here, before.columns, step)
         if expected < SETTLED * self._unit:
             there = self._steps.moved(here, step)

@@ -233,24 +233,25 @@ def finer_shape(
     if not shapes:
         return shape
     shapes.append(shape)
-    products, length = products_and_lengths(base, noise, effect, shapes)
-    length[length == 0.0] = np.inf
-    return shapes[int(np.argmax(np.abs(products) / length))]
+    scores, _ = scores_and_lengths(base, noise, effect, shapes)
+    return shapes[int(np.argmax(np.abs(scores)))]
 
 
-def products_and_lengths(
+def scores_and_lengths(
     base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
 ) -> tuple[FloatArray, FloatArray]:
     """Score shapes of an effect's first size on a fit's residual.
 
     Returns
     -------
-    products, lengths
-        Inner products of the residual with the derivative by the size, projected, and the
-        lengths of that; shape (shapes,). The size is product/length^2, and lowers chi^2 by
-        (product/length)^2.
+    scores, lengths
+        Inner products of the residual with the derivative by the size, projected and of unit
+        length, and the lengths of that (inf where nothing remains); shape (shapes,). The size is
+        score/length, and lowers chi^2 by score^2.
     """
     columns = whitened(base, noise, effect, shapes)[:: effect.sizes]
     basis = tangent_basis(base)
     columns -= (columns @ basis) @ basis.T
-    return columns @ base.residual, np.linalg.norm(columns, axis=1)
+    lengths = np.linalg.norm(columns, axis=1)
+    lengths[lengths == 0.0] = np.inf
+    return columns @ base.residual / lengths, lengths
