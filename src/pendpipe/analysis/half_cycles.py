@@ -4,8 +4,6 @@ This is for finding out which part of a record is one free decay, not for measur
 turning points are read off a thinned record, without a fit.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final

@@ -5,8 +5,6 @@ effect or curve, nothing need be missing. Of these parameters only those that ar
 reported. A drift, a step and red noise all have power at low frequencies.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

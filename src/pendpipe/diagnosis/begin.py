@@ -1,7 +1,5 @@
 """From a recording to the readings and the start values of the baseline."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

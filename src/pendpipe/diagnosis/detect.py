@@ -4,8 +4,6 @@ How often chance alone does as well anywhere in the catalogue (the look-elsewher
 on white residuals.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

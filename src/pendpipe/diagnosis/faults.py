@@ -4,8 +4,6 @@ One lost sample changes chi^2 more than most physics. So faults that can corrupt
 tested before the catalogue, and those that only small residuals reveal after it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final

@@ -1,7 +1,5 @@
 """Gauss-Newton steps towards the best values of a model, within their bounds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

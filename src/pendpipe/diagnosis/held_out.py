@@ -1,7 +1,5 @@
 """Cross-validation: how well a model predicts cycles that it was not fitted to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Instants of sudden effects: chi^2 has a minimum in each half cycle about the true one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import replace

@@ -5,8 +5,6 @@ modes beat one alone has no phase; what is fitted to them there means little. Th
 are counted, tell sin x and its start; the slow amplitude tells the modes.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where an effect shows: time, amplitude, phase of the cycle, frequency, harmonic."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Final

@@ -6,8 +6,6 @@ of smooth random functions whose strengths are unknown, zero among them, so that
 does not change is found to be constant, and precisely so.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ the best set (`evidence.Scale`): chi^2 itself where the best leaves noise alone.
 effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.charge`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple

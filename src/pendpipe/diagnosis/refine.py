@@ -1,7 +1,5 @@
 """Maximum-likelihood fit of a model, also from start values far away."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Refit the leading effects side by side, and rank them; stop those that can't come near."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final

@@ -1,7 +1,5 @@
 """Held parameters that may be wrong: fitting them separates this from missing physics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Final
 

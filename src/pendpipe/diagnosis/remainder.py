@@ -7,8 +7,6 @@ the noise: a misfit of the phase widens the error of the frequency, one of the a
 the losses.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
-if TYPE_CHECKING:
-    from pendpipe.arrays import BoolArray, FloatArray
-    from pendpipe.diagnosis.cycles import SmallSwings
-    from pendpipe.diagnosis.held_out import HeldOut
-    from pendpipe.diagnosis.remainder import Remainder
-    from pendpipe.estimate import Estimate
+from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.diagnosis.cycles import SmallSwings
+from pendpipe.diagnosis.held_out import HeldOut
+from pendpipe.diagnosis.remainder import Remainder
+from pendpipe.estimate import Estimate
 
 FILE_NAME: Final = "diagnosis.json"
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}

@@ -6,8 +6,6 @@ rest, at unit length, with the whitened residual: the locally most powerful test
 effect's shape is many such columns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

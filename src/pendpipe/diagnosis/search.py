@@ -1,7 +1,5 @@
 """Add one effect after another, until nothing significant is left."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final

@@ -6,8 +6,6 @@ solves: by the same score, the same moves, the same check on cycles left out. Th
 the recordings share, settle, and predict of each other.
 """
 
-from __future__ import annotations
-
 import math
 from collections import ChainMap
 from collections.abc import Mapping, Sequence

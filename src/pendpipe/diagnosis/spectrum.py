@@ -1,7 +1,5 @@
 """Scans for tones of any frequency, steady or decaying, in a residual."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The state of a search, and the joint estimate of a fit and its noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from pendpipe.diagnosis.cycles import SmallSwings
 from pendpipe.diagnosis.detect import printed
-from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE
+from pendpipe.diagnosis.held_out import HeldOut
+from pendpipe.diagnosis.remainder import Remainder
+from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE, FittedModel, FoundEffect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
-
-if TYPE_CHECKING:
-    from pendpipe.diagnosis.cycles import SmallSwings
-    from pendpipe.diagnosis.held_out import HeldOut
-    from pendpipe.diagnosis.remainder import Remainder
-    from pendpipe.diagnosis.result import FittedModel, FoundEffect
 
 _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""

@@ -1,7 +1,5 @@
 """What a search is to do, and the effects that it may choose from."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass

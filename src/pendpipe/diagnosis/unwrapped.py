@@ -1,7 +1,5 @@
 """Readings beside a model's motion, cycle by cycle: amplitude, phase, and the residual along it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple

@@ -1,7 +1,5 @@
 """The fitted values as parameters and curves in their own units, with errors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress

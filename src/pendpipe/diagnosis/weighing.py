@@ -1,7 +1,5 @@
 """Final probabilities of each effect and its rivals; likelier rivals are swapped in."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

@@ -3,8 +3,6 @@
 Every test is a function ``find(data, fit, noise, samples) -> Finding``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Codes of a converter: their lattice, rounding, and the angles that the motion had."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Final

@@ -4,8 +4,6 @@ Under a random torque amplitude and phase perform a random walk, which colours t
 the pendulum's frequency; the density of coloured noise there differs from its mean.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

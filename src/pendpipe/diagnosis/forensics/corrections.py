@@ -12,8 +12,6 @@ sizes are free, and that they come out *whole* is the test.
 Of a tracked mark what its wander does to the distance from the pivot it does to the angle.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

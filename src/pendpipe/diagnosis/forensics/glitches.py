@@ -1,7 +1,5 @@
 """Glitches: single wrong readings."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

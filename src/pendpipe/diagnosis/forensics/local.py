@@ -6,8 +6,6 @@ quadratures of the fundamental with their slopes are fitted and subtracted (and 
 third harmonic where these are significant).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Final

@@ -1,7 +1,5 @@
 """Sampling times: gaps, stamps less regular than the readings themselves, and jitter."""
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """Tails: of the noise (Student's distribution), and of weighted sums of squares."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Final
