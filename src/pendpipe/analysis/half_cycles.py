@@ -4,6 +4,8 @@ This is for finding out which part of a record is one free decay, not for measur
 turning points are read off a thinned record, without a fit.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import Final

@@ -10,7 +10,6 @@ effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.ch
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -21,7 +20,6 @@ from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
-from pendpipe.diagnosis.refits import OF_A_CURVE, refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
 from pendpipe.diagnosis.state import State, Step
@@ -41,10 +39,6 @@ _LOST_AT_KNOTS: Final = 0.012
 _MOST_MOVES: Final = 6
 _MOST_RARE: Final = 2
 """Rare names that may take the place of one curve."""
-_FIRST_TRIED: Final = 2
-"""Named effects tried as the first of two."""
-_SECOND_TRIED: Final = 3
-"""Named effects refitted as the second, beside each of them."""
 
 
 class Proposed(NamedTuple):
@@ -253,51 +247,3 @@ def _with(bare: Fit, effect: Effect, own: FloatArray, state: State) -> Fit | Non
     model, start = bare.model.adding(effect), np.concatenate([bare.value, own])
     fit = best_fit(model, state.data, state.noise, [start], held=state.held)
     return fit if fit and effect.believable(fit.value[len(bare.value) :]) else None
-
-
-def prefer_two_names(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:
-    """Put a named effect before the leading curve if it and a second one are better than it.
-
-    A curve can follow parts of two effects, and no name is added after a curve.
-    """
-    curve = rivals[0]
-    if not curve.drawn:
-        return list(rivals)
-    least_gain = OF_A_CURVE * curve.gain
-    names = [rival for rival in rivals if not rival.drawn and rival.gain > least_gain]
-    names = names or [rival for rival in _named(state, _FIRST_TRIED) if rival.gain > least_gain]
-    drawn = Proposed(curve.fit, (Step((curve,), 0.0, state.fit),))
-    for name in sorted(names, key=lambda rival: -rival.gain)[:_FIRST_TRIED]:
-        task.progress(f"trying {name.name} with a second effect instead of a curve")
-        pairs = [
-            Proposed(second.fit, tuple(Step((rival,), 0.0, state.fit) for rival in (name, second)))
-            for second in _seconds(state, name, task)
-        ]
-        if _best(drawn, pairs, state) is not drawn:
-            return [name, *(rival for rival in rivals if rival is not name)]
-    return list(rivals)
-
-
-def _seconds(state: State, name: Rival, task: Task) -> list[Rival]:
-    """Return the best named effects that could be added to a first."""
-    effect, beside = name.lead.effect, replace(state, fit=name.fit)
-    if isinstance(effect, ReleasedParameter):
-        beside.held = effect.without(state.held)
-    task.scanned(beside)
-    assert beside.now is not None
-    return [] if beside.now.p_value > task.threshold else _named(beside, _SECOND_TRIED)
-
-
-def _named(state: State, most: int) -> list[Rival]:
-    """Refit the best named effects of a scan, where only curves had been."""
-    assert state.now is not None
-    leads = tuple(lead for lead in state.now.leads if lead.effect.kind != "unnamed")
-    return refit_leads(
-        state.fit,
-        state.data,
-        state.noise,
-        replace(state.now, leads=leads),
-        held=state.held,
-        phase_lost=False,
-        most=most,
-    )

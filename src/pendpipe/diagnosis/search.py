@@ -20,7 +20,6 @@ from pendpipe.diagnosis.moves import (
     describe,
     improve,
     prefer_rare,
-    prefer_two_names,
     price,
     refit_without,
 )
@@ -250,8 +249,6 @@ def _add_one(state: State, task: Task) -> bool:
     )
     if rivals:
         rivals = prefer_parameters(state, rivals)
-    if rivals and not gross:
-        rivals = prefer_two_names(state, rivals, task)
     if rivals:
         rivals = prefer_rare(state, rivals, task)
     if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):

@@ -22,6 +22,8 @@ and then dtau/dp by one more integral (both taken over w, see `panel.py`). Turni
 psi = 0 and pi whatever p is, so there is no jump in the friction to differentiate through.
 """
 
+from __future__ import annotations
+
 import math
 
 from pendpipe.arrays import FloatArray

@@ -1,5 +1,7 @@
 """Half cycle after half cycle, from the release to the last sample or to the stop."""
 
+from __future__ import annotations
+
 import math
 
 from pendpipe.arrays import FloatArray

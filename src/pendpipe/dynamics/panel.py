@@ -29,6 +29,8 @@ which for k~ = sin(y/2) is the time of the motion without losses (psi by Jacobi'
 functions); w = psi for the linear torque, and at small amplitudes.
 """
 
+from __future__ import annotations
+
 import math
 
 from pendpipe.arrays import FloatArray

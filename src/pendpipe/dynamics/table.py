@@ -6,6 +6,8 @@ at Chebyshev points in ln y, and all others are interpolated: every number of a 
 (see `half_cycle.py`) becomes a polynomial in z = (ln y - middle)/half_span.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

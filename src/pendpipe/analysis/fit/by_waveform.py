@@ -9,6 +9,8 @@ this is the usual chi^2 with variance s^2 + step^2/12; below, that would take th
 random, which it is not, least of all in the tail.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

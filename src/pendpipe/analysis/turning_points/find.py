@@ -5,6 +5,8 @@ neighbours, and the half cycles followed into the tail. Then the level under the
 which of them are kept, and their errors.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from pathlib import Path

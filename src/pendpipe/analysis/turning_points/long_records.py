@@ -7,6 +7,8 @@ products with tables made once a block; the fraction of a reading between that o
 turning is made up for by turning the result, cos(p + q) = cos p cos q - sin p sin q.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import replace

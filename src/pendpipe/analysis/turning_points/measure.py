@@ -17,6 +17,8 @@ hysteretic, which leaves +-0.17 (b/omega)^2 of the amplitude open, and of the ti
 constant +-b/(4 omega^2).
 """
 
+from __future__ import annotations
+
 import math
 from typing import Final, NamedTuple
 
