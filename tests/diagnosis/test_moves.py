@@ -14,16 +14,15 @@ from scipy.interpolate import CubicSpline
 from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
-from pendpipe.diagnosis.detect import Lead, detect, prepare
+from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.location import off_harmonics
-from pendpipe.diagnosis.moves import FURTHER, describe, improve, prefer_two_names, price
+from pendpipe.diagnosis.moves import FURTHER, describe, improve, price
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.state import State, Step, first_noise
-from pendpipe.diagnosis.task import Task, applicable
-from pendpipe.effects import Effect
+from pendpipe.diagnosis.state import State, Step
+from pendpipe.diagnosis.task import Task
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -34,7 +33,6 @@ from .records import (
     TIME_S,
     TRUTH,
     VALUES,
-    beginning_of,
     classes_found,
     diagnosed,
     null_fit,
@@ -241,32 +239,9 @@ def task_for(record: Recording) -> Task:
     return Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent)
 
 
-def rivals_after(readings: FloatArray, seed: int) -> list[Rival]:
-    """A curve of the torque leads; return what leads after two effects are tried."""
-    record = recording(readings, seed)
-    begun = beginning_of(record)
-    noise = first_noise(begun)
-    fit = refine(begun.model, begun.data, noise, begun.value)
-    state = State(fit, begun.data, noise, [], fit.value)
-    task = task_for(record)
-    effects: list[Effect] = applicable(CATALOGUE, fit, "eq8", "rad")
-    state.now = detect(prepare(fit, begun.data, noise, effects), fit, seed=1)
-    lead = next(each for each in state.now.leads if each.effect.identifier == "unnamed-restoring")
-    start = np.append(fit.value, np.zeros(lead.effect.count))
-    drawn = refine(begun.model.adding(lead.effect), begun.data, noise, start)
-    rival = Rival.of(lead, drawn, fit.chi2, Scale(drawn.chi2), NO_SCAN)
-    return prefer_two_names(state, [rival], task)
-
-
-def test_a_step_and_a_tone_go_before_a_curve() -> None:
-    found = rivals_after(with_effects("equilibrium-step", "tone-pickup"), 3)
-    assert found[0].identifier in ("equilibrium-step", "tone-pickup")
-    assert found[1].identifier == "unnamed-restoring"
-
-
-def test_a_law_outside_the_catalogue_stays_a_curve() -> None:
-    found = rivals_after(pulled(), 3)
-    assert [each.identifier for each in found] == ["unnamed-restoring"]
+def test_a_step_and_a_tone_are_both_named_and_no_curve_instead() -> None:
+    found = diagnose_recording(recording(with_effects("equilibrium-step", "tone-pickup"), 3))
+    assert {each.identifier for each in found.effects} == {"equilibrium-step", "tone-pickup"}
 
 
 @pytest.mark.parametrize("seed", range(3))
