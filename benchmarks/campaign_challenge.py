@@ -264,7 +264,7 @@ def judge(
         first = answer.found[0]
         members = [first.leader, *(rival for rival, _ in first.rivals)]
     inside = {rival.last.identifier: rival for rival in members}
-    fit = inside[cause].fit if cause in inside else answer.baseline
+    fit = inside.get(cause, answer.baseline)
     pulls = {}
     if cause is None or cause in inside:
         pulls["k"] = pull(coefficient(fit), truth["k"])
