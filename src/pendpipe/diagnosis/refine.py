@@ -255,7 +255,7 @@ class Refining:
             if self._ended or self.hopeless:
                 break
             self._round()
-        # As large as the derivatives themselves.
+        # The factors are as large as the derivatives; a fit that is kept needs only those.
         vars(self._here).pop("factored", None)
 
     def _cannot_reach(self, useful: float, left: int) -> bool:

@@ -21,10 +21,11 @@ from pendpipe.effects import Effect
 
 NEAR: Final = 16.0
 """Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
-OF_A_CURVE: Final = 0.4
-"""Part of a curve's gain that a named effect must explain alone to be tried with a second."""
+_BEHIND_CURVE: Final = 0.6
+"""Part of a curve's gain by which a refit may end behind it, beyond `NEAR`, and matter: a name has
+far fewer values."""
 _BEHIND_NAMED: Final = 0.1
-"""Part of a named effect's gain by which a refit may end behind it, beyond `NEAR`, and matter."""
+"""The same behind a named effect."""
 _FIRST_ROUNDS: Final = 4
 """Rounds after which the refits are compared."""
 _STALLED_GAIN: Final = 0.3
@@ -150,10 +151,9 @@ def useful_chi2(best: float, gain: float, *, drawn: bool) -> float:
     best, gain
         The best chi^2, and its gain over the model without the effect.
     drawn
-        Whether the best is a curve: two named effects may replace it, and one with far fewer
-        values is as good with a smaller gain.
+        Whether the best is a curve.
     """
-    return best + NEAR + (1.0 - OF_A_CURVE if drawn else _BEHIND_NAMED) * max(gain, 0.0)
+    return best + NEAR + (_BEHIND_CURVE if drawn else _BEHIND_NAMED) * max(gain, 0.0)
 
 
 def believable(base: Fit, fit: Fit, effect: Effect) -> bool:

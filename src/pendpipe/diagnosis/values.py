@@ -115,6 +115,7 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
         free, narrow = np.ix_(fit.free, fit.free), normal.copy()
         inverse = np.linalg.pinv(fit.scatter[free], hermitian=True)
         normal[free] = narrow[free] @ inverse @ narrow[free]
+        # The distance to which a value is pulled beyond its bound stays as it was.
         gradient = (
             gradient * normal.diagonal() / np.where(narrow.diagonal() > 0.0, narrow.diagonal(), 1.0)
         )

@@ -210,8 +210,8 @@ def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> Foun
     if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
     if finding.identifier in _RANDOM:
-        beside = zip(found.steps, weighed, strict=True)
-        none = [float(by.weights[-1]) for step, by in beside if not step.winner.drawn]
+        names = zip(found.steps, weighed, strict=True)
+        none = [float(name.weights[-1]) for step, name in names if not step.winner.drawn]
         each *= 1.0 - max(none, default=0.0)
     return FoundEffect(
         effect.identifier,

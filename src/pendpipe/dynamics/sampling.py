@@ -81,7 +81,7 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     """Read a motion at times within its clock.
 
     psi - omega t and ln r are slow; each is interpolated by the polynomial through six
-    neighbouring nodes of its half cycle, close enough for 1e-8 of the motion.
+    neighbouring nodes of its half cycle, close enough for 3e-7 of the motion.
     """
     order = _FINER * motion.clock.order
     nodes = _at_finer(motion.time_s)
