@@ -144,10 +144,22 @@ def test_a_clock_slips_by_whole_samples_or_it_is_no_slip(swing: Swing, whole: bo
         assert finding.p_value > 1e-3
         return
     assert finding.p_value < 1e-5
+    # Without the model: the slips are steps of the time in the readings as they are.
+    assert finding.confirmed is not None
+    assert finding.confirmed.summary.startswith("14 steps")
     assert finding.parameters["number"].value == 14
     moved = corrected.time_s - (np.arange(len(corrected)) / RATE_HZ + 1.0)
     truth = np.cumsum(np.bincount(rows, sizes, len(corrected))) / RATE_HZ
     assert np.mean(np.abs(moved - moved[0] - truth) > 1e-3) < 0.01
+
+
+@pytest.mark.parametrize("number", [4, 9, 30])
+def test_steps_of_any_size_are_seldom_whole(number: int) -> None:
+    sizes = np.random.default_rng(number).uniform(0.5, 3.5, (4000, number))
+    rows = np.arange(number)
+    p_values = np.array([corrections.Slips(rows, each).p_value for each in sizes])
+    for level in (0.05, 0.01):
+        assert 0.5 * level < np.mean(p_values < level) < 1.5 * level
 
 
 def test_counts_are_lost_from_an_encoder_that_is_read_at_fixed_times(swing: Swing) -> None:

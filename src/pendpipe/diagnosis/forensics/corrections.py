@@ -51,13 +51,19 @@ _ELSEWHERE: Final = 20
 _AGREE_SD: Final = 3.0
 _SLOW_CYCLES: Final = 10.0
 _HARMONICS: Final = 3
-_MOST: Final = {False: 150, True: 60}
-"""Slips at most, between readings and within them (which takes three columns each)."""
+_MOST: Final = 150
+"""Slips at most."""
 _CHOICE: Final = 6.0
 """Price of a slip beside the places where it may have been (2 ln n)."""
 _FEWEST: Final = 4
 _NEIGHBOURS: Final = 11
 _IN_A_HALF_SWING: Final = 12
+_BESIDE: Final = 0.055
+"""Length of a side about a step of the time, in periods: what a polynomial of the fourth degree
+leaves of a swing there, 1e-6 of it, is less than the noise."""
+_OF_A_STEP: Final = 4
+_FEWEST_BESIDE: Final = 8
+_ROUNDS: Final = 3
 TRACKING_NOISE: Final = "tracking-noise"
 _SMOOTH: Final = 5
 """Degree in the angle of what the camera's geometry makes of the distance from the pivot."""
@@ -259,9 +265,24 @@ class Slips(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """Probability that steps of any sizes are so near whole numbers."""
+        """Probability that steps of any sizes are so near whole numbers.
+
+        Of many, the sum of cosines is normal. Of few, the distances from whole numbers are as near
+        as that in a ball within the cube of side 1 in which they lie (at most: it may stick out).
+        """
+        half = 0.5 * len(self.sizes)
         near = float(np.sum(np.cos(2.0 * math.pi * self.sizes)))
-        return upper_tail(near / math.sqrt(0.5 * len(self.sizes)))
+        squares = max(2.0 * half * self.scatter**2, 1e-300)
+        ball = half * math.log(math.pi * squares) - math.lgamma(half + 1.0)
+        return min(upper_tail(near / math.sqrt(half)), math.exp(min(ball, 0.0)))
+
+    def joined(self) -> "Slips":
+        """Join steps in neighbouring readings: one within a reading, which is a mean, makes two."""
+        groups = np.split(np.arange(len(self.rows)), 1 + np.flatnonzero(np.diff(self.rows) > 3))
+        first = [group[np.argmax(np.abs(self.sizes[group]))] for group in groups]
+        sizes = np.array([np.sum(self.sizes[group]) for group in groups])
+        kept = np.abs(sizes) > 0.5
+        return Slips(self.rows[first][kept], sizes[kept])
 
     def staircase(self, count: int) -> FloatArray:
         """Return the sum of the whole steps at each of `count` readings."""
@@ -270,7 +291,7 @@ class Slips(NamedTuple):
         return np.cumsum(steps)
 
 
-def whole_steps(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False) -> Slips | None:
+def whole_steps(data: Data, fit: Fit, unit: FloatArray) -> Slips | None:
     """Find steps of whole units; None where there are too few.
 
     Parameters
@@ -279,15 +300,13 @@ def whole_steps(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False)
         The readings, and a model that keeps their phase.
     unit
         What a step of one changes in each reading, rad, shape (n,).
-    within
-        Whether a step may lie within a reading, which is a mean: such readings are left out.
     """
     left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
     left = left - basis @ (basis.T @ left)
     whole = _later(unit[:, None] ** 2 * data.weight[:, None])
     alone = whole - np.sum(_later(unit[:, None] * basis) ** 2, axis=1, keepdims=True)
     rows: list[int] = []
-    for _ in range(_MOST[within]):
+    for _ in range(_MOST):
         seen = alone[:, 0] > 1e-6 * whole[0]
         product = _later((unit * left)[:, None])[:, 0]
         gain = np.where(seen, product**2 / np.where(seen, alone[:, 0], 1.0), 0.0)
@@ -295,11 +314,10 @@ def whole_steps(data: Data, fit: Fit, unit: FloatArray, *, within: bool = False)
         if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
         rows.append(row)
-        for column in _columns(row, unit, data, within=within):
-            known = basis.shape[1]
-            left, basis = _without(left, basis, column)
-            alone -= np.sum(_later(unit[:, None] * basis[:, known:]) ** 2, axis=1, keepdims=True)
-    return _whole(data, fit, unit, np.sort(np.array(rows, dtype=np.int64)), within=within)
+        known = basis.shape[1]
+        left, basis = _without(left, basis, _step(row, unit, data))
+        alone -= np.sum(_later(unit[:, None] * basis[:, known:]) ** 2, axis=1, keepdims=True)
+    return _whole(data, fit, unit, np.sort(np.array(rows, dtype=np.int64)))
 
 
 def _later(columns: FloatArray) -> FloatArray:
@@ -329,11 +347,9 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
     return np.asarray(basis[:, lengths > 1e-6 * lengths[0]])
 
 
-def _columns(row: int, unit: FloatArray, data: Data, *, within: bool) -> list[FloatArray]:
-    """Return a step's change of the readings, and the readings within which it may lie."""
-    step = np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
-    about = [np.eye(1, len(unit), at)[0] for at in (max(row - 1, 0), row)]
-    return [step, *about] if within else [step]
+def _step(row: int, unit: FloatArray, data: Data) -> FloatArray:
+    """Return a step's change of the readings."""
+    return np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
 
 
 def _without(
@@ -350,25 +366,14 @@ def _without(
     return left - column * float(column @ left), np.column_stack([basis, column])
 
 
-def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray, *, within: bool) -> Slips | None:
-    """Fit all sizes together, and test whether they are whole."""
+def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray) -> Slips | None:
+    """Fit all sizes together."""
     left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
-    for row in rows.tolist():
-        for about in _columns(row, unit, data, within=within)[1:]:
-            left, basis = _without(left, basis, about)
     while len(rows) >= _FEWEST:
-        steps = [_columns(row, unit, data, within=False)[0] for row in rows.tolist()]
-        columns = np.column_stack(steps)
+        columns = np.column_stack([_step(row, unit, data) for row in rows.tolist()])
         columns -= basis @ (basis.T @ columns)
         sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
         kept = np.abs(sizes) > 0.5
-        if kept.all() and within:
-            # The readings about a step are left out, so two that undo each other there are hardly
-            # determined: each must be worth its choice.
-            noise = spread(left - columns @ sizes)
-            worth = (sizes / noise) ** 2 / np.diag(np.linalg.pinv(columns.T @ columns))
-            least = int(np.argmin(worth))
-            kept[least] = worth[least] > 2.0 * math.log(len(left)) + _CHOICE
         if kept.all():
             return Slips(rows, sizes)
         rows = rows[kept]
@@ -390,9 +395,14 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
     unit = data.interval_s / data.fold if clock else count_of(samples)
     possible = data.uniform and not data.time_noise if clock else unit > 0.0
     change = fit.at.sampled.velocity if clock else np.ones(len(data))
-    slips = whole_steps(data, fit, unit * change, within=clock) if possible else None
+    slips = whole_steps(data, fit, unit * change) if possible else None
     if slips is None:
         return data, nothing(name)
+    slips = slips.joined() if clock else slips
+    when = data.time_s[slips.rows] - 0.5 * data.interval_s
+    seen = (
+        steps_of_the_time(samples, when, data.interval_s, fit.at.span.period_s) if clock else None
+    )
     stairs = unit * slips.staircase(len(data))
     if clock:
         corrected = replace(data, time_s=data.time_s + stairs, uniform=False)
@@ -401,10 +411,9 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
     squares = float(np.sum(slips.whole**2))
     size = float(slips.sizes @ slips.whole) / squares
     words = "the clock slips by whole samples" if clock else "whole counts are lost, or gained,"
-    when = data.time_s[slips.rows]
     finding = Finding(
         name,
-        slips.p_value,
+        seen.p_value if seen else slips.p_value,
         parameters={
             "dt" if clock else "step": Estimate(
                 unit * size, unit * slips.scatter / math.sqrt(squares), "s" if clock else data.unit
@@ -414,7 +423,7 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
         location=Location((float(when[0]), float(when[-1]))),
         summary=f"{words} {len(when)} times between {when[0]:.5g} and {when[-1]:.5g} s: fitted"
         f" freely, the steps are whole within {slips.scatter:.2f} (by chance 0.29)",
-        confirmed=steps_of_the_level(samples, unit) if not clock else None,
+        confirmed=seen if clock else steps_of_the_level(samples, unit),
     )
     return corrected, finding
 
@@ -453,6 +462,62 @@ def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
         " (by chance 0.29)",
         large.p_value,
     )
+
+
+def steps_of_the_time(
+    samples: Samples, when_s: FloatArray, within_s: float, period_s: float
+) -> Confirmation | None:
+    """Test whether the time steps by whole samples at instants, without any model.
+
+    Near each instant one polynomial in time is fitted, with a step of the time: from there on it
+    changes the readings as the velocity does. The row where it is most significant counts.
+    """
+    interval = within_s / round(within_s / float(np.median(np.diff(samples.time_s))))
+    side = max(int(_BESIDE * period_s / interval), _FEWEST_BESIDE)
+    about, floor = side + round(within_s / interval), (samples.step or 0.0) / math.sqrt(12.0)
+    found: list[float] = []
+    for row in np.searchsorted(samples.time_s, when_s).tolist():
+        near = samples.values[max(row - about, 0) : row + about]
+        if len(near) < 2 * side:
+            continue
+        windows = np.lib.stride_tricks.sliding_window_view(near, 2 * side).T
+        size, sd = _step_of_time(windows, np.zeros(windows.shape[1]), floor)
+        best = np.argmax(np.abs(size) / sd, keepdims=True)
+        size = size[best]
+        for _ in range(_ROUNDS):
+            more, sd = _step_of_time(windows[:, best], size, floor)
+            size = size + more
+        if abs(size[0]) > max(_SIGNIFICANT_SD * sd[0], 0.5):
+            found.append(float(size[0]))
+    seen = Slips(np.arange(len(found)), np.array(found))
+    if len(found) < _FEWEST:
+        return None
+    return Confirmation(
+        f"{len(found)} steps of the time in the readings as they are are whole within"
+        f" {seen.scatter:.2f} samples (by chance 0.29)",
+        seen.p_value,
+    )
+
+
+def _step_of_time(
+    values: FloatArray, size: FloatArray, floor: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return how much larger the step of the time in the middle of each window is, and its sd.
+
+    In sampling intervals; values have the shape (rows, windows), a size and an sd each.
+    """
+    side = len(values) // 2
+    later = np.arange(2 * side) >= side
+    at = (np.arange(2 * side) - side + 0.5 + size[0] * later) / side
+    powers = np.vander(at, _OF_A_STEP + 1, increasing=True)
+    basis = np.linalg.qr(powers)[0]
+    slopes = powers[:, :-1] * np.arange(1, _OF_A_STEP + 1) @ np.linalg.pinv(powers)[1:]
+    steps = slopes @ values * later[:, None] / side
+    left, steps = (each - basis @ (basis.T @ each) for each in (values, steps))
+    square = np.maximum(np.sum(steps**2, axis=0), 1e-300)
+    more = np.sum(steps * left, axis=0) / square
+    rest = (np.sum(left**2, axis=0) - more**2 * square) / (2 * side - _OF_A_STEP - 2)
+    return more, np.sqrt(np.maximum(rest, floor**2) / square)
 
 
 def _turns(values: FloatArray) -> list[int]:
