@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pendpipe.analysis.fit.by_waveform import _mean_square
-from pendpipe.analysis.noise import find_step, noise_rms, quantisation_rms, white_rms
+from pendpipe.analysis.noise import noise_rms, quantisation_rms, white_rms
 
 SWING = np.cos(np.arange(20000) * 0.06)
 
@@ -30,16 +28,6 @@ def test_glitches_are_no_noise() -> None:
     values = 3e-4 * np.random.default_rng(1).standard_normal(20000)
     values[::997] += 5.0
     assert noise_rms(values) == pytest.approx(3e-4, rel=0.1)
-
-
-@given(step=st.floats(1e-6, 1e-2), offset=st.floats(-1.0, 1.0))
-def test_the_step_of_a_converter_is_found(step: float, offset: float) -> None:
-    codes = np.round(40.0 * SWING + np.random.default_rng(2).standard_normal(20000))
-    assert find_step(codes * step + offset) == pytest.approx(step, rel=1e-3)
-
-
-def test_readings_off_a_lattice_have_no_step() -> None:
-    assert find_step(np.random.default_rng(3).standard_normal(20000)) is None
 
 
 def test_noise_is_never_below_the_rounding() -> None:

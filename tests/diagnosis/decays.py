@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pendpipe.analysis.noise import find_step, noise_rms
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
@@ -15,6 +15,7 @@ from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Model
+from pendpipe.recording import find_step
 
 FREQUENCY_HZ = 0.9
 

@@ -12,12 +12,19 @@ from hypothesis import strategies as st
 
 from pendpipe.cli import main
 from pendpipe.formats import inspect, read
-from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, resolution, sample_rate
-from pendpipe.recording import read_plain
+from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, sample_rate
+from pendpipe.recording import find_step, read_plain
 
 from .decays import WindaqFile, swing
 
 TIME, ANGLE = swing(2000)
+
+
+@given(digits=st.integers(3, 5), middle=st.floats(-0.02, 0.02))
+def test_numbers_of_as_many_digits_each_have_no_step(digits: int, middle: float) -> None:
+    """0.0938 and 0.104 are rounded to different places: no bit of a converter is stuck."""
+    values = [float(f"{value:.{digits}g}") for value in middle + 0.25 * ANGLE]
+    assert find_step(np.array(values)) is None
 
 
 @given(
@@ -32,12 +39,12 @@ def test_the_step_of_any_converter_is_found(
         # Printed with few digits: a step of the converter is that many of the print.
         quantum = step / decimals
         values = np.rint(values / quantum) * quantum
-    assert resolution(values) == pytest.approx(step, rel=2e-2 if decimals else 1e-6)
+    assert find_step(values) == pytest.approx(step, rel=2e-2 if decimals else 1e-6)
 
 
 def test_a_computed_reading_has_no_step() -> None:
-    assert resolution(ANGLE) is None
-    assert resolution(ANGLE + 1e-4 * np.random.default_rng(1).standard_normal(2000)) is None
+    assert find_step(ANGLE) is None
+    assert find_step(ANGLE + 1e-4 * np.random.default_rng(1).standard_normal(2000)) is None
 
 
 def test_gaps_do_not_spoil_rate_and_uniformity() -> None:

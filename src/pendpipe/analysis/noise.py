@@ -1,4 +1,4 @@
-"""The step and the noise of a recording, from what no slow motion can touch."""
+"""The noise of a recording, from what no slow motion can touch."""
 
 import math
 from typing import Final
@@ -12,43 +12,11 @@ _GAIN: Final = float(math.comb(2 * _ORDER, _ORDER))
 """Sum of the squared weights of the fourth difference: what white noise is multiplied by."""
 _BLOCK: Final = 64
 _BLOCKS: Final = 256
-_LATTICE: Final = 2048
 
 
 def quantisation_rms(step: float | None) -> float:
     """Rms of the rounding to a step: ``step/sqrt(12)``; zero where no step is known."""
     return 0.0 if step is None else step / math.sqrt(12.0)
-
-
-def find_step(values: FloatArray) -> float | None:
-    """Find the step between the readings of a digital instrument.
-
-    The readings of a converter, an encoder or a file with few digits lie on a lattice:
-    every difference is a whole multiple of the smallest.
-
-    Parameters
-    ----------
-    values
-        Finite readings, shape (n,); a long recording is judged by its beginning, where
-        the motion crosses the most steps.
-
-    Returns
-    -------
-    float or None
-        The step in the unit of `values`; None when the readings lie on no lattice.
-    """
-    levels = np.sort(values[:_LATTICE])
-    gaps = levels[1:] - levels[:-1]
-    # Readings that differ by a rounding error of the file are one level.
-    gaps = gaps[gaps > 1e-7 * (levels[-1] - levels[0])]
-    if gaps.size < 2:
-        return None
-    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
-    ratio = gaps / step
-    ratio = ratio[ratio < 50.0]
-    if np.abs(ratio - np.round(ratio)).max() > 0.1:
-        return None
-    return step
 
 
 def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float = 0.5) -> float:

@@ -36,6 +36,8 @@ _TESTED_AFTER: Final = (
 )
 _SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
+_FAR: Final = 8.0
+"""Usual errors from which a reading is wrong, even at an end, where the tests can't tell."""
 _CLEAN_CHI2: Final = 1.3
 """Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
@@ -147,6 +149,10 @@ class Forensics:
         noise = replace(state.noise, weight=whole.weight)
         finding = TESTS[name](whole, state.fit, noise, self.samples)
         p_value = _global(finding)
+        error = np.abs(masked.residual(state.fit.at.reading))
+        usual = float(np.sqrt(np.mean(error[masked.weight > 0.0] ** 2)))
+        if np.all(error[fault.mask[: len(masked)]] > _FAR * usual):
+            return
         if p_value > self.level or finding.mask is None:
             progress(f"{name}: no longer needed with the final model")
             del state.faults[number]

@@ -94,15 +94,16 @@ def _drops(state: State) -> Iterator[Proposed]:
     """Drop one effect.
 
     The last one, which was significant, is not dropped where it leaves only noise, unless a fault
-    of the measurement was found after it.
+    of the measurement was found after it. A curve can follow sin x too, and does not replace it.
     """
     clean = Scale.of(state.fit, state.data, state.noise).clean
     joined = any(fault.after == len(state.steps) for fault in state.faults)
     if clean and len(state.steps) < 2 and not joined:
         return
+    drawn = any(step.winner.drawn for step in state.steps)
     for step in state.steps:
         effect = step.winner.lead.effect
-        if isinstance(effect, ReleasedParameter):
+        if isinstance(effect, ReleasedParameter) or (effect.parameter_free and drawn):
             continue
         without = refit_without(state, [step])
         if without is not None:

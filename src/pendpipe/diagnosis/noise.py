@@ -263,7 +263,8 @@ def _cycles_per_reading(data: Data, frequency_hz: float) -> tuple[float, float]:
     edges = np.arange(data.time_s[0], data.time_s[-1], _CYCLES_TOGETHER / frequency_hz)
     number = np.diff(np.searchsorted(data.time_s, edges))
     found = _CYCLES_TOGETHER / np.maximum(number, 1)
-    return min(usual, *found.tolist()), max(usual, *found.tolist())
+    every = [usual, *found.tolist()]
+    return min(every), max(every)
 
 
 def _with_spectrum(

@@ -245,7 +245,6 @@ def diagnose_decay(
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     changing = None if found.data.time_noise else level_note(found.noise)
     stamps = (*([gap] if gap else []), *found.clock_notes, *([changing] if changing else []))
-    noise_rms = max(found.noise.rms, found.data.step / 12.0**0.5)
     before = _fitted_model(found.baseline, found)
     if not fixed:
         # A part of b that is held bounds b here, and not in the fit.
@@ -255,6 +254,8 @@ def diagnose_decay(
     after = before if same else _fitted_model(found.improved, found, law)
     if not fixed and [each.key for each in found.improved.model.effects] == [SINE]:
         after = _as_fit_prints(after, part, points, baseline, "sine", place)
+    # What is left holds all noise.
+    noise_rms = max(min(found.noise.rms, after.residual_rms_rad), found.data.step / 12.0**0.5)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")

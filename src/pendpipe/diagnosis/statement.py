@@ -126,7 +126,7 @@ def statement(
         *(_effect(effect) for effect in named),
         _nameless([effect for effect in effects if effect not in named], rest=bool(named)),
         _improvement(len(effects), before, after, held, unit),
-        _changes(len(effects), before.parameters, after.parameters, unit),
+        _changes(len(effects), before.parameters, after.parameters, held, unit),
         _rest(unexplained, level, remainder),
     ]
     if swings is not None:
@@ -222,20 +222,34 @@ def _improvement(
         text += f", by a factor of {_factor(old / new)}"
     if held is None or not math.isfinite(held.gain):
         return text + "."
-    worse = held.gain < 0.0
+    worse = _fails(held)
     count = held.blocks - held.better if worse else held.better
     text += (
         f". Cycles that were left out of the fit are predicted {'worse' if worse else 'better'} in"
-        f" {count} of {held.blocks} parts of the record (from {compact(held.rms_before, unit)} to"
-        f" {compact(held.rms_after, unit)} rms)"
+        f" {count} of {held.blocks} parts of the record"
     )
+    if worse == (held.rms_after > held.rms_before):
+        old, new = held.rms_before, held.rms_after
+        text += f" (from {compact(old, unit)} to {compact(new, unit)} rms)"
     return f"{text}: the extended model fails this test." if worse else f"{text}."
 
 
+def _fails(held: HeldOut | None) -> bool:
+    """Whether the extended model predicts cycles that were left out worse."""
+    return held is not None and held.gain < 0.0
+
+
 def _changes(
-    number: int, before: Mapping[str, Estimate], after: Mapping[str, Estimate], unit: str
+    number: int,
+    before: Mapping[str, Estimate],
+    after: Mapping[str, Estimate],
+    held: HeldOut | None,
+    unit: str,
 ) -> str:
-    """What it changes in the small-angle period, in Q, and in the other parameters."""
+    """What it changes in the small-angle period, in Q, and in the other parameters.
+
+    What predicts worse says nothing of a bias without it.
+    """
     changed, kept, period = [], [], "small-angle period" if unit == "rad" else "period"
     for name, of in ((period, _period), ("Q limit (pi f/b)", _quality_factor)):
         old, new = of(before), of(after)
@@ -253,7 +267,7 @@ def _changes(
         if name in _PARAMETERS and _biased(before[name], new)
     ]
     text = f"This {listed(parts)}." if parts else ""
-    if moved:
+    if moved and not _fails(held):
         without = "it" if number == 1 else "them"
         text += f" Without {without} the fit is biased: {'; '.join(moved)}."
     return text.strip()

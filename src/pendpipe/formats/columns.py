@@ -20,11 +20,10 @@ from pendpipe.formats.table import (
     derivative_slope,
     follows_sine,
     periods,
-    resolution,
     swing_of,
 )
 from pendpipe.formats.words import Role, Unit, plain, role_of, unit_of
-from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
+from pendpipe.recording import Quantity, find_step, from_below, jumps_of_a_turn
 
 _WORTH: Final[Mapping[Role, float]] = {
     "angle": 6.0,
@@ -1026,7 +1025,7 @@ def _by_step(finite: FloatArray, named: bool) -> _Guess | None:
             if digit := _printed_digit(finite, scale):
                 why = f"converted to {other}, its values are multiples of {digit:.4g}"
                 return _Guess(unit, f"is taken to be in {name} ({why})")
-    step = resolution(finite)
+    step = find_step(finite)
     if step is None or _is_round(step, named=named):
         return None
     for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):

@@ -30,7 +30,6 @@ from pendpipe.formats.table import (
     find_gaps,
     is_uniform,
     most_unpacked,
-    resolution,
     sample_rate,
 )
 from pendpipe.formats.words import role_of, split_header, unit_of
@@ -41,6 +40,7 @@ from pendpipe.recording import (
     Recording,
     check,
     converter_step,
+    find_step,
     read_plain,
 )
 
@@ -252,7 +252,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         quantity=found.quantity,
         quality=quality if quality.any() else None,
         metadata=metadata,
-        resolution=own_step * found.factor if own_step is not None else resolution(values),
+        resolution=own_step * found.factor if own_step is not None else find_step(values),
         notes=tuple(notes),
         weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
         radius_excess=None if found.radius_excess is None else found.radius_excess[base.rows],
@@ -318,7 +318,7 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
             "name the reading's column, or choose it with --column and --unit",
         )
     recording = read_plain(place, data)
-    return replace(recording, resolution=recording.resolution or resolution(recording.values))
+    return replace(recording, resolution=recording.resolution or find_step(recording.values))
 
 
 def _header(data: bytes) -> list[str]:
@@ -460,7 +460,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     except InputError as fault:
         base = time_base(table, choice, options)
         time, values = base.time_s, column.values[base.rows]
-        unit, step = column.unit, column.resolution or resolution(values)
+        unit, step = column.unit, column.resolution or find_step(values)
         notes = [*table.notes, *choice.notes, f"the readings can't be analysed: {fault.problem}"]
     known = unit_of(column.unit) if column.unit else None
     scale = known.factor if known is not None and unit in ("rad", "V", "m") else 1.0

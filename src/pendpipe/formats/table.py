@@ -218,44 +218,6 @@ def find_gaps(time_s: FloatArray) -> list[Gap]:
     return [Gap(int(at), float(steps[at] - middle)) for at in np.flatnonzero(steps > limit)]
 
 
-def resolution(values: FloatArray) -> float | None:
-    """Find the step between readings: what all differences of neighbours are multiples of.
-
-    ``None`` where there is none (a computed or a smoothed reading). Neighbours, and not
-    all distinct values, since an encoder that has lost a count once has two ladders of
-    values with one step.
-    """
-    finite = values[np.isfinite(values)]
-    if len(finite) < 2 or np.abs(finite).max() > 1e100:
-        return None
-    jumps = np.abs(np.diff(finite))
-    # Values that arithmetic has left a rounding error apart are one value.
-    jumps = np.sort(jumps[jumps > 1e-9 * float(np.ptp(finite))])
-    if not len(jumps):
-        return None
-    smallest = float(jumps[min(2, len(jumps) - 1)])
-    near = float(jumps[jumps <= 1.35 * smallest].mean())
-    return _refined(jumps, near) or _refined(jumps, smallest)
-
-
-def _refined(jumps: FloatArray, step: float) -> float | None:
-    """Fit ``jump = k step`` and keep the step if nearly all jumps lie on it.
-
-    The reach of the fit grows, since an error of the step adds up over many steps.
-    """
-    reach, full = 2.0 * step, float(jumps[-1])
-    while True:
-        reach *= 2.0
-        near = jumps[jumps <= reach]
-        multiples = np.rint(near / step)
-        step = float(near @ multiples) / (float(multiples @ multiples) or np.inf) or step
-        # Jumps that belong to no ladder are spread evenly: 40 % of them within 0.2.
-        if np.mean(np.abs(near - multiples * step) < 0.2 * step) < 0.9:
-            return None
-        if reach >= full:
-            return step
-
-
 def clipped_samples(
     values: FloatArray, step: float | None, limits: tuple[float, float] | None = None
 ) -> int:

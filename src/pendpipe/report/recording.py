@@ -5,7 +5,6 @@ import io
 from matplotlib.figure import Figure
 
 from pendpipe.analysis.fit.result import (
-    LOSSES,
     WITHOUT_LAW,
     FitResult,
     qualities,
@@ -69,7 +68,7 @@ def render_recording(
             (
                 compact(each.amplitude_rad, unit),
                 with_error(each.quality_factor.value, each.quality_factor.sd),
-                f"{100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
+                each.cause,
             )
             for each in qualities(result)
         ]

@@ -406,6 +406,8 @@ LOSSES: Final = {
 
 
 WITHOUT_LAW: Final = "from the turning points alone"
+_TOLD: Final = 0.15
+"""Standard deviation of a loss's share up to which it is printed: a third is told from two."""
 _TOP: Final = 3.13
 """Amplitude in rad beyond which no correction is made for sin x."""
 
@@ -419,8 +421,15 @@ class Quality(NamedTuple):
     period_s: float
     dominant: str
     """A key of `LOSSES`."""
-    share: float
+    share: Estimate
     """The dominant loss over all losses."""
+
+    @property
+    def cause(self) -> str:
+        """The dominant loss and its share, in words, as far as the fit tells them."""
+        if not self.share.sd < _TOLD:
+            return "by losses that this fit does not tell apart"
+        return f"{100.0 * self.share.value:.0f} % {LOSSES[self.dominant]}"
 
 
 def qualities(result: FitResult) -> list[Quality]:
@@ -452,17 +461,25 @@ def _quality(result: FitResult, amplitude: float) -> Quality:
     dominant = max(losses, key=lambda name: losses[name])
     period = period_of(result, amplitude)
     value = math.pi / (period * loss) if loss > 0.0 else math.inf
-    error = Estimate(value, value * _relative_sd(result, amplitude), "")
-    return Quality(amplitude, error, period, dominant, losses[dominant] / sum(losses.values()))
+    covariance = _covariance_of_losses(result, amplitude)
+    error = Estimate(value, value * _sd(np.ones(3), covariance), "")
+    index = list(losses).index(dominant)
+    share = losses[dominant] / sum(losses.values())
+    of_it = Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
+    return Quality(amplitude, error, period, dominant, of_it)
 
 
-def _relative_sd(result: FitResult, amplitude: float) -> float:
-    """Relative standard deviation of a y + b + c/y, from the covariance of the three."""
+def _sd(weights: FloatArray, covariance: FloatArray) -> float:
+    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
+
+
+def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
+    """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
     place = [result.covariance_order.index(name) for name in "abc"]
     slope = np.array([amplitude, 1.0, 1.0 / amplitude])
-    variance = float(slope @ result.covariance[np.ix_(place, place)] @ slope)
     loss = float(slope @ [result.value(name) for name in "abc"])
-    return math.sqrt(max(variance, 0.0)) / loss if loss > 0.0 else math.inf
+    relative = slope / loss if loss > 0.0 else np.full(3, math.inf)
+    return relative[:, None] * result.covariance[np.ix_(place, place)] * relative
 
 
 def period_of(result: FitResult, amplitude: float) -> float:
@@ -551,7 +568,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
         found.append(
             _line(
                 f"Q at {compact(each.amplitude_rad, unit)}",
-                f"{q}, {100.0 * each.share:.0f} % {LOSSES[each.dominant]}",
+                f"{q}, {each.cause}",
             )
         )
     limit = result.quality_factor_limit

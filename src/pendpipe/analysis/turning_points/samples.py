@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.noise import find_step, noise_rms
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.recording import Recording
+from pendpipe.recording import Recording, find_step
 
 _FEWEST: Final = 16
 _SATURATED: Final = 0.1
