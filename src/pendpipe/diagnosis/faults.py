@@ -151,9 +151,9 @@ class Forensics:
         p_value = _global(finding)
         error = np.abs(masked.residual(state.fit.at.reading))
         usual = float(np.sqrt(np.mean(error[masked.weight > 0.0] ** 2)))
-        if np.all(error[fault.mask[: len(masked)]] > _FAR * usual):
-            return
         if p_value > self.level or finding.mask is None:
+            if np.all(error[fault.mask[: len(masked)]] > _FAR * usual):
+                return
             progress(f"{name}: no longer needed with the final model")
             del state.faults[number]
             self._quiet[name] = p_value

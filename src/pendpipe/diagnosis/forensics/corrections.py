@@ -396,9 +396,9 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
     possible = data.uniform and not data.time_noise if clock else unit > 0.0
     change = fit.at.sampled.velocity if clock else np.ones(len(data))
     slips = whole_steps(data, fit, unit * change) if possible else None
-    if slips is None:
+    slips = slips.joined() if slips and clock else slips
+    if slips is None or len(slips.rows) < _FEWEST:
         return data, nothing(name)
-    slips = slips.joined() if clock else slips
     when = data.time_s[slips.rows] - 0.5 * data.interval_s
     seen = (
         steps_of_the_time(samples, when, data.interval_s, fit.at.span.period_s) if clock else None
