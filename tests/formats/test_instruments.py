@@ -553,12 +553,21 @@ def test_of_a_phone_the_axis_is_read_that_swings_once_a_cycle(
     np.testing.assert_allclose(recording.values, across, atol=1e-5)
 
 
-def test_heights_above_the_floor_are_no_distances_from_a_pivot(
-    read_as: Callable[..., Recording],
+@pytest.mark.parametrize("down", [-1.0, 1.0])
+@pytest.mark.parametrize("origin", [(0.0, 1.1), (-3.2, 0.4), (0.1, -0.55)])
+def test_positions_from_any_origin_are_angles_about_the_pivot(
+    read_as: Callable[..., Recording], origin: tuple[float, float], down: float
 ) -> None:
-    x, height = LENGTH_M * np.sin(ANGLE), 1.1 - LENGTH_M * np.cos(ANGLE)
-    recording = read_as("t (s),x (m),y (m)\n" + rows(TIME, x, height))
-    same(recording, x, "m")
+    """A tracker's origin may lie anywhere, and a picture's y axis points down."""
+    random = np.random.default_rng(3)
+    x, y = 1e-3 * random.standard_normal((2, len(TIME)))
+    x += origin[0] + LENGTH_M * np.sin(ANGLE)
+    y += origin[1] + down * LENGTH_M * np.cos(ANGLE)
+    recording = read_as("t (s),x (m),y (m)\n" + rows(TIME, x, y))
+    assert recording.unit == "rad"
+    slope, offset = np.polyfit(ANGLE, recording.values, 1)
+    assert abs(slope - 1.0) < 0.02
+    assert abs(offset) < 0.01
 
 
 def test_a_position_whose_period_grows_as_an_angles_is_one(

@@ -3,6 +3,7 @@
 From the chosen columns come seconds that rise, and readings in radians, volts, metres or so.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -398,7 +399,7 @@ def _moves(column: Column) -> bool:
 
 
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
-    """Find x, y of something that moves on a circle about the origin, below or above it."""
+    """Find x, y of something that moves on a circle, about the origin or another pivot."""
     named = {column.name.lower(): column for column in columns}
     silent = tuple(column for column in columns if not column.name)
     pairs = [(named[a], named[b]) for a, b in ("xy", ("px", "py")) if {a, b} <= named.keys()]
@@ -408,7 +409,10 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
         for x, y in pairs or _bob_from_pivot(columns) or bare
         # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
         if not ("z" in named and not x.unit)
-        and _on_a_circle(x.values, y.values, named=bool(x.name))
+        and (
+            _on_a_circle(x.values, y.values, named=bool(x.name))
+            or (x.name and x.swing.clear and _pivot(x.values, y.values) is not None)
+        )
     )
     return next(round_the_pivot, None)
 
@@ -1086,10 +1090,41 @@ def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
 
 
 def _position(x: Column, y: Column) -> Readings:
-    """Turn a position seen from the pivot into an angle: atan2(x, -y), 0 straight down."""
-    down, sign = (-1.0, "-") if float(np.nanmedian(y.values)) < 0 else (1.0, "")
-    note = f"angle = atan2({x.label}, {sign}{y.label}), the position seen from the pivot"
-    angle, radius = np.arctan2(x.values, down * y.values), np.hypot(x.values, y.values)
+    """Turn a position into an angle about the pivot: atan2(x, -y), 0 straight down.
+
+    Positions that are not on a circle about (0, 0) are on one about the pivot.
+    """
+    left, up, seen = x.values, y.values, "the position seen from the pivot"
+    pivot = _pivot(left, up)
+    if pivot is not None:
+        left, up = left - pivot[0], up - pivot[1]
+        seen = f"about the centre of their circle, ({pivot[0]:.5g}, {pivot[1]:.5g})"
+    down, sign = (-1.0, "-") if float(np.nanmedian(up)) < 0 else (1.0, "")
+    note = f"angle = atan2({x.label}, {sign}{y.label}), {seen}"
+    angle, radius = np.arctan2(left, down * up), np.hypot(left, up)
     return Readings(
         angle, "angle_rad", 1.0, "rad", (note,), radius_excess=radius / np.nanmedian(radius) - 1.0
     )
+
+
+def _pivot(x: FloatArray, y: FloatArray) -> FloatArray | None:
+    """Find the centre of the circle on which positions lie: x^2 + y^2 = 2 (a x + b y) + c.
+
+    None where they lie on none, its centre is uncertain by 3 % of its radius, or within a tenth
+    of it of (0, 0), and where the swing is below a tenth of a radian.
+    """
+    good = np.isfinite(x) & np.isfinite(y)
+    points = np.column_stack([x[good], y[good]])
+    if len(points) < 8 or np.abs(points).max() > 1e100:
+        return None
+    middle = points.mean(axis=0)
+    design = np.column_stack([2.0 * (points - middle), np.ones(len(points))])
+    inverse = np.linalg.pinv(design)
+    centre = (inverse @ np.sum((points - middle) ** 2, axis=1))[:2] + middle
+    radius = np.hypot(*(points - centre).T)
+    mean, (wide, high) = float(radius.mean()), np.abs(points - centre).T
+    known = 2.0 * float(np.std(radius)) * float(np.linalg.norm(inverse[:2])) < 0.03
+    hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
+    elsewhere = math.hypot(*centre) > 0.1 * mean
+    clear = np.std(radius) < 0.3 * np.std(points[:, 1])
+    return centre if known and hangs and clear and elsewhere else None
