@@ -186,6 +186,8 @@ def diagnose_recording(
     check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")
     points, part = measure_recording(recording.as_motion(place=place), place)
+    for cut in points.cuts:
+        progress(f"left out: {cut.start_s:.4g} to {cut.stop_s:.4g} s, {cut.reason}")
     return diagnose_decay(
         part,
         points,

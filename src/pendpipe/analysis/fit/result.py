@@ -436,7 +436,7 @@ def qualities(result: FitResult) -> list[Quality]:
     """Evaluate the fitted law at a large, a middle and a small amplitude of the decay."""
     first = result.parameters["amplitude"].value
     seen = [check.amplitude_rad for check in result.decrement_check] or [first]
-    return [_quality(result, amplitude) for amplitude in seen]
+    return [_quality(result, amplitude) for amplitude in dict.fromkeys(seen)]
 
 
 def seen_qualities(result: FitResult) -> list[tuple[float, Estimate]]:
@@ -552,6 +552,9 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
         if result.method == "turning-points"
         else f"  {result.equation} fitted to {result.samples} readings"
     )
+    for cut in result.cuts:
+        when = f"{cut['start_s']:.4g} to {cut['stop_s']:.4g} s"
+        found.append(_line("left out", f"{when}: {cut['reason']}"))
     if not (result.light != "red" if law is None else law):
         found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
         for amplitude, seen in seen_qualities(result):
