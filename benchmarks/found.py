@@ -2,8 +2,9 @@
 
     python -m benchmarks.found [--decoys N] [--recordings]
 
-Facts of three kinds: an encoder loses counts, a clock loses time, a tracked mark wanders. Decoys
-look alike: a level that steps by any amount (0.6 to 2.6 counts) at a quarter of the reversals, or
+Facts of four kinds: an encoder loses counts, a clock loses time or slips by whole samples, a
+tracked mark wanders. Decoys look alike: steps of the time that are no whole samples, several knocks
+or offsets; a level that steps by any amount (0.6 to 2.6 counts) at a quarter of the reversals, or
 wanders as a random walk, of encoders that are read at each edge, or at fixed times; a knock, an
 offset, a clock that wanders; errors of both coordinates of a mark that have nothing to do with
 each other, a camera that looks obliquely and a pivot that is misplaced, a string that stretches.
@@ -201,6 +202,84 @@ TIME: Final = Kind(
 )
 
 
+# ---------------------------------------------------------------- slips of a clock
+
+STAMP_S: Final = 5e-3
+
+
+def slipping(*, whole: bool) -> Callable[[Swing, float], Recording]:
+    """A clock that misses or repeats samples 12 to 30 times, or jumps by parts of them."""
+
+    def make(swing: Swing, _: float) -> Recording:
+        random, size = swing.random, int(LASTS_S / STAMP_S)
+        number = int(random.integers(12, 31))
+        steps = np.ones(number) if whole else random.uniform(0.6, 2.4, number)
+        rows = random.choice(np.arange(400, size - 400), number, replace=False)
+        late = np.cumsum(np.bincount(rows, steps * random.choice([-1.0, 1.0], number), size))
+        return swing.sampled(swing.angle, 0.5 + STAMP_S * late)
+
+    return make
+
+
+def shaken(swing: Swing, _: float) -> Recording:
+    """A reading that is off by another amount from each of a dozen instants on."""
+    rows = swing.random.choice(len(swing.time_s), 12, replace=False)
+    steps = swing.random.choice([-1.0, 1.0], 12) * swing.random.uniform(0.005, 0.03, 12)
+    return swing.sampled(swing.angle + np.cumsum(np.bincount(rows, steps, len(swing.time_s))))
+
+
+SLIPS: Final = {
+    "whole samples missed or repeated": slipping(whole=True),
+    "decoy: parts of samples": slipping(whole=False),
+    "decoy: a dozen offsets": shaken,
+    "decoy: a clock that wanders": drifting,
+}
+CLOCK: Final = Kind("clock-slips", time_test, SLIPS, tuple(SLIPS))
+
+
+def repeated_s(recording: Recording, period_s: float) -> Array:
+    """When a sample is repeated: instants where the time steps by -1, by polynomials alone.
+
+    A quintic with a step of the time in its middle, over a tenth of a period on each side, row by
+    row; what stands out by twelve standard deviations counts, the largest of its neighbourhood.
+    """
+    values, side = (
+        recording.values,
+        int(0.09 * period_s / float(np.median(np.diff(recording.time_s)))),
+    )
+    at = (np.arange(2 * side) - side + 0.5) / side
+    basis = np.linalg.qr(np.vander(at, 6))[0]
+    windows = np.lib.stride_tricks.sliding_window_view(values, 2 * side)
+    steps, errors = (np.zeros(len(windows)) for _ in range(2))
+    for row, window in enumerate(windows):
+        smooth = basis @ (basis.T @ window)
+        change = np.gradient(smooth) * (at > 0.0)
+        change -= basis @ (basis.T @ change)
+        square = float(change @ change) + 1e-300
+        steps[row] = float(change @ (window - smooth)) / square
+        left = window - smooth - steps[row] * change
+        errors[row] = math.sqrt(float(left @ left) / (2 * side - 7) / square)
+    clear = np.abs(steps) / errors
+    top = np.array([clear[max(row - side, 0) : row + side].max() for row in range(len(clear))])
+    found = np.flatnonzero((clear == top) & (clear > 12.0) & (np.abs(steps + 1.0) < 0.15))
+    return np.asarray(recording.time_s[found + side])
+
+
+def regularity(name: str) -> str:
+    """Whether samples are repeated at regular intervals, as where two clocks beat."""
+    path = Path(RECORDINGS / name)
+    points, part = measure_recording(pp.read(path).as_motion(), path)
+    when = repeated_s(part, 1.0 / points.apparent_frequency_hz)
+    number = np.round((when - when[0]) / np.median(np.diff(when)))
+    (every, _), rest, *_ = np.polyfit(number, when, 1, full=True)
+    scatter = math.sqrt(float(rest[0]) / max(len(when) - 2, 1))
+    instants = ", ".join(f"{each:.3f}" for each in when)
+    return (
+        f"{path.stem}: a sample is repeated at {instants} s: every {every:.4f} s, within"
+        f" {1e3 * scatter:.1f} ms"
+    )
+
+
 # ---------------------------------------------------------------- wander of a mark
 
 
@@ -275,7 +354,7 @@ MARK: Final = Kind(
         "decoy: a string that stretches": stretched,
     },
 )
-KINDS: Final = (COUNTS, TIME, MARK)
+KINDS: Final = (COUNTS, TIME, CLOCK, MARK)
 
 
 def is_claimed(kind: Kind, name: str, number: int) -> bool:
@@ -347,6 +426,14 @@ def print_recordings() -> None:
         found = kind.test(part, at_s, 1.0 / points.apparent_frequency_hz)
         said = f"{found.summary}: p = {found.p_value:.2g}" if found else "not tested"
         print(f"{path.stem}: {kind.effect}: {said}", flush=True)
+    for name in ("adip", "cdip"):
+        file = f"profcarter-adip/{name}_pend_data.mat"
+        effects = pp.diagnose(RECORDINGS / file).to_dict()["effects"]
+        for each in effects:
+            if each["id"] == "clock-slips":
+                sure = each["confirmed"]
+                print(f"{name}: clock-slips: {sure['summary']}: p = {sure['p_value']:.2g}")
+        print(regularity(file), flush=True)
 
 
 if __name__ == "__main__":
