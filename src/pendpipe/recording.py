@@ -284,7 +284,7 @@ def from_below(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
         if turns and abs(centre - shift) < near:
             notes.append(
                 f"the angle swings about {centre:.3f} rad: {shift:.4f} rad"
-                f" ({turns} {words}) taken off, so that it hangs at 0"
+                f" ({turns} {words}) taken off, so that it hangs near 0"
             )
             return values - shift, tuple(notes)
     return values, tuple(notes)

@@ -224,6 +224,7 @@ def _undriven(run: Run) -> Run:
 
 _SHORT: Final = 8.0
 """Half periods below which a rest between two motions is part of the handling."""
+_BY_HAND: Final = "held or moved by hand before release"
 _NO_DECAY: Final = "no free decay: handling, clamp, repositioning or drive"
 
 
@@ -405,7 +406,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     ]
     half, swing = run.half_period_s, float(run.swing[0])
     quiet = max(2.0 * least, 0.02 * swing)
-    before = "driven: the amplitude is held up" if run.driven else "moved by hand before release"
+    before = "driven: the amplitude is held up" if run.driven else _BY_HAND
     centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
     wide = np.abs(values[time < start] - centre).max(initial=0.0)
     if recording.quantity == "angle_rad" and wide > np.pi > 0.5 * swing:
@@ -535,7 +536,7 @@ def _beating(
         stop,
         quiet=2.0 * least,
         window_s=half_period,
-        before="moved by hand before release",
+        before=_BY_HAND,
     )
     return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
 

@@ -132,7 +132,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
     if picked:
         return Choice(time, counts, tuple(picked), channels)
-    mine, others = _of_one_run(channels, time)
+    time, mine, others = _of_one_run(channels, time)
     readings, notes, weak = _readings(mine, time)
     # What an instrument sampled by a clock of its own is no list.
     told = readings or [c for c in mine if c.role != "index"]
@@ -153,7 +153,7 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         else "name it with --column (and its unit with --unit)",
     )
     if others:
-        notes = (*notes, f"the first of several runs is read; choose with --column: {others}")
+        notes = (*notes, f"one of several runs is read; choose with --column: {others}")
     return Choice(time, counts, readings, channels, notes, weak)
 
 
@@ -275,22 +275,37 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
     return found, found is not None and _counts_samples(found)
 
 
-def _of_one_run(channels: Sequence[Column], time: Column | None) -> tuple[Sequence[Column], str]:
-    """Of runs side by side, each with its own time column, keep one; name the others."""
+def _of_one_run(
+    channels: Sequence[Column], time: Column | None
+) -> tuple[Column | None, Sequence[Column], str]:
+    """Of runs side by side, each with its own time column, keep the first that swings.
+
+    Returns its time column and its others, and the names of the other runs' columns.
+    """
     start = time.number if time is not None else len(channels) + 2
     clocks = [
-        c.number
+        c
         for c in channels
         if time is not None and _moves(c) and (c.role == "time" or _same(time, c))
     ]
-    holding = [c.number for c in channels if _WORTH[c.role] > 0.5 and _moves(c)]
-    end = min((number for number in clocks if number > start), default=start)
-    if not any(start < number < end for number in holding):
-        return channels, ""
-    mine = [c for c in channels if start < c.number < end]
-    wanted = [c.number - start for c in mine]
-    others = [c.label for c in channels if any(c.number - number in wanted for number in clocks)]
-    return mine, listed(others, 6)
+    starts = [start, *(c.number for c in clocks if c.number > start)]
+    ends = [*starts[1:], len(channels) + 2]
+    runs = [
+        [c for c in channels if first < c.number < end]
+        for first, end in zip(starts, ends, strict=True)
+    ]
+    if len(starts) == 1 or not any(_WORTH[c.role] > 0.5 and _moves(c) for c in runs[0]):
+        return time, channels, ""
+    one = next((k for k, run in enumerate(runs) if any(c.swing.clear for c in run)), 0)
+    wanted = [c.number - starts[one] for c in runs[one]]
+    before = [c.number for c in (*clocks, *([time] if time and one else []))]
+    others = [
+        c.label
+        for c in channels
+        if c not in runs[one] and any(c.number - number in wanted for number in before)
+    ]
+    clock = next((c for c in clocks if c.number == starts[one]), time)
+    return clock, runs[one], listed(others, 6)
 
 
 def _same(clock: Column, column: Column) -> bool:

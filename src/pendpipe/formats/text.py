@@ -880,6 +880,7 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
             # Rigol's names go on beyond the rows.
             longer = layout.delimiter in "\t;," and number >= filled[-1][0] - 1 and cells == own
             cells = cells[: layout.width] if longer else _trimmed(cells, layout.width)
+            cells = [cell.lstrip("#%") for cell in cells]
             said = [any(map(str.isalpha, cell)) or "°" in cell for cell in cells]
             numbers = list(map(layout.is_number, cells))
             texts = sum(a and not b for a, b in zip(said, numbers, strict=True))
@@ -894,7 +895,7 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
                 and not ((candidates or layout.width < 4) and any(numbers))
                 and not (_are_units(cells) and candidates and candidates[-1][0] == len(cells))
             ):
-                candidates.append((len(cells), number, [cell.lstrip("#%") for cell in cells]))
+                candidates.append((len(cells), number, cells))
                 break
     _, number, names = max(candidates, key=lambda entry: entry[:2], default=(0, 0, []))
     return number, names

@@ -595,7 +595,9 @@ def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
 def quotable(result: FitResult) -> str:
     """Advise which of the numbers to quote."""
     if result.light == "green":
-        return "Quote these numbers with their errors."
+        told = all(each.share.sd < _TOLD for each in qualities(result))
+        rest = "" if told else " This decay does not tell a, b and c apart: quote period and Q."
+        return "Quote these numbers with their errors." + rest
     if result.light_reason.startswith(BEAT):
         return "Quote the frequency and the loss of each mode; pendpipe diagnose fits both."
     if result.light == "red":

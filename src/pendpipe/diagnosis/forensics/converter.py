@@ -237,7 +237,7 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         if 2 * len(counts.code) == comb.period:
             bit = comb.period.bit_length() - 2
             parameters["bit"] = Estimate(float(bit), 0.0, "")
-            lead = f"bit {bit} of the converter is stuck or unreliable: "
+            lead = f"bit {bit} of the converter is stuck or unreliable, or its steps are unequal: "
     return Finding(
         "missing-codes",
         comb.p_value,
