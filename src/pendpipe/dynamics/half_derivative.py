@@ -62,7 +62,9 @@ def half_derivative(motion: Motion, first: int = 0) -> FloatArray:
     # All before that.
     lasts = time[:, -1]
     whole = float(motion.time_s[-1, -1] - motion.time_s[first, 0])
-    logs = np.arange(-math.log(whole) - 8.0, math.log(18.0 / np.min(lasts)), _SPACING)
+    # Beyond the readings a half cycle need not be solved.
+    shortest = np.min(lasts, where=lasts > 0.0, initial=whole)
+    logs = np.arange(-math.log(whole) - 8.0, math.log(18.0 / shortest), _SPACING)
     rates, sizes = np.exp(logs), _SPACING / math.pi * np.exp(0.5 * logs)
     values, slopes = _between(order, "even")
     to_go = lasts[:, None] - time @ values
