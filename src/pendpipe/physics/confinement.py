@@ -246,12 +246,11 @@ def _legendre(order: int, x: Any, s: Any) -> tuple[Any, Any, Any]:
 
 def _bessel(order: int, alpha: complex) -> tuple[ComplexArray, ComplexArray]:
     """Return e^x k_l(x) and (x k_l)'/k_l at x = alpha, for l = 1 to `order`."""
-    values = [1.0 / alpha, 1.0 / alpha + 1.0 / alpha**2]
-    for n in range(1, order):
-        values.append(values[n - 1] + (2 * n + 1) / alpha * values[n])
-    k = np.array(values, dtype=np.complex128)
-    orders = np.arange(1, order + 1)
-    return k[1:], -(alpha * k[:-1] / k[1:] + orders)
+    from scipy.special import kve
+
+    orders = np.arange(order + 1)
+    k = np.sqrt(2.0 / (np.pi * alpha)) * kve(orders + 0.5, alpha)
+    return k[1:], -(alpha * k[:-1] / k[1:] + orders[1:])
 
 
 def _on_the_sphere(
@@ -290,15 +289,14 @@ def _sent_back(
     u_x = p J_0 + q J_2 cos 2 phi, u_y = q J_2 sin 2 phi. With d = q - p and t = q + p
     continuity is k d + dw/dz = 0, and t, alone, is the part without divergence.
     """
-    from scipy.special import j0 as bessel_0
-    from scipy.special import j1 as bessel_1
+    from scipy import special
 
     k, weight = _wave_numbers(min(floor, above or floor) - 1.0)
     gamma = np.sqrt(k**2 + alpha**2)
     amplitudes = _reflected(order, alpha, k, gamma, floor, above, surface)
     sine = np.sqrt(1.0 - cosine**2)
     rho = np.outer(sine, k)
-    j0, j1 = bessel_0(rho), bessel_1(rho)
+    j0, j1 = special.j0(rho), special.j1(rho)
     j2 = 2.0 * j1 / np.maximum(rho, 1e-12) - j0
     total = np.zeros((3 * cosine.size, 3 * order), dtype=np.complex128)
     for distance, sign, waves in amplitudes:

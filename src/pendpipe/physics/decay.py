@@ -162,16 +162,8 @@ _SERIES_BELOW = 1.0
 _TERMS = 18
 
 
-def _series(x: AnyArray, coefficients: list[float]) -> AnyArray:
-    """Sum a power series by Horner's rule."""
-    total = np.full_like(x, coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        total = total * x + coefficient
-    return total
-
-
-_RAMP = [(-1.0) ** n / math.factorial(n + 2) for n in range(_TERMS)]
-_HYPERBOLIC = [2.0 / math.factorial(2 * n + 3) for n in range(_TERMS // 2)]
+_RAMP = [(-1.0) ** n / math.factorial(n + 2) for n in reversed(range(_TERMS))]
+_HYPERBOLIC = [2.0 / math.factorial(2 * n + 3) for n in reversed(range(_TERMS // 2))]
 
 
 def _moments(t: FloatArray, r: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
@@ -184,9 +176,9 @@ def _moments(t: FloatArray, r: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
     fading = np.exp(-x)
     small = np.abs(x) < _SERIES_BELOW
     near, far = np.where(small, x, 0.0), np.where(small, 1.0, x)
-    ramp = np.where(small, _series(near, _RAMP), (far - 1.0 + np.exp(-far)) / far**2)
+    ramp = np.where(small, np.polyval(_RAMP, near), (far - 1.0 + np.exp(-far)) / far**2)
     bulge = (1.0 - np.exp(-2.0 * far) - 2.0 * far * np.exp(-far)) / far**3
-    bulge = np.where(small, fading * _series(near**2, _HYPERBOLIC), bulge)
+    bulge = np.where(small, fading * np.polyval(_HYPERBOLIC, near**2), bulge)
     return saturation(r, t) * fading, t**2 * ramp * fading, t**3 * bulge
 
 

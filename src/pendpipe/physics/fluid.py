@@ -234,8 +234,6 @@ POTENTIAL_FLOW_ADDED_MASS = 0.5
 
 
 _ROUNDS: Final = 50
-_NODES: Final = np.linspace(0.0, 8.0, 161)
-"""Of the trapezoidal rule over t in exp(-x cosh t): it converges exponentially."""
 
 
 def free_decay_root(
@@ -325,11 +323,10 @@ def cylinder_drag(
     FloatArray
         In N s/m^2, in phase with the velocity that it opposes.
     """
+    from scipy.special import kve
+
     argument = radius_m * np.sqrt(1j * angular_frequency_per_s * density_kg_per_m3 / viscosity_pa_s)
-    # K_n(z) = int_0^inf exp(-z cosh t) cosh(n t) dt; the factor exp(z) cancels in the ratio.
-    cosh = np.cosh(_NODES)
-    kernel = np.exp(-argument[..., None] * (cosh - 1.0))
-    kernel[..., 0] *= 0.5
-    ratio = (kernel * cosh).sum(axis=-1) / kernel.sum(axis=-1)
+    # Both times exp(z), which cancels in the ratio.
+    ratio = kve(1, argument) / kve(0, argument)
     displaced = np.pi * density_kg_per_m3 * radius_m**2
     return displaced * angular_frequency_per_s * np.real(4.0j * ratio / argument)

@@ -284,9 +284,8 @@ def period_lengthening(
     torque. Parameters as in `swing`.
     """
     bare = swing(parts, None, gravity_m_per_s2).angular_frequency_per_s
-
-    def longer(*, buoyancy: bool, added_mass: bool) -> FloatArray:
-        wet = swing(
+    wet = (
+        swing(
             parts,
             fluid,
             gravity_m_per_s2,
@@ -294,13 +293,9 @@ def period_lengthening(
             buoyancy=buoyancy,
             added_mass=added_mass,
         )
-        return plain(bare / wet.angular_frequency_per_s - 1.0)
-
-    return Lengthening(
-        longer(buoyancy=True, added_mass=False),
-        longer(buoyancy=False, added_mass=True),
-        longer(buoyancy=True, added_mass=True),
+        for buoyancy, added_mass in ((True, False), (False, True), (True, True))
     )
+    return Lengthening(*(plain(bare / each.angular_frequency_per_s - 1.0) for each in wet))
 
 
 @equation
