@@ -8,8 +8,6 @@ Other packages add commands by entry points of the group ``pendpipe.commands``; 
 commands of its own declares them by a function ``add_arguments(parser)`` instead.
 """
 
-from __future__ import annotations
-
 import argparse
 import difflib
 import importlib
@@ -17,14 +15,11 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import Any, Final, NoReturn
 
 from pendpipe.errors import InputError
 from pendpipe.process import one_thread
 from pendpipe.version import __version__
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 COMMANDS: Final = {
     "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
@@ -73,8 +68,8 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {line}; see {self.prog} --help\n")
 
 
-def _added() -> dict[str, EntryPoint]:
-    """The commands that other packages add."""
+def _added() -> dict[str, Any]:
+    """The entry points of the commands that other packages add."""
     from importlib.metadata import entry_points
 
     return {found.name: found for found in entry_points(group="pendpipe.commands")}

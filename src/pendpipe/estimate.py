@@ -1,10 +1,8 @@
 """A number with its uncertainty, as it stands in every result file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 
 def number(value: float | None) -> float:
@@ -63,7 +61,7 @@ class Estimate:
         }
 
     @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Estimate:
+    def from_json(cls, entry: Mapping[str, Any]) -> Self:
         """Read what `as_json` (or `dataclasses.asdict`) has made; null stands for NaN."""
         interval = entry.get("interval95")
         ends = None if interval is None else (number(interval[0]), number(interval[1]))

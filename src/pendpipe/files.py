@@ -4,8 +4,8 @@ import errno
 import hashlib
 import json
 import math
-import os
 import re
+import secrets
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -44,17 +44,13 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
             with target.open(mode, **text) as stream:  # type: ignore[call-overload]
                 yield stream
             return
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+        beside = temporary.open(mode.replace("w", "x"), **text)  # type: ignore[call-overload]
     except OSError as fault:
         raise _cannot_write(target, fault) from None
-    temporary = Path(name)
     try:
-        with os.fdopen(handle, mode, **text) as stream:  # type: ignore[call-overload]
-            yield stream
-        # mkstemp gives 0600; a result is as readable as any other file its user makes.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
+        with beside:
+            yield beside
         temporary.replace(target)
     except BaseException as fault:
         temporary.unlink(missing_ok=True)
@@ -145,6 +141,11 @@ def read_json(path: str | Path) -> Any:
     except (ValueError, RecursionError) as fault:
         problem = f"this is no JSON ({fault})" if place.stat().st_size else "it is empty"
         raise DamagedError(place, problem, "delete it and run again") from None
+
+
+def digest(content: Any) -> str:
+    """Hash any JSON-like content, the same on every machine."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def sha256(path: str | Path) -> str:

@@ -14,8 +14,6 @@ such a parameter: it lists every damage of a stage's results, and keeps those th
 so that each damage runs the stage once.
 """
 
-import hashlib
-import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -24,7 +22,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import read_json, sha256, write_json
+from pendpipe.files import digest, read_json, sha256, write_json
 from pendpipe.version import __version__
 
 FOLDER: Final = "manifest"
@@ -98,7 +96,7 @@ class Manifest:
         for name in ("outputs", "extras", "sources"):
             content[name] = {key: entry._asdict() for key, entry in getattr(self, name).items()}
         content |= {"inputs": self.inputs, "repaired": list(self.repaired)}
-        write_json(self.path, content | {"check": _digest(content)})
+        write_json(self.path, content | {"check": digest(content)})
 
     def damages(self, *, hash_all: bool = False) -> list[Damage]:
         """Compare the results with what was written.
@@ -122,7 +120,7 @@ def read_manifest(home: Path, stage: str) -> Manifest:
         return manifest
     try:
         content = read_json(manifest.path)
-        if content.pop("check") != _digest(content):
+        if content.pop("check") != digest(content):
             raise ValueError
         for name in ("outputs", "extras", "sources"):
             setattr(manifest, name, {key: Sum(**entry) for key, entry in content[name].items()})
@@ -132,11 +130,6 @@ def read_manifest(home: Path, stage: str) -> Manifest:
         damage = Damage(manifest.path, "this manifest is torn or altered", found)
         return Manifest(home, stage, own_damage=damage)
     return manifest
-
-
-def _digest(content: dict[str, Any]) -> str:
-    """Hash a manifest's own content."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def manifests(home: Path) -> Iterator[Manifest]:

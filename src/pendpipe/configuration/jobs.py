@@ -1,15 +1,13 @@
 """What the workflow's rules need to know about a campaign: names, sources, digests."""
 
-import hashlib
-import json
 import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pendpipe import files
 from pendpipe.configuration.load import Campaign
-from pendpipe.files import replaced
 from pendpipe.manifest import source_sha256
 from pendpipe.process import one_thread
 
@@ -26,9 +24,8 @@ def prepare_environment() -> None:
 
 
 def digest(content: Any) -> str:
-    """Hash any JSON-like content, the same on every machine."""
-    text = json.dumps(content, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    """Hash what a job depends on, short enough for a parameter or a file's name."""
+    return files.digest(content)[:12]
 
 
 def store(campaign: Campaign, folder: str | Path) -> str:
@@ -41,8 +38,7 @@ def store(campaign: Campaign, folder: str | Path) -> str:
     content = campaign.configuration.model_dump(mode="json")
     path = Path(folder) / f"configuration-{digest(content)}.json"
     if not path.exists():
-        with replaced(path) as stream:
-            json.dump(content, stream, indent=1)
+        files.write_json(path, content)
     return path.as_posix()
 
 
