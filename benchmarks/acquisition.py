@@ -339,7 +339,7 @@ def clock_table(_folder: Path) -> str:
                 made = scans + np.where(scans > place, lost, 0)
                 losses, _ = find_clock_losses(made / 100.0 + delay, scans, 100.0)
                 found += bool(losses)
-                right += len(losses) == 1 and abs(losses[0].scans - lost) <= 1
+                right += len(losses) == 1 and abs(losses[0][1] - lost) <= 1
             lines.append(
                 f"| {1e3 * delay_s:g} ms | {1e3 * np.median(limits):.0f} ms | {lost} | "
                 f"{found / 5:.1f} % | {right / 5:.1f} % | {invented / 5:.1f} % |"
@@ -405,7 +405,7 @@ def slip_table(_folder: Path) -> str:
                 and (slips[0].next_byte + gone) % size == 0
             )
             right += true
-            doubted += bool(slips) and not true and not all(slip.sure for slip in slips)
+            doubted += bool(slips) and not true and any("unsure" in slip.reason for slip in slips)
         lines.append(
             f"| {swing[0]} | {100 * found / RUNS:.1f} % | {100 * right / RUNS:.1f} % | "
             f"{100 * doubted / RUNS:.1f} % | {100 * invented / RUNS:.1f} % |"

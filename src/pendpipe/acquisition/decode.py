@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from pendpipe.acquisition.raw import (
     is_being_recorded,
     read_raw,
 )
-from pendpipe.acquisition.slips import find_slips
+from pendpipe.acquisition.slips import Cut, find_slips
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
@@ -412,11 +412,11 @@ def _decode(
     counts, losses = _scans_of(data, holes, decoder)
     made, good = _scans_by(arrived_bytes, losses, decoder.bytes_per_scan)
     missing, limit_s = find_clock_losses(arrival_s, made, rate_hz, scale)
-    for loss in missing:
+    for arrival, lost in missing:
         # It was lost on the way to this arrival, behind what the one before had brought.
-        place = min(len(counts), max(1, round(float(good[loss.first_arrival - 1]))))
-        losses = (*losses, Loss(place, 0, loss.scans, suspect_before=True, reason="clock"))
-        made[loss.first_arrival :] += loss.scans
+        place = min(len(counts), max(1, round(float(good[arrival - 1]))))
+        losses = (*losses, Loss(place, 0, lost, suspect_before=True, reason="clock"))
+        made[arrival:] += lost
     return Segment(
         counts, tuple(sorted(losses, key=lambda loss: loss.after_scan)), arrival_s, made, limit_s
     )
@@ -444,39 +444,28 @@ def _scans_of(
             break
         thrown = cut.next_byte - cut.last_byte
         lost = -(-(thrown + cut.bytes_missing) // size)
-        losses.append(Loss(scans, thrown, lost, suspect_before=cut.suspect, reason=cut.reason))
+        losses.append(
+            Loss(scans, thrown, lost, suspect_before=cut.reason != "damage", reason=cut.reason)
+        )
         begin = cut.next_byte
     counts = [part for part in parts if len(part)] or parts[:1]
     return np.concatenate(counts) if len(counts) > 1 else counts[0], tuple(losses)
 
 
-class _Cut(NamedTuple):
-    """Where a stream is taken apart: what is between the two bytes is thrown away."""
-
-    last_byte: int
-    next_byte: int
-    reason: str
-    bytes_missing: int = 0
-    suspect: bool = False
-
-
-def _cuts(data: bytes, holes: Sequence[Hole], size: int, *, marked: bool) -> list[_Cut]:
+def _cuts(data: bytes, holes: Sequence[Hole], size: int, *, marked: bool) -> list[Cut]:
     """Find the places where a stream of scans of so many bytes is out of step."""
-    cuts: list[_Cut] = []
+    cuts: list[Cut] = []
     begin = 0
     for hole in (*holes, None):
         end = len(data) if hole is None else hole.at_byte
         if not marked:
-            for slip in find_slips(data[begin:end], size // 2):
-                reason = "slip" if slip.sure else "slip, channels unsure"
-                last, following = begin + slip.last_byte, begin + slip.next_byte
-                cuts.append(_Cut(last, following, reason, suspect=True))
+            cuts += find_slips(data[:end], size // 2, begin)
             begin = cuts[-1].next_byte if cuts else begin
         if hole is None:
             break
         last = end - (end - begin) % size
         following = end + -(end - last + hole.bytes_missing) % size
-        cuts.append(_Cut(last, min(following, len(data)), "damage", hole.bytes_missing))
+        cuts.append(Cut(last, min(following, len(data)), "damage", hole.bytes_missing))
         begin = cuts[-1].next_byte
     return cuts
 
@@ -567,25 +556,9 @@ def measure_rate(
     return TimeBase(nominal_hz, float(1.0 / interval), float(sd / interval**2))
 
 
-@dataclass(frozen=True)
-class ClockLoss:
-    """Scans missing between two arrivals.
-
-    Parameters
-    ----------
-    first_arrival
-        The index of the first arrival after it.
-    scans
-        How many are missing, rounded.
-    """
-
-    first_arrival: int
-    scans: int
-
-
 def find_clock_losses(
     arrival_s: FloatArray, scans: FloatArray, nominal_hz: float, clock_scale: float = 1.0
-) -> tuple[list[ClockLoss], float]:
+) -> tuple[list[tuple[int, int]], float]:
     """Find whole-scan losses.
 
     Parameters
@@ -601,8 +574,9 @@ def find_clock_losses(
 
     Returns
     -------
-    list of ClockLoss
-        Steps of the lateness that stay, in order.
+    list of tuple
+        Steps of the lateness that stay, in order: the index of the first arrival after each,
+        and how many scans are missing before it, rounded.
     float
         The limit: losses shorter than so many seconds, and those within three stretches
         of the ends, are not seen. Infinite for too few arrivals.
@@ -629,7 +603,7 @@ def find_clock_losses(
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
     interval_s = slope + 1.0 / nominal_hz
     limit_s = max(_FEWEST_SCANS * interval_s, _HOST_S * clock_scale, _SPREADS * spread)
-    found: list[ClockLoss] = []
+    found: list[tuple[int, int]] = []
     before = np.maximum.accumulate(level)
     after = np.minimum.accumulate(level[::-1])[::-1]
     index = _BESIDE - 1
@@ -648,7 +622,7 @@ def find_clock_losses(
         begin, end = int(first[index]), int(first[index + 2])
         least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
         at = begin + 1 + int(np.argmax(np.diff(least_after)))
-        found.append(ClockLoss(at, max(1, round(rise / interval_s))))
+        found.append((at, max(1, round(rise / interval_s))))
         index += _BESIDE
     return found, limit_s
 

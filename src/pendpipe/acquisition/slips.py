@@ -6,8 +6,7 @@ of the full scale, and what is read one byte later becomes smooth. Only that *ch
 to the other, is believed: a signal that looks odd throughout is left alone.
 """
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -25,26 +24,29 @@ _MARGIN: Final = 3
 _NEAR: Final = 8
 
 
-@dataclass(frozen=True)
-class Slip:
-    """A place where the bytes slipped.
+class Cut(NamedTuple):
+    """Where a stream is taken apart: what is between the two bytes is thrown away.
 
     Parameters
     ----------
     last_byte
-        Up to here the words are in step as before: a whole number of scans since the last slip.
+        Up to here the scans are in step as before: a whole number of them since the last cut.
     next_byte
         From here on they are in step again.
-    sure
-        Whether the levels tell which channel is which behind it.
+    reason
+        ``"slip"``, ``"slip, channels unsure"`` where the levels don't tell which channel is
+        which behind it, or ``"damage"``.
+    bytes_missing
+        What the stream lacks there besides.
     """
 
     last_byte: int
     next_byte: int
-    sure: bool = True
+    reason: str
+    bytes_missing: int = 0
 
 
-def find_slips(data: bytes, channels: int) -> list[Slip]:
+def find_slips(data: bytes, channels: int, begin: int = 0) -> list[Cut]:
     """Find where a stream of little-endian 16-bit words slips by an odd number of bytes.
 
     Parameters
@@ -53,24 +55,25 @@ def find_slips(data: bytes, channels: int) -> list[Slip]:
         The stream.
     channels
         Words in a scan.
+    begin
+        From here on the words are held to be in step.
 
     Returns
     -------
-    list of Slip
+    list of Cut
         In order. What slips by an even number (whole words: the channels change places), a
         signal that changes by more than some 2000 codes from scan to scan, or that stands
         still to the last bit, can't be found so.
     """
     size = 2 * channels
-    slips: list[Slip] = []
-    begin = 0
+    slips: list[Cut] = []
     while found := _next_slip(data, begin, size):
         slips.append(found)
         begin = found.next_byte
     return slips
 
 
-def _next_slip(data: bytes, begin: int, size: int) -> Slip | None:
+def _next_slip(data: bytes, begin: int, size: int) -> Cut | None:
     """Find the first slip behind `begin`, where the words are held to be in step."""
     scans = (len(data) - begin) // size - 1
     in_step: int | None = None
@@ -83,7 +86,7 @@ def _next_slip(data: bytes, begin: int, size: int) -> Slip | None:
     return None
 
 
-def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Slip:
+def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Cut:
     """Place a slip between two scans: the sum of what is smooth on either side is least there."""
     here, beside = _roughness(data, begin + first * size, last - first, size)
     at = max(_MARGIN, first + int(np.argmin(np.cumsum(here - beside))) + 1)
@@ -96,10 +99,9 @@ def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Slip:
     ]
     best = int(np.argmin(jumps))
     # Channels that read alike can't decide: one lost byte is the most likely then.
-    sure = len(jumps) == 1 or sorted(jumps)[1] >= 2.0 * jumps[best]
-    if not sure:
-        best = len(jumps) - 1
-    return Slip(stop, start + 2 * best + 1, sure)
+    if len(jumps) == 1 or sorted(jumps)[1] >= 2.0 * jumps[best]:
+        return Cut(stop, start + 2 * best + 1, "slip")
+    return Cut(stop, start + size - 1, "slip, channels unsure")
 
 
 def _slipped(here: FloatArray, beside: FloatArray) -> bool:

@@ -102,46 +102,19 @@ class SyncBitDecoder:
     def __init__(self, channels: int, bits: int) -> None:
         self.bytes_per_scan = 2 * channels
         self._bits = bits
-        self._marks = np.full(channels, 0x0101, dtype="<u2")
-        self._marks[0] = 0x0100
         self._pending = b""  # the beginning of a scan
         self._scans = 0
         self._discarded = 0  # since the last good scan
         self._suspect = False  # the last good scan was followed by bytes without a start
 
     def feed(self, data: bytes) -> Scans:
-        """Decode further bytes; an unfinished scan waits for the next call."""
-        data = self._pending + data
-        whole = len(data) - len(data) % self.bytes_per_scan
-        words = np.frombuffer(data, dtype="<u2", count=whole // 2).reshape(-1, len(self._marks))
-        rest = data[whole:]
-        begun = all((byte & 1) == (place > 0) for place, byte in enumerate(rest))
-        in_step = begun and bool(((words & 0x0101) == self._marks).all())
-        if self._discarded or not in_step:
-            return self._resynchronise(data)
-        self._pending = rest
-        self._scans += len(words)
-        return Scans(self._counts(words))
-
-    def finish(self) -> Scans:
-        """Say what is left over at the end: no counts, perhaps a loss."""
-        nothing = np.empty((0, len(self._marks)), dtype=np.int16)
-        left = self._discarded
-        self._discarded, self._pending = 0, b""
-        return Scans(nothing, (self._loss(self._scans, left, self._suspect),) if left else ())
-
-    def _counts(self, words: AnyArray) -> AnyArray:
-        """Take the samples out of words that are in step; shape (scans, channels)."""
-        code = (words & 0x00FF) >> (15 - self._bits) | (words >> 9) << (self._bits - 7)
-        return np.asarray(code.astype(np.int16) - np.int16(1 << (self._bits - 1)))
-
-    def _resynchronise(self, data: bytes) -> Scans:
-        """Find the whole scans between broken ones, and count what is thrown away.
+        """Decode further bytes; an unfinished scan waits for the next call.
 
         A byte with bit 0 = 0 starts a scan; it is whole if the next start is at least a
         scan away. The bytes between the end of a whole scan and the next start, and the
         scans cut short, are thrown away.
         """
+        data = self._pending + data
         size = self.bytes_per_scan
         octets = np.frombuffer(data, dtype=np.uint8)
         starts = np.flatnonzero((octets & 1) == 0)
@@ -173,7 +146,19 @@ class SyncBitDecoder:
         self._suspect = followed
         words = np.ascontiguousarray(octets[starts[index][:, None] + np.arange(size)]).view("<u2")
         self._scans += len(index)
-        return Scans(self._counts(words.reshape(-1, len(self._marks))), tuple(losses))
+        return Scans(self._counts(words), tuple(losses))
+
+    def finish(self) -> Scans:
+        """Say what is left over at the end: no counts, perhaps a loss."""
+        nothing = np.empty((0, self.bytes_per_scan // 2), dtype=np.int16)
+        left = self._discarded
+        self._discarded, self._pending = 0, b""
+        return Scans(nothing, (self._loss(self._scans, left, self._suspect),) if left else ())
+
+    def _counts(self, words: AnyArray) -> AnyArray:
+        """Take the samples out of words that are in step; shape (scans, channels)."""
+        code = (words & 0x00FF) >> (15 - self._bits) | (words >> 9) << (self._bits - 7)
+        return np.asarray(code.astype(np.int16) - np.int16(1 << (self._bits - 1)))
 
     def _loss(self, after_scan: int, discarded: int, suspect: bool) -> Loss:
         return Loss(

@@ -52,7 +52,10 @@ class LetterDriver(Driver):
         raise self._no_answer(letter.decode(), echo)
 
     def _echo(self) -> bytes:
-        return self.line.read(1, self.patience_s)
+        """Return the next byte that is no start-up junk."""
+        while (byte := self.line.read(1, self.patience_s)) and byte in _JUNK:
+            pass
+        return byte
 
 
 class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4):
@@ -98,12 +101,6 @@ class DI154RS(LetterDriver, model="DI-154RS", baudrate=4800, bits=12, channels=4
             self._command(b"B", _BAUD_CODES[baudrate])
             self.line.set_baudrate(baudrate)
             self._baudrate = baudrate
-
-    def _echo(self) -> bytes:
-        """Return the next byte that is no start-up junk."""
-        while (byte := super()._echo()) and byte in _JUNK:
-            pass
-        return byte
 
 
 class DI194RS(DI154RS, model="DI-194RS", bits=10):
