@@ -497,10 +497,13 @@ def _theory_spread(comparison: Mapping[str, Any]) -> float:
 def _ratio(comparison: Mapping[str, Any], name: str) -> Mark:
     """Measured over theory; the theory at each record's own geometry."""
     look = branch(name)
-    entries = [e for e in of_branch(comparison, name) if e.get("quality_factor_limit_theory")]
-    points = series(entries, "quality_factor_limit")
-    of_each = {e["record"]: number(e["quality_factor_limit_theory"]) for e in entries}
-    own = np.array([of_each[record] for record in points.names])
+    measured_of, theory_of = "quality_factor_limit", "quality_factor_limit_theory"
+    entries = [
+        e
+        for e in of_branch(comparison, name)
+        if np.isfinite(number(e.get(measured_of))) and np.isfinite(number(e.get(theory_of)))
+    ]
+    points, own = series(entries, measured_of), series(entries, theory_of).y
     symbol = {"fmt": look.marker, "ecolor": GREY}
     return measured(points.x, points.y / own, points.y_sd / own, None, look.colour, **symbol)
 

@@ -20,13 +20,12 @@ class NothingToDrawError(Exception):
 
 
 class Series(NamedTuple):
-    """Points with error bars; arrays of shape (n,), and the records' names."""
+    """Points with error bars; arrays of shape (n,)."""
 
     x: FloatArray
     x_sd: FloatArray
     y: FloatArray
     y_sd: FloatArray
-    names: tuple[str, ...]
 
 
 def number(entry: Any) -> float:
@@ -63,14 +62,11 @@ def series(entries: Iterable[Entry], quantity: str) -> Series:
             error(e["frequency"]),
             number(e.get(quantity)),
             error(e.get(quantity)),
-            e["record"],
         )
         for e in entries
     ]
     rows = sorted(row for row in rows if np.isfinite(row[0]) and np.isfinite(row[2]))
-    table = np.array([row[:4] for row in rows], dtype=np.float64).reshape(-1, 4)
-    x, x_sd, y, y_sd = table.T
-    return Series(x, x_sd, y, y_sd, tuple(row[4] for row in rows))
+    return Series(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
 
 
 def branches(comparison: Mapping[str, Any]) -> list[str]:

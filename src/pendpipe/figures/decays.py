@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -306,19 +306,16 @@ FALL = 0.75
 """A measured point spans turning points until the amplitude has fallen to this share."""
 
 
-class LocalQuality(NamedTuple):
-    """Q from turning points alone; arrays of shape (n,)."""
-
-    time_s: FloatArray
-    value: FloatArray
-    sd: FloatArray
-
-
-def local_quality(decay: Decay) -> LocalQuality:
+def local_quality(decay: Decay) -> FloatArray:
     """Q from the logarithmic decrement between turning points, without a model.
 
     ``Q = pi n/ln(y1/y2)`` over n cycles in which the amplitude falls to `FALL`;
     the error is that of the two amplitudes.
+
+    Returns
+    -------
+    FloatArray
+        Time, Q and its standard deviation, shape (3, n).
     """
     rows, first = [], 0
     time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
@@ -333,7 +330,7 @@ def local_quality(decay: Decay) -> LocalQuality:
         spread = value * np.hypot(sd[first] / y[first], sd[last] / y[last]) / decrement
         rows.append((0.5 * (time[first] + time[last]), value, spread))
         first = last
-    return LocalQuality(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
+    return np.array(rows, dtype=np.float64).reshape(-1, 3).T
 
 
 def _measured_quality(x: FloatArray, value: FloatArray, sd: FloatArray) -> Mark:

@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from operator import methodcaller
@@ -72,10 +73,8 @@ class Shown:
     @property
     def clock(self) -> Evaluated:
         """The model whose phase tells the cycles apart: the one that stays in step."""
-        best = self.extended
-        if best is None or best.max_phase_error_rad > self.baseline.max_phase_error_rad:
-            best = self.baseline
-        return best.at
+        fits = (fit for _, fit in reversed(self.models))
+        return min(fits, key=lambda fit: fit.max_phase_error_rad).at
 
     @property
     def baseline_name(self) -> str:
@@ -561,9 +560,6 @@ def draw_diagnosis(outcome: Outcome, folder: Path) -> list[Path]:
     """
     content, drawn = shown(outcome), []
     for name, draw in DRAWINGS.items():
-        try:
-            figure = draw(content)
-        except NothingToDrawError:
-            continue
-        drawn.append(save(figure, folder / name, dpi=150)[0])
+        with suppress(NothingToDrawError):
+            drawn.append(save(draw(content), folder / name, dpi=150)[0])
     return drawn

@@ -2,8 +2,6 @@
 
 import io
 
-from matplotlib.figure import Figure
-
 from pendpipe.analysis.fit.result import (
     WITHOUT_LAW,
     FitResult,
@@ -27,7 +25,6 @@ def render_recording(
     recording: Recording,
     result: FitResult,
     statement: str | None = None,
-    figures: tuple[tuple[str, Figure], ...] = (),
 ) -> str:
     """Make the page of one recording.
 
@@ -41,8 +38,6 @@ def render_recording(
         The fit, with its readings.
     statement
         The diagnosis in a paragraph; None where none was asked for.
-    figures
-        Further figures, each with its title.
 
     Returns
     -------
@@ -72,7 +67,8 @@ def render_recording(
             )
             for each in qualities(result)
         ]
-    drawn = [("The decay with its fit", result.plot()), *figures]
+    drawn, title = io.StringIO(), "The decay with its fit"
+    result.plot().savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
     return fill_template(
         "pendpipe.report",
         "recording.html",
@@ -84,19 +80,10 @@ def render_recording(
         qualities=rows,
         advice=quotable(result),
         checks=[check.sentence(unit) for check in result.decrement_check],
-        figures=[
-            (title, inline_svg(_svg(figure), f"figure{number}", title, title))
-            for number, (title, figure) in enumerate(drawn)
-        ],
+        figures=[(title, inline_svg(drawn.getvalue(), "figure0", title, title))],
         statement=statement,
         cuts=result.cuts,
         guesses=(*recording.weak_guesses, *recording.notes),
         warnings=result.warnings,
         provenance=result.provenance,
     )
-
-
-def _svg(figure: Figure) -> str:
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
-    return stream.getvalue()
