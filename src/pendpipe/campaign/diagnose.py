@@ -312,12 +312,17 @@ def _extended(design: Design, change: Callable[[Run], Run] | None) -> tuple[Desi
     if change is None:
         return design, every
     wet = [number for number in every if design.runs[number].fluid is not None]
-    more = []
-    for number in wet:
-        run = design.runs[number]
-        places = {name: place + _CLAMPED_ANEW_M for name, place in run.weights_m.items()}
-        more.append(change(replace(run, weights_m=places)))
-    return replace(design, runs=(*design.runs, *more)), [*every, *wet]
+    more = [
+        replace(
+            design.runs[number],
+            weights_m={
+                name: place + _CLAMPED_ANEW_M
+                for name, place in design.runs[number].weights_m.items()
+            },
+        )
+        for number in wet
+    ]
+    return replace(design, runs=(*design.runs, *map(change, more))), [*every, *wet]
 
 
 def _carried(fit: JointFit, truth: JointFit, design: Design) -> FloatArray:

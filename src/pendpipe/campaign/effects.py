@@ -14,6 +14,7 @@ from inspect import signature
 from typing import Any, Final, Literal
 
 import numpy as np
+from numpy.polynomial.polynomial import polyvander2d
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
@@ -100,9 +101,7 @@ def _closest(tank: Tank) -> float:
 
 def _powers(closeness: FloatArray, depth: FloatArray, nears: int, depths: int) -> FloatArray:
     """The polynomial's terms: every one has the closeness as a factor."""
-    near = [closeness**power for power in range(1, nears + 1)]
-    thick = [depth**power for power in range(depths)]
-    return np.stack([one * other for one in near for other in thick], axis=-1)
+    return np.asarray(polyvander2d(closeness, depth, [nears, depths - 1])[..., depths:], float)
 
 
 @cache

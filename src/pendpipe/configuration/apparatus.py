@@ -56,21 +56,20 @@ def pendulum_parts(
     apparatus: Apparatus, weights_m: Mapping[str, float | FloatArray], *, sphere: bool
 ) -> list[physics.Part]:
     """List the parts of the pendulum; the weights' places below the axis may be arrays."""
-    parts: list[physics.Part] = [physics.Rod(apparatus.rod.mass_kg, apparatus.rod.length_m)]
-    for name, position in weights_m.items():
-        weight = apparatus.weights[name]
-        if weight.radius_m:
-            parts.append(physics.Sphere(weight.mass_kg, weight.radius_m, position))
-        else:
-            parts.append(physics.PointMass(weight.mass_kg, position))
+    rod, weights = apparatus.rod, apparatus.weights
+    parts: list[physics.Part] = [
+        physics.Rod(rod.mass_kg, rod.length_m),
+        *(
+            physics.Sphere(weights[name].mass_kg, weights[name].radius_m, position)
+            for name, position in weights_m.items()
+        ),
+    ]
     if sphere and (ball := apparatus.sphere):
-        parts.append(
-            physics.Sphere(ball.mass_kg, ball.diameter_m / 2, ball.distance_m, submerged=True)
-        )
-        # The screw's mass is counted with the sphere; under water it displaces some more.
-        parts.append(
-            physics.PointMass(0.0, ball.screw_distance_m, displaced_m3=ball.screw_volume_m3)
-        )
+        parts += [
+            physics.Sphere(ball.mass_kg, ball.diameter_m / 2, ball.distance_m, submerged=True),
+            # The screw's mass is counted with the sphere; under water it displaces some more.
+            physics.PointMass(0.0, ball.screw_distance_m, displaced_m3=ball.screw_volume_m3),
+        ]
     return parts
 
 
